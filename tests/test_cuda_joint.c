@@ -720,6 +720,55 @@ START_TEST(joints_survive_a_step_that_fails)
 }
 END_TEST
 
+static bool is_dynamic(sadmm_world *world, sadmm_body_id id)
+{
+    sadmm_body_def def;
+    MUST(world, sadmm_world_body_def(world, id, &def));
+    return def.type == SADMM_BODY_DYNAMIC;
+}
+
+/* Islands that are solved directly take such steps to the host, whose impulses are those of the wrenches then; and back
+ * to the device where nobody asks for it any more. */
+START_TEST(islands_are_solved_directly)
+{
+    struct sadmm_scene scene = open_scene("ragdolls:1");
+    sadmm_world *world = build_scene(&scene);
+    sadmm_settings settings = scene.def.settings;
+    int above = 0, pressed = 0;
+    use_device(world, _i, 0);
+    settings.certify = true;
+    settings.direct_points = 128;
+    MUST(world, sadmm_world_set_settings(world, &settings));
+    for (int step = 0; step < 200; ++step) {
+        step_world(world, 1);
+        above += world_report(world).certificate.ncp_max > 1e-8; /* some rows pass on 1e3 times what they hold by */
+        const int32_t contacts = sadmm_world_contact_count(world), bodies = sadmm_world_body_count(world);
+        double up = 0, most = 1;
+        for (int32_t k = 0; k < contacts; ++k) {
+            sadmm_contact contact;
+            MUST(world, sadmm_world_contacts(world, k, 1, &contact));
+            const bool on_floor = contact.body_a.slot == 0 || !is_dynamic(world, contact.body_a);
+            up += on_floor ? contact.force[2] : 0; /* others are between two bodies */
+            most = fmax(most, norm3(contact.force));
+        }
+        for (int32_t k = 0; k < bodies; ++k) {
+            double wrench[6];
+            if (!is_dynamic(world, body_at(world, k))) continue;
+            MUST(world, sadmm_world_body_contact_wrench(world, body_at(world, k), wrench));
+            up -= wrench[2];
+        }
+        ck_assert_double_lt(fabs(up), 1e-9 * most);
+        pressed += contacts > 0;
+    }
+    ck_assert_int_le(above, 2);
+    ck_assert_int_gt(pressed, 50);
+    settings.direct_points = 0;
+    MUST(world, sadmm_world_set_settings(world, &settings));
+    step_world(world, 20);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("cuda_joint");
@@ -733,5 +782,6 @@ int main(void)
     ADD_CASE(suite, parts_of_any_size_are_solved, 0, 4);
     ADD_CASE(suite, rows_of_a_resident_step_are_read, 0, tested_precisions());
     ADD_CASE(suite, joints_survive_a_step_that_fails, 0, tested_precisions());
+    ADD_CASE(suite, islands_are_solved_directly, 0, tested_precisions());
     return run_cuda_suite(suite);
 }

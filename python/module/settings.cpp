@@ -31,6 +31,8 @@ void bind_settings(nb::module_ &m)
         .def_rw("penalty_ratio_limit", &S::penalty_ratio_limit, "'paper': alpha of eq. (15).")
         .def_rw("penalty_update_warm", &S::penalty_update_warm, "'paper': also update in steps that start warm.")
         .def_rw("warm_start", &S::warm_start, "Start from the last step's impulses and velocities.")
+        .def_rw("direct_points", &S::direct_points,
+                "Islands with joints and at most so many contact points are solved directly, in [0, 128].")
         .def_rw("residual_tolerance", &S::residual_tolerance, "Stop when both residuals are at most this; 0: never.")
         .def_rw("certificate_tolerance", &S::certificate_tolerance, "Stop when the natural map (m/s) is at most this; 0: never.")
         .def_rw("certificate_momentum_tolerance", &S::certificate_momentum_tolerance, "... and the momentum error this.")

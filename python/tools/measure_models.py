@@ -3,13 +3,14 @@
 Two tables. One step by iterations: natural map (m/s) of the step 1 s after the start, made again from the same state
 with more and more iterations. Runs of 10 s: controls of servos go from one end of their range to the other and back
 every 2 s (sweep), or are 0; largest natural map, share of the steps with at most 1e-6 m/s, that of the last step;
-largest errors of loops and of locked coordinates (m, rad) over the last 5 s.
+largest errors of loops and of locked coordinates (m, rad) over the last 5 s; time of a step with its certificate.
 
 Models are from packages by their registry names (BY_ITERATIONS, RUNS); what is not installed is printed and left out.
 NAME: only models whose name has it.
 """
 
 import argparse
+import time
 import xml.etree.ElementTree as tree
 from importlib import metadata
 
@@ -186,27 +187,29 @@ def loaded_of(path, given, options):
     return subadmm.load(path, backend=given.backend, precision=given.precision, **options)
 
 
-def set_iterations(world, iterations):
+def set_iterations(world, iterations, direct_points):
     settings = world.settings
     settings.certify, settings.iterations, settings.dt = True, iterations, min(settings.dt, 0.005)
+    if direct_points is not None:
+        settings.direct_points = direct_points
     world.settings = settings
 
 
 def maps_by_iterations(path, given):
     world = loaded_of(path, given, {}).world
-    set_iterations(world, STEP_ITERATIONS[0])
+    set_iterations(world, STEP_ITERATIONS[0], given.direct_points)
     world.step(round(1 / world.settings.dt) - 1)
     state, maps = world.save(), []
     for iterations in STEP_ITERATIONS:
         world.restore(state)
-        set_iterations(world, iterations)
+        set_iterations(world, iterations, given.direct_points)
         world.step()
         maps.append(world.report.certificate.ncp_max)
     return maps
 
 
-def sweep(loaded, time):
-    share = 0.5 - 0.5 * np.cos(2 * np.pi * time / PERIOD)
+def sweep(loaded, at):
+    share = 0.5 - 0.5 * np.cos(2 * np.pi * at / PERIOD)
     for actuator in loaded.actuators.values():
         low, high = actuator.control_range
         if actuator.kind != "motor" and np.isfinite([low, high]).all():
@@ -228,22 +231,25 @@ def kind_of_worst(world):
 
 
 def run(path, given, iterations, motion, options):
-    """(natural maps, what is worst of those above SMALL, worst error of loops, of locked coordinates)"""
+    """(natural maps, what is worst of those above SMALL, worst error of loops, of locked coordinates, seconds a step with
+    its certificate)"""
     loaded = loaded_of(path, given, options)
     world, loops, joints = loaded.world, [j for j in loaded.loops.values() if j.enabled], tree_joints(loaded)
-    set_iterations(world, iterations)
+    set_iterations(world, iterations, given.direct_points)
     steps = round(DURATION / world.settings.dt)
-    maps, worst, loop_off, joint_off = np.zeros(steps), {}, 0.0, 0.0
+    maps, worst, loop_off, joint_off, spent = np.zeros(steps), {}, 0.0, 0.0, 0.0
     for k in range(steps):
         if motion == "sweep" and k % 4 == 0:
             sweep(loaded, k * world.settings.dt)
+        begin = time.perf_counter()
         world.step()
+        spent += time.perf_counter() - begin
         maps[k] = world.report.certificate.ncp_max
         if given.worst and maps[k] > SMALL:
             worst.setdefault(kind_of_worst(world), []).append(maps[k])
         if k > steps // 2 and k % 10 == 0:
             loop_off, joint_off = max(loop_off, lock_error(world, loops)), max(joint_off, lock_error(world, joints))
-    return maps, worst, loop_off if loops else None, joint_off
+    return maps, worst, loop_off if loops else None, joint_off, spent / steps
 
 
 def row(*cells):
@@ -260,6 +266,7 @@ def main():
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--backend", default="cpu")
     parser.add_argument("--precision", default="f64")
+    parser.add_argument("--direct-points", type=int, help="in place of the model's: 0: contacts by iteration alone")
     parser.add_argument("--iterations", type=int, action="append", help="of the runs, in place of the table's")
     parser.add_argument("--worst", action="store_true",
                         help="of steps above 1e-6 m/s: how many by a contact that sticks, slips or is open, or a row")
@@ -277,13 +284,13 @@ def main():
     for path, model in wanted(BY_ITERATIONS):
         row(model[0], *(f"{m:.0e}" for m in maps_by_iterations(path, given)))
     print()
-    head("model, package", "", "iterations", "largest map", "small", "at the end", "loops, m", "joints off")
+    head("model, package", "", "iterations", "largest map", "small", "at the end", "loops, m", "joints off", "ms a step")
     for path, (name, package, version, _, motion, counts, options) in wanted(RUNS):
         for count in given.iterations or counts:
-            maps, worst, loops, joints = run(path, given, count, motion, options)
+            maps, worst, loops, joints, spent = run(path, given, count, motion, options)
             row(f"{name}, {package} {version}", motion, str(count), f"{maps.max():.0e}",
                 f"{100 * np.mean(maps <= SMALL):.1f} %", f"{maps[-1]:.0e}", "" if loops is None else f"{loops:.0e}",
-                f"{joints:.0e}",
+                f"{joints:.0e}", f"{1e3 * spent:.2f}",
                 *(f"{kind}: {len(of)}, median {np.median(of):.0e}" for kind, of in sorted(worst.items())))
 
 

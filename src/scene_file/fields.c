@@ -102,6 +102,7 @@ static const struct sadmm_field settings_list[] = {
     REAL(sadmm_settings, penalty_ratio_limit),
     BOOL(sadmm_settings, penalty_update_warm),
     BOOL(sadmm_settings, warm_start),
+    INT32(sadmm_settings, direct_points),
     REAL(sadmm_settings, residual_tolerance),
     REAL(sadmm_settings, certificate_tolerance),
     REAL(sadmm_settings, certificate_momentum_tolerance),

@@ -106,7 +106,7 @@ def load(
         backend=backend,
         precision=precision,
         device=device,
-        settings=settings if settings is not None else settings_of(source),
+        settings=settings if settings is not None else settings_of(source, backend),
     )
     loaded = LoadedModel(world, source, report)
     report_options(source, report)

@@ -5,6 +5,9 @@ import numpy as np
 from .model import element
 
 
+DIRECT_POINTS = 64  # contact points of an island that is solved directly, at most
+
+
 def disabled(source, flag):
     """Is a flag of the file's <option><flag> off? As 'CONTACT'."""
     import mujoco
@@ -12,11 +15,13 @@ def disabled(source, flag):
     return bool(source.opt.disableflags & int(getattr(mujoco.mjtDisableBit, "mjDSBL_" + flag, 0)))
 
 
-def settings_of(source):
+def settings_of(source, backend):
+    """The file's. Contacts of the robots are solved directly, but on a device, where that would bring every step to the host."""
     from .. import Settings
 
     gravity = [0.0, 0, 0] if disabled(source, "GRAVITY") else list(source.opt.gravity)
-    return Settings(dt=float(np.clip(source.opt.timestep, 1e-6, 1)), gravity=gravity, iterations=60)
+    points = 0 if backend == "cuda" else DIRECT_POINTS
+    return Settings(dt=float(np.clip(source.opt.timestep, 1e-6, 1)), gravity=gravity, iterations=60, direct_points=points)
 
 
 def report_options(source, report):

@@ -60,6 +60,7 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
     } integers[] = {
         {"substeps", s->substeps, 1, SADMM_MOST_SUBSTEPS},
         {"iterations", s->iterations, 1, 1000000},
+        {"direct_points", s->direct_points, 0, SADMM_MOST_DIRECT_POINTS},
         {"check_period", s->check_period, 1, 1000000},
         {"threads", s->threads, 0, 1024},
     };
@@ -132,7 +133,7 @@ sadmm_settings sadmm_settings_of_substep(const sadmm_settings *whole)
 #define MEMBERS(ONE, THREE)                                                                                      \
     ONE(dt) ONE(substeps) THREE(gravity)                                                                         \
     ONE(method) ONE(iterations) ONE(relaxation) ONE(penalty_period) ONE(penalty_mass_factor) ONE(penalty_offset) \
-    ONE(penalty_ratio_limit) ONE(penalty_update_warm) ONE(warm_start)                                            \
+    ONE(penalty_ratio_limit) ONE(penalty_update_warm) ONE(warm_start) ONE(direct_points)                         \
     ONE(residual_tolerance) ONE(certificate_tolerance) ONE(certificate_momentum_tolerance) ONE(check_period)     \
     ONE(measure_residuals) ONE(certify) ONE(recover_wrenches)                                                    \
     ONE(baumgarte) ONE(slop) ONE(correction_speed) ONE(restitution_threshold)                                    \

@@ -49,6 +49,7 @@ void sadmm_archive_settings(struct sadmm_archive *archive, sadmm_settings *s)
     SADMM_ARCHIVE(archive, s->penalty_ratio_limit);
     sadmm_archive_flag(archive, &s->penalty_update_warm);
     sadmm_archive_flag(archive, &s->warm_start);
+    SADMM_ARCHIVE(archive, s->direct_points);
     SADMM_ARCHIVE(archive, s->residual_tolerance);
     SADMM_ARCHIVE(archive, s->certificate_tolerance);
     SADMM_ARCHIVE(archive, s->certificate_momentum_tolerance);

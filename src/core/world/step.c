@@ -153,6 +153,7 @@ struct host_step {
     int iterations;        /* of all of them */
     bool unconverged;      /* one of them has not met a stop rule */
     int32_t limited;       /* islands, most of any */
+    int32_t direct;        /* islands solved directly in this sub-step */
     int64_t islands_above; /* likewise, but of the last sub-step; -1: no stop rule */
     double ms[SADMM_PHASE_COUNT];
 };
@@ -166,6 +167,18 @@ static sadmm_status solve_joined(struct host_step *step, bool after)
     if (!world->joined) return sadmm_fail_memory(&world->error, "joined bodies");
     return sadmm_joined_solve(world->joined, &step->system, world->joint_constraints, world->joint_constraint_count,
                               &step->settings, after, &world->error);
+}
+
+/* What the iterations have left of islands with joints (core/solve/direct.h). */
+static sadmm_status solve_direct(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    step->direct = 0;
+    if (step->settings.direct_points == 0 || !step->system.rows) return SADMM_OK;
+    if (!world->direct) world->direct = sadmm_direct_create();
+    if (!world->direct) return sadmm_fail_memory(&world->error, "islands that are solved directly");
+    return sadmm_direct_solve(world->direct, world->joined, &step->system, world->joint_constraints, &step->settings,
+                              &step->direct, &world->error);
 }
 
 static sadmm_status make_plan(struct host_step *step)
@@ -210,6 +223,7 @@ static sadmm_status integrate(struct host_step *step)
     TRY(world->kernels->integrate(world->context, world->next, &world->error));
     if (step->system.rows) {
         TRY(solve_joined(step, true));
+        TRY(solve_direct(step));
         TRY(sadmm_world_move_joined(world, &step->settings));
         sadmm_world_keep_rows(world, &step->settings);
     }
@@ -229,7 +243,10 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     case SADMM_STAGE_INTEGRATE: return integrate(step);
     case SADMM_STAGE_WRENCHES:
         sadmm_world_add_driven_wrenches(world, &step->settings);
-        return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
+        if (step->direct == 0)
+            return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
+        sadmm_world_find_wrenches(world, &step->settings); /* by impulses that the backend has not */
+        return SADMM_OK;
     case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;
     case SADMM_STAGE_CERTIFY:
         step->system.carried = NULL;

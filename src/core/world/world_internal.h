@@ -27,6 +27,7 @@
 #include "core/model/joint_law.h"
 #include "core/model/settings.h"
 #include "core/solve/certificate.h"
+#include "core/solve/direct.h"
 #include "core/solve/joined.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
@@ -277,6 +278,7 @@ struct sadmm_world {
     struct sadmm_certificate_workspace certificate_workspace;
     int64_t certified_step; /* the step that the workspace's contacts are of, as report.step counts; -1: of none */
     struct sadmm_joined *joined; /* made with the first joint */
+    struct sadmm_direct *direct; /* made with the first island that is solved directly */
     sadmm_step_report report;
 };
 
@@ -297,6 +299,8 @@ sadmm_status sadmm_world_move_driven(sadmm_world *world, const sadmm_settings *s
 /* The next sub-step begins there. */
 void sadmm_world_turn_driven(sadmm_world *world);
 /* What the (sub-)step's contacts give them. */
+/* Contact wrenches of dynamic bodies, eq. (12), by the points' impulses as they are. */
+void sadmm_world_find_wrenches(sadmm_world *world, const sadmm_settings *settings);
 void sadmm_world_add_driven_wrenches(sadmm_world *world, const sadmm_settings *settings);
 /* The step is done. */
 void sadmm_world_commit_driven(sadmm_world *world);

@@ -1,0 +1,593 @@
+#include "direct.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/model/islands.h"
+#include "core/model/system_math.h"
+#include "direct_newton.h"
+#include "joined_part.h"
+
+/* m/s: an island with a smaller natural map, and velocities as near to what its impulses make them, is left alone; what is aimed at; what Newton's steps go for, which solve for
+ * what rows in their states give. */
+static const double ENOUGH = 1e-9, AIM = 1e-11, NEWTON_AIM = 1e-13;
+/* Rows that changed their states and are solved for together with the contacts; and how often it goes from the one to
+ * the other. */
+/* Multiplications of the eliminations for an island, so that one that does not come to an end takes 0.1 s or less. */
+static const double BUDGET = 2e8;
+enum { MOST_LOOSE = 96, MOST_ROUNDS = 16, MOST_PASSES = 6 };
+
+struct direct_contact {
+    int32_t pair, point;
+    int32_t body[2];           /* of the island; -1: not one that is solved for */
+    double e;
+    double row[2][3][6], answer[2][3][6]; /* J, A^-1 J^T of either side: normal, tangents */
+    double given[3];           /* velocity of what is not solved for */
+};
+
+/* A row that is solved for with the contacts: r of a part of the island. */
+struct direct_loose {
+    int32_t part, r;
+    double lo, hi;
+};
+
+struct direct_body {
+    int32_t body;              /* of the system */
+    double factor[36], b[6];
+    double velocity[6], dv[6]; /* by the impulses so far; by one of them */
+};
+
+struct sadmm_direct {
+    /* bodies of the system: island, number in it, the next one of it; islands, by their first body: */
+    int32_t *label, *number, *next_body;
+    int32_t *points, *first_pair; /* how many points; its pairs */
+    uint8_t *kind;             /* bits of enum island_kind */
+    int32_t *next_pair;
+    /* one island: */
+    struct direct_body *bodies;
+    struct direct_contact *contacts;
+    struct direct_law *laws;
+    int32_t *parts;            /* of the joined bodies */
+    double *numbers;           /* lambda, u, G, Newton's work; the best */
+    double *rows;              /* multipliers of the system's rows, the best */
+    uint8_t *states;           /* JOINED_ROWS a place, of the parts one after the other: those that G is for */
+    size_t label_capacity, number_capacity, body_list_capacity, points_capacity, first_capacity, kind_capacity,
+        pair_list_capacity, body_capacity,
+        contact_capacity, law_capacity, part_capacity, numbers_capacity, row_capacity, state_capacity;
+};
+
+enum island_kind { ISLAND_JOINED = 1, ISLAND_LEFT = 2 };
+
+/* The island that is solved. */
+struct island {
+    struct sadmm_direct *d;
+    struct sadmm_joined *joined;
+    const struct sadmm_system *system;
+    const struct sadmm_row_constraint *slots;
+    const struct sadmm_settings *settings;
+    int32_t bodies, contacts, parts, loose;
+    struct direct_loose loose_row[MOST_LOOSE];
+    struct direct_dense dense;
+    double *best_lambda, *best_velocity; /* contacts x 3; bodies x 6 */
+    double best;                         /* natural map, m/s */
+};
+
+struct sadmm_direct *sadmm_direct_create(void)
+{
+    return (struct sadmm_direct *)sadmm_alloc(1, sizeof(struct sadmm_direct));
+}
+
+void sadmm_direct_destroy(struct sadmm_direct *d)
+{
+    if (!d) return;
+    void *blocks[] = {d->label,  d->number,   d->next_body, d->points, d->first_pair, d->kind, d->next_pair,
+                      d->bodies, d->contacts, d->laws,      d->parts,  d->numbers,    d->rows, d->states};
+    for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
+    sadmm_free(d);
+}
+
+/* ---- an island's contacts and bodies ------------------------------------------------------------------------------ */
+
+static void add_body(struct island *s, int32_t i)
+{
+    struct direct_body *body = &s->d->bodies[s->bodies];
+    double A[36];
+    body->body = i;
+    sadmm_system_body(s->system, s->settings, i, A, body->b);
+    ldl6_factor(A, body->factor);
+    memcpy(body->velocity, s->system->velocity + 6 * (size_t)i, sizeof body->velocity);
+    s->d->number[i] = s->bodies++;
+    const int32_t part = s->joined->part[i];
+    if (part < 0 || s->joined->entry[i] != 0) return;
+    s->d->parts[s->parts++] = part;
+}
+
+static void add_contact(struct island *s, int32_t p, int32_t k)
+{
+    const struct sadmm_system *system = s->system;
+    const struct sadmm_contact_pair *pair = &system->contacts->pairs[p];
+    const struct sadmm_contact_point *points = &system->contacts->points[pair->first];
+    struct direct_contact *c = &s->d->contacts[s->contacts];
+    struct direct_law *law = &s->d->laws[s->contacts];
+    const mat3 frame = sadmm_contact_frame(pair->normal);
+    const vec3 impulse = m3_mul(frame, v3_load(points[k].impulse)),
+               driven = m3_mul(frame, sadmm_driven_part(system, pair, &points[k]));
+    c->pair = p, c->point = pair->first + k;
+    c->e = sadmm_contact_e(system, s->settings, pair, points, k);
+    v3_store(driven, c->given);
+    *law = (struct direct_law){.first = 3 * s->contacts, .count = 3, .friction = pair->friction};
+    v3_store(impulse, s->dense.lambda + law->first);
+    for (int side = 0; side < 2; ++side) {
+        const int32_t body = side ? pair->body_b : pair->body_a;
+        c->body[side] = body >= 0 ? s->d->number[body] : -1;
+    }
+    for (int i = 0; i < 3; ++i) {
+        double response = 0;
+        for (int side = 0; side < 2; ++side) {
+            sadmm_contact_row(frame.r[i], side ? points[k].arm_b : points[k].arm_a, side ? 1 : -1, c->row[side][i]);
+            if (c->body[side] < 0) continue;
+            ldl6_solve(s->d->bodies[c->body[side]].factor, c->row[side][i], c->answer[side][i]);
+            response += six_product(c->row[side][i], c->answer[side][i]);
+        }
+        if (i == 0 || pair->friction > 0) law->response = response > law->response ? response : law->response;
+    }
+    ++s->contacts;
+}
+
+/* x + e of the contacts by the bodies' velocities. */
+static void find_contact_velocities(struct island *s)
+{
+    for (int32_t i = 0; i < s->contacts; ++i) {
+        const struct direct_contact *c = &s->d->contacts[i];
+        for (int k = 0; k < 3; ++k) {
+            double x = c->given[k] + (k == 0 ? c->e : 0);
+            for (int side = 0; side < 2; ++side)
+                if (c->body[side] >= 0) x += six_product(c->row[side][k], s->d->bodies[c->body[side]].velocity);
+            s->dense.u[3 * i + k] = x;
+        }
+    }
+}
+
+/* ---- what the iterations have left -------------------------------------------------------------------------------- */
+
+static void add_row_loads(struct island *s, const struct joined_view *v)
+{
+    const struct sadmm_rows *rows = s->system->rows;
+    EACH_JOINED_ROW(s->slots, v, r, from) {
+        for (int side = 0; side < 2; ++side) {
+            const int32_t entry = v->s.side[2 * (r / JOINED_ROWS) + side];
+            const double *row = (side ? rows->jacobian_b : rows->jacobian_a) + 6 * (size_t)from;
+            double *to = entry >= 0 ? s->d->bodies[s->d->number[v->s.body[entry]]].dv : NULL;
+            for (int k = 0; to && k < 6; ++k) to[k] += row[k] * rows->lambda[from];
+        }
+    }
+}
+
+/* How far velocities are from those that go with the impulses, m/s or rad/s. */
+static double momentum_missing(struct island *s)
+{
+    double most = 0, owed[6];
+    for (int32_t n = 0; n < s->bodies; ++n) memcpy(s->d->bodies[n].dv, s->d->bodies[n].b, 6 * sizeof(double));
+    for (int32_t i = 0; i < s->contacts; ++i)
+        for (int side = 0; side < 2; ++side)
+            for (int k = 0; s->d->contacts[i].body[side] >= 0 && k < 3; ++k)
+                for (int j = 0; j < 6; ++j)
+                    s->d->bodies[s->d->contacts[i].body[side]].dv[j] +=
+                        s->d->contacts[i].row[side][k][j] * s->dense.lambda[3 * i + k];
+    for (int32_t k = 0; k < s->parts; ++k) add_row_loads(s, &s->joined->parts[s->d->parts[k]].view);
+    for (int32_t n = 0; n < s->bodies; ++n) {
+        const struct direct_body *body = &s->d->bodies[n];
+        ldl6_solve(body->factor, body->dv, owed);
+        for (int k = 0; k < 6; ++k) most = fmax(most, fabs(body->velocity[k] - owed[k]));
+    }
+    return most;
+}
+
+/* ---- velocities and rows for given impulses ----------------------------------------------------------------------- */
+
+static struct joined_part *part_of(const struct island *s, int32_t k) { return &s->joined->parts[s->d->parts[k]]; }
+
+/* A load (force, torque) dt on a body. */
+static void add_load(struct island *s, int32_t number, const double row[6], double lambda)
+{
+    struct direct_body *body = &s->d->bodies[number];
+    const int32_t part = s->joined->part[body->body];
+    double *to = part < 0 ? body->dv
+                          : s->joined->parts[part].impulse + 6 * (size_t)s->joined->entry[body->body];
+    for (int k = 0; k < 6; ++k) to[k] += row[k] * lambda;
+}
+
+static void put_loads(struct island *s)
+{
+    for (int32_t k = 0; k < s->parts; ++k) {
+        struct joined_part *part = part_of(s, k);
+        memset(part->impulse, 0, 6 * (size_t)part->view.s.bodies * sizeof *part->impulse);
+    }
+    for (int32_t n = 0; n < s->bodies; ++n) memcpy(s->d->bodies[n].dv, s->d->bodies[n].b, 6 * sizeof(double));
+    for (int32_t i = 0; i < s->contacts; ++i)
+        for (int side = 0; side < 2; ++side)
+            for (int k = 0; s->d->contacts[i].body[side] >= 0 && k < 3; ++k)
+                add_load(s, s->d->contacts[i].body[side], s->d->contacts[i].row[side][k], s->dense.lambda[3 * i + k]);
+}
+
+/* Its multiplier is given, whatever its law says. */
+static void hold_loose(const struct island *s, int32_t part)
+{
+    for (int32_t i = 0; i < s->loose; ++i) {
+        const struct direct_loose *loose = &s->loose_row[i];
+        struct joined_row *row = &part_of(s, part)->view.rows[loose->r];
+        if (loose->part == part) row->lo = row->hi = s->dense.lambda[3 * s->contacts + i];
+    }
+}
+
+static void find_loose_residuals(struct island *s)
+{
+    for (int32_t i = 0; i < s->loose; ++i)
+        s->dense.u[3 * s->contacts + i] =
+            joined_residual(&part_of(s, s->loose_row[i].part)->view, s->loose_row[i].r, true, true);
+}
+
+/* Velocities, rows and u for the impulses of the contacts and of loose rows. states: where rows were, and are then.
+ * False: some of the rows have not settled, and u is not what goes with them. */
+static bool solve_for_impulses(struct island *s, uint8_t *states)
+{
+    bool settled = true;
+    put_loads(s);
+    for (int32_t k = 0; k < s->parts; ++k) {
+        struct joined_part *part = part_of(s, k);
+        const struct joined_view *v = &part->view;
+        const size_t rows = (size_t)(JOINED_ROWS * v->s.places);
+        sadmm_joined_part_load(part, s->system, s->settings, s->slots);
+        hold_loose(s, k);
+        settled = sadmm_joined_part_solve(v, states, true) && settled;
+        memcpy(states, v->state, rows);
+        states += rows;
+        for (int32_t e = 0; e < v->s.bodies; ++e) {
+            double *velocity = s->d->bodies[s->d->number[v->s.body[e]]].velocity;
+            for (int j = 0; j < 6; ++j) velocity[j] = v->velocity[6 * e + j] + v->dv[6 * e + j];
+        }
+    }
+    for (int32_t n = 0; n < s->bodies; ++n) {
+        struct direct_body *body = &s->d->bodies[n];
+        if (s->joined->part[body->body] < 0) ldl6_solve(body->factor, body->dv, body->velocity);
+    }
+    find_contact_velocities(s);
+    find_loose_residuals(s);
+    return settled;
+}
+
+/* Where the rows' own solve has left them. */
+static void take_states(const struct island *s, uint8_t *states)
+{
+    for (int32_t k = 0; k < s->parts; ++k) {
+        const struct joined_view *v = &part_of(s, k)->view;
+        memcpy(states, v->state, (size_t)(JOINED_ROWS * v->s.places));
+        states += JOINED_ROWS * v->s.places;
+    }
+}
+
+/* Rows that are no longer as they were become loose. False: too many. */
+static bool loosen(struct island *s, const uint8_t *before, const uint8_t *after, bool *any)
+{
+    *any = false;
+    for (int32_t k = 0; k < s->parts; ++k) {
+        const struct joined_view *v = &part_of(s, k)->view;
+        for (int32_t r = 0; r < JOINED_ROWS * v->s.places; ++r) {
+            if (before[r] == after[r] || after[r] == JOINED_GIVEN) continue;
+            if (s->loose == MOST_LOOSE) return false;
+            const int32_t number = 3 * s->contacts + s->loose;
+            s->loose_row[s->loose] = (struct direct_loose){k, r, v->rows[r].lo, v->rows[r].hi};
+            s->d->laws[s->contacts + s->loose] = (struct direct_law){
+                .first = number, .count = 1, .lo = v->rows[r].lo, .hi = v->rows[r].hi,
+                .response = v->rows[r].gain * joined_scale(v, r) + v->rows[r].compliance};
+            s->dense.lambda[number] = joined_bounded(v, r);
+            s->dense.u[number] = joined_residual(v, r, true, true);
+            ++s->loose;
+            *any = true;
+        }
+        before += JOINED_ROWS * v->s.places;
+        after += JOINED_ROWS * v->s.places;
+    }
+    s->dense.laws = s->contacts + s->loose;
+    s->dense.size = 3 * s->contacts + s->loose;
+    return true;
+}
+
+/* ---- G ------------------------------------------------------------------------------------------------------------ */
+
+/* Rows of a part answer to impulses alone, from rest, in the states that they are in. */
+static void make_linear(const struct joined_view *v)
+{
+    memset(v->velocity, 0, 6 * (size_t)v->s.bodies * sizeof *v->velocity);
+    memset(v->missing, 0, 6 * (size_t)v->s.bodies * sizeof *v->missing);
+    for (int32_t r = 0; r < JOINED_ROWS * v->s.places; ++r) {
+        v->rows[r].bias = v->rows[r].lambda = v->change[r] = 0;
+    }
+}
+
+/* What a number's impulse 1 does to its sides: a body's answer. */
+struct impulse_side {
+    int32_t number;
+    const double *row, *answer;
+};
+static int sides_of(const struct island *s, int32_t number, struct impulse_side side[2])
+{
+    int sides = 0;
+    if (number < 3 * s->contacts) {
+        const struct direct_contact *c = &s->d->contacts[number / 3];
+        for (int k = 0; k < 2; ++k)
+            if (c->body[k] >= 0)
+                side[sides++] = (struct impulse_side){c->body[k], c->row[k][number % 3], c->answer[k][number % 3]};
+        return sides;
+    }
+    const struct direct_loose *loose = &s->loose_row[number - 3 * s->contacts];
+    const struct joined_view *v = &part_of(s, loose->part)->view;
+    for (int k = 0; k < 2; ++k) {
+        const int32_t entry = v->s.side[2 * (loose->r / JOINED_ROWS) + k];
+        if (entry >= 0)
+            side[sides++] = (struct impulse_side){s->d->number[v->s.body[entry]], v->rows[loose->r].jacobian[k],
+                                                  v->answer + 12 * (size_t)loose->r + 6 * k};
+    }
+    return sides;
+}
+
+static const double *change_of(const struct island *s, int32_t number)
+{
+    const struct direct_body *body = &s->d->bodies[number];
+    const int32_t part = s->joined->part[body->body];
+    return part < 0 ? body->dv : s->joined->parts[part].view.dv + 6 * (size_t)s->joined->entry[body->body];
+}
+
+/* What an impulse of 1 changes the velocities of its bodies by, and of those that rows join to them; of others dv is 0,
+ * as before and after. */
+static void answer(struct island *s, const struct impulse_side side[2], int sides, double scale)
+{
+    const struct joined_view *moved[2] = {NULL, NULL};
+    for (int k = 0; k < sides; ++k) {
+        struct direct_body *body = &s->d->bodies[side[k].number];
+        const int32_t part = s->joined->part[body->body];
+        double *to = body->dv;
+        if (part >= 0) {
+            moved[k] = &s->joined->parts[part].view;
+            to = moved[k]->missing + 6 * (size_t)s->joined->entry[body->body];
+        }
+        for (int j = 0; j < 6; ++j) to[j] = scale * side[k].answer[j] + (part >= 0 && scale != 0 ? to[j] : 0);
+    }
+    for (int k = 0; k < 2; ++k) {
+        if (!moved[k] || (k == 1 && moved[1] == moved[0])) continue;
+        if (scale == 0) {
+            memset(moved[k]->dv, 0, 6 * (size_t)moved[k]->s.bodies * sizeof *moved[k]->dv);
+            continue;
+        }
+        /* Twice: along what rows hold, what they give by is all there is. */
+        sadmm_joined_part_solve_rows(moved[k], false);
+        sadmm_joined_part_solve_rows(moved[k], true);
+    }
+}
+
+static void make_responses(struct island *s, double *G)
+{
+    const size_t n = (size_t)s->dense.size;
+    for (int32_t k = 0; k < s->parts; ++k) {
+        const struct joined_view *v = &part_of(s, k)->view;
+        make_linear(v);
+        memset(v->dv, 0, 6 * (size_t)v->s.bodies * sizeof *v->dv);
+    }
+    for (int32_t i = 0; i < s->bodies; ++i) memset(s->d->bodies[i].dv, 0, sizeof s->d->bodies[i].dv);
+    for (size_t c = 0; c < n; ++c) {
+        struct impulse_side by[2], on[2];
+        const int sides = sides_of(s, (int32_t)c, by);
+        answer(s, by, sides, 1);
+        for (size_t r = 0; r < n; ++r) {
+            const int others = sides_of(s, (int32_t)r, on);
+            double x = 0;
+            for (int k = 0; k < others; ++k) x += six_product(on[k].row, change_of(s, on[k].number));
+            if (r >= 3 * (size_t)s->contacts) {
+                const struct direct_loose *loose = &s->loose_row[r - 3 * (size_t)s->contacts];
+                const struct joined_row *row = &part_of(s, loose->part)->view.rows[loose->r];
+                x = row->gain * x + (r == c ? row->compliance : 0);
+            }
+            G[r * n + c] = x;
+        }
+        answer(s, by, sides, 0);
+    }
+}
+
+/* ---- the search --------------------------------------------------------------------------------------------------- */
+
+static void keep_best(struct island *s)
+{
+    const double map = direct_natural_map(&s->dense);
+    if (!(map < s->best)) return;
+    s->best = map;
+    memcpy(s->best_lambda, s->dense.lambda, 3 * (size_t)s->contacts * sizeof *s->best_lambda);
+    for (int32_t n = 0; n < s->bodies; ++n)
+        memcpy(s->best_velocity + 6 * (size_t)n, s->d->bodies[n].velocity, 6 * sizeof(double));
+    for (int32_t k = 0; k < s->parts; ++k) {
+        const struct joined_view *v = &part_of(s, k)->view;
+        EACH_JOINED_ROW(s->slots, v, r, from) s->d->rows[from] = joined_bounded(v, r);
+    }
+}
+
+/* Velocities and rows for the impulses as they are, where rows that change their states become loose, until none does.
+ * changed: is set where G is no longer right. False: rows do not settle. */
+static bool settle(struct island *s, uint8_t *states, uint8_t *next, size_t rows, bool *changed)
+{
+    for (int pass = 0; pass < MOST_PASSES; ++pass) {
+        bool loose = false;
+        memcpy(next, states, rows);
+        const bool settled = solve_for_impulses(s, next);
+        if (settled) keep_best(s);
+        if (!loosen(s, states, next, &loose)) return false;
+        if (!loose) return settled;
+        memcpy(states, next, rows);
+        *changed = true;
+    }
+    return false;
+}
+
+static void search(struct island *s, double *G, uint8_t *states, uint8_t *next, size_t rows)
+{
+    bool changed = true;
+    take_states(s, states);
+    if (!settle(s, states, next, rows, &changed)) return;
+    for (int round = 0; round < MOST_ROUNDS && s->best > AIM; ++round) {
+        const double last = s->best;
+        if (changed) make_responses(s, G);
+        changed = false;
+        direct_newton(&s->dense, NEWTON_AIM);
+        if (!settle(s, states, next, rows, &changed)) return;
+        if (!changed && s->best > last / 2) return; /* what is left is rounding */
+    }
+}
+
+static void store_best(const struct island *s)
+{
+    struct sadmm_contact_set *contacts = s->system->contacts;
+    for (int32_t i = 0; i < s->contacts; ++i) {
+        const struct direct_contact *c = &s->d->contacts[i];
+        const double *lambda = s->best_lambda + 3 * (size_t)i;
+        const mat3 frame = sadmm_contact_frame(contacts->pairs[c->pair].normal);
+        const vec3 normal = v3_scale(frame.r[0], lambda[0]);
+        v3_store(v3_madd(v3_madd(normal, lambda[1], frame.r[1]), lambda[2], frame.r[2]),
+                 contacts->points[c->point].impulse);
+    }
+    for (int32_t n = 0; n < s->bodies; ++n)
+        memcpy(s->system->velocity + 6 * (size_t)s->d->bodies[n].body, s->best_velocity + 6 * (size_t)n,
+               6 * sizeof(double));
+    for (int32_t k = 0; k < s->parts; ++k) {
+        const struct joined_view *v = &part_of(s, k)->view;
+        EACH_JOINED_ROW(s->slots, v, r, from) {
+            s->system->rows->lambda[from] = s->d->rows[from];
+            (void)r;
+        }
+    }
+}
+
+/* ---- all islands -------------------------------------------------------------------------------------------------- */
+
+/* Lists by island, ascending: its bodies from the first one, which is its label, its pairs. Last ones are kept meanwhile
+ * in `number` and `points`. */
+static void list_islands(struct sadmm_direct *d, const struct sadmm_system *system)
+{
+    const struct sadmm_contact_set *contacts = system->contacts;
+    sadmm_islands(system, d->label);
+    for (int32_t i = 0; i < system->body_count; ++i) {
+        const int32_t label = d->label[i];
+        d->next_body[i] = d->first_pair[i] = -1;
+        if (label != i) d->next_body[d->number[label]] = i;
+        d->number[label] = i;
+    }
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        const int32_t label = d->label[pair->body_a >= 0 ? pair->body_a : pair->body_b];
+        d->next_pair[p] = -1;
+        if (d->first_pair[label] < 0) d->first_pair[label] = (int32_t)p;
+        else d->next_pair[d->points[label]] = (int32_t)p;
+        d->points[label] = (int32_t)p;
+    }
+}
+
+/* What is known of them: how many points they have, and whether all their rows are solved directly. */
+static void describe_islands(struct sadmm_direct *d, const struct sadmm_joined *joined,
+                             const struct sadmm_system *system)
+{
+    const struct sadmm_contact_set *contacts = system->contacts;
+    memset(d->points, 0, (size_t)system->body_count * sizeof *d->points);
+    memset(d->kind, 0, (size_t)system->body_count);
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        d->points[d->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]] += pair->count;
+    }
+    for (size_t k = 0; k < system->rows->constraint_count; ++k) {
+        const struct sadmm_row_constraint *constraint = &system->rows->constraints[k];
+        const int32_t body = constraint->body_a >= 0 ? constraint->body_a : constraint->body_b;
+        if (body >= 0) d->kind[d->label[body]] |= joined->part[body] < 0 ? ISLAND_LEFT : ISLAND_JOINED;
+    }
+}
+
+static bool is_taken(const struct sadmm_direct *d, int32_t label, const struct sadmm_settings *settings)
+{
+    return d->kind[label] == ISLAND_JOINED && d->points[label] > 0 && d->points[label] <= settings->direct_points;
+}
+
+/* Room for any of them. */
+static bool make_room(struct sadmm_direct *d, const struct sadmm_joined *joined, const struct sadmm_system *system,
+                      const struct sadmm_settings *settings)
+{
+    const size_t n = (size_t)system->body_count;
+    size_t points = 0, states = 0;
+    for (size_t i = 0; i < n; ++i)
+        if (is_taken(d, (int32_t)i, settings) && (size_t)d->points[i] > points) points = (size_t)d->points[i];
+    for (int32_t k = 0; k < joined->order.parts; ++k) states += (size_t)(JOINED_ROWS * joined->parts[k].view.s.places);
+    const size_t size = 3 * points + MOST_LOOSE;
+    return sadmm_grow_empty(&d->bodies, &d->body_capacity, n, sizeof *d->bodies) &&
+           sadmm_grow_empty(&d->contacts, &d->contact_capacity, points, sizeof *d->contacts) &&
+           sadmm_grow_empty(&d->laws, &d->law_capacity, points + MOST_LOOSE, sizeof *d->laws) &&
+           sadmm_grow_empty(&d->parts, &d->part_capacity, (size_t)joined->order.parts, sizeof *d->parts) &&
+           sadmm_grow_empty(&d->numbers, &d->numbers_capacity,
+                            3 * size + size * size + direct_work_size(size) + 6 * n, sizeof *d->numbers) &&
+           sadmm_grow_empty(&d->rows, &d->row_capacity, system->rows->row_count, sizeof *d->rows) &&
+           sadmm_grow_empty(&d->states, &d->state_capacity, 2 * states, sizeof *d->states);
+}
+
+static bool solve_island(struct island *s, int32_t label)
+{
+    struct sadmm_direct *d = s->d;
+    const struct sadmm_contact_set *contacts = s->system->contacts;
+    const size_t size = 3 * (size_t)d->points[label] + MOST_LOOSE;
+    double *at = d->numbers, *G;
+    s->bodies = s->contacts = s->parts = s->loose = 0;
+    s->dense.lambda = at, at += size;
+    s->dense.u = at, at += size;
+    s->best_lambda = at, at += size;
+    s->dense.G = G = at, at += size * size;
+    s->dense.work = at, at += direct_work_size(size);
+    s->best_velocity = at;
+    s->dense.law = d->laws;
+    for (int32_t i = label; i >= 0; i = d->next_body[i]) add_body(s, i);
+    for (int32_t p = d->first_pair[label]; p >= 0; p = d->next_pair[p])
+        for (int32_t k = 0; k < contacts->pairs[p].count; ++k) add_contact(s, p, k);
+    s->dense.laws = s->contacts;
+    s->dense.size = 3 * s->contacts;
+    find_contact_velocities(s);
+    const double before = fmax(direct_natural_map(&s->dense), momentum_missing(s));
+    if (!(before > ENOUGH)) return false;
+    size_t rows = 0;
+    for (int32_t k = 0; k < s->parts; ++k) rows += (size_t)(JOINED_ROWS * part_of(s, k)->view.s.places);
+    s->best = before;
+    s->dense.budget = BUDGET;
+    search(s, G, d->states, d->states + rows, rows);
+    if (!(s->best < before)) return false;
+    store_best(s);
+    return true;
+}
+
+sadmm_status sadmm_direct_solve(struct sadmm_direct *direct, struct sadmm_joined *joined,
+                                const struct sadmm_system *system, const struct sadmm_row_constraint *slots,
+                                const struct sadmm_settings *settings, int32_t *solved, struct sadmm_error *error)
+{
+    struct sadmm_system down = *system;
+    struct island s = {.d = direct, .joined = joined, .system = &down, .slots = slots, .settings = settings};
+    const size_t n = (size_t)system->body_count;
+    down.carried = NULL;
+    *solved = 0;
+    if (system->contacts->pair_count == 0) return SADMM_OK;
+    if (!sadmm_grow_empty(&direct->label, &direct->label_capacity, n, sizeof *direct->label) ||
+        !sadmm_grow_empty(&direct->number, &direct->number_capacity, n, sizeof *direct->number) ||
+        !sadmm_grow_empty(&direct->next_body, &direct->body_list_capacity, n, sizeof *direct->next_body) ||
+        !sadmm_grow_empty(&direct->points, &direct->points_capacity, n, sizeof *direct->points) ||
+        !sadmm_grow_empty(&direct->first_pair, &direct->first_capacity, n, sizeof *direct->first_pair) ||
+        !sadmm_grow_empty(&direct->kind, &direct->kind_capacity, n, sizeof *direct->kind) ||
+        !sadmm_grow_empty(&direct->next_pair, &direct->pair_list_capacity, system->contacts->pair_count,
+                          sizeof *direct->next_pair))
+        return sadmm_fail_memory(error, "islands that are solved directly");
+    list_islands(direct, &down);
+    describe_islands(direct, joined, &down);
+    if (!make_room(direct, joined, &down, settings))
+        return sadmm_fail_memory(error, "islands that are solved directly");
+    for (int32_t i = 0; i < system->body_count; ++i)
+        if (direct->label[i] == i && is_taken(direct, i, settings)) *solved += solve_island(&s, i);
+    return SADMM_OK;
+}
