@@ -386,13 +386,14 @@ static sadmm_status set_state(struct machine *m)
 static sadmm_status set_settings(struct machine *m)
 {
     sadmm_settings s = sadmm_world_settings(m->world);
-    switch (take_choice(&m->in, 7)) {
+    switch (take_choice(&m->in, 8)) {
     case 0: s.dt = take_scale(&m->in, 1e-5, 0.1); break;
     case 1: s.method = (sadmm_method)take_choice(&m->in, 2); break;
     case 2: s.iterations = take_byte(&m->in); break;
     case 3: s.substeps = take_choice(&m->in, 4); break;
     case 4: s.certify = take_choice(&m->in, 2); break;
     case 5: s.correction_speed = take_number(&m->in, 0, 1e3); break;
+    case 6: s.direct_points = take_byte(&m->in); break; /* some beyond the range */
     default: take_vector(&m->in, -20, 20, s.gravity); break;
     }
     return sadmm_world_set_settings(m->world, &s);

@@ -14,8 +14,8 @@
 static const double ENOUGH = 1e-9, AIM = 1e-11, NEWTON_AIM = 1e-13;
 /* Rows that changed their states and are solved for together with the contacts; and how often it goes from the one to
  * the other. */
-/* Multiplications of the eliminations for an island, so that one that does not come to an end takes 0.1 s or less. */
-static const double BUDGET = 2e8;
+/* Multiplications of the eliminations for an island, so that one that does not come to an end takes 0.05 s or less. */
+static const double BUDGET = 1e8;
 enum { MOST_LOOSE = 96, MOST_ROUNDS = 16, MOST_PASSES = 6 };
 
 struct direct_contact {
