@@ -333,6 +333,13 @@ START_TEST(constraints_left_out_are_in_no_part)
         bodies[2 * k + 1] = k < SPOKES ? k + 1 : bodies[2 * k] - 1;
     }
     ck_assert(sadmm_joined_order_make(&order, bodies, CONSTRAINTS, CONSTRAINTS + 1, 64));
+    ck_assert_int_eq(order.parts, 0); /* the spokes press on the chain */
+    ck_assert(sadmm_joined_order_make(&order, bodies + 2, CONSTRAINTS - 1, CONSTRAINTS + 1, 64));
+    ck_assert_int_eq(order.parts, 1); /* 64 may be at a body; the chain is at the last one still */
+    ck_assert_int_eq(sadmm_joined_part(&order, 0).places, CONSTRAINTS - 1);
+    /* With the chain apart it is one. */
+    bodies[2 * (CONSTRAINTS - 1) + 1] = -1;
+    ck_assert(sadmm_joined_order_make(&order, bodies, CONSTRAINTS, CONSTRAINTS + 1, 64));
     ck_assert_int_eq(order.parts, 1);
     const struct joined_structure s = sadmm_joined_part(&order, 0);
     ck_assert_int_eq(s.places, CHAIN);

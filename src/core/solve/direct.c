@@ -9,13 +9,13 @@
 #include "direct_newton.h"
 #include "joined_part.h"
 
-/* m/s: an island with a smaller natural map, and velocities as near to what its impulses make them, is left alone; what is aimed at; what Newton's steps go for, which solve for
- * what rows in their states give. */
+/* m/s: what is left alone, of the natural map and of velocities against what the impulses make them; what is aimed at;
+ * what Newton's steps go for, which solve for what rows in their states give. */
 static const double ENOUGH = 1e-9, AIM = 1e-11, NEWTON_AIM = 1e-13;
-/* Rows that changed their states and are solved for together with the contacts; and how often it goes from the one to
- * the other. */
 /* Multiplications of the eliminations for an island, so that one that does not come to an end takes 0.05 s or less. */
 static const double BUDGET = 1e8;
+/* Rows that are solved for together with the contacts, since they changed their states; how often it goes from contacts to
+ * rows and back, and in between from solve to solve of the rows. */
 enum { MOST_LOOSE = 96, MOST_ROUNDS = 16, MOST_PASSES = 6 };
 
 struct direct_contact {
@@ -29,7 +29,6 @@ struct direct_contact {
 /* A row that is solved for with the contacts: r of a part of the island. */
 struct direct_loose {
     int32_t part, r;
-    double lo, hi;
 };
 
 struct direct_body {
@@ -53,8 +52,8 @@ struct sadmm_direct {
     double *rows;              /* multipliers of the system's rows, the best */
     uint8_t *states;           /* JOINED_ROWS a place, of the parts one after the other: those that G is for */
     size_t label_capacity, number_capacity, body_list_capacity, points_capacity, first_capacity, kind_capacity,
-        pair_list_capacity, body_capacity,
-        contact_capacity, law_capacity, part_capacity, numbers_capacity, row_capacity, state_capacity;
+        pair_list_capacity, body_capacity, contact_capacity, law_capacity, part_capacity, numbers_capacity, row_capacity,
+        state_capacity;
 };
 
 enum island_kind { ISLAND_JOINED = 1, ISLAND_LEFT = 2 };
@@ -215,9 +214,9 @@ static void put_loads(struct island *s)
 static void hold_loose(const struct island *s, int32_t part)
 {
     for (int32_t i = 0; i < s->loose; ++i) {
-        const struct direct_loose *loose = &s->loose_row[i];
-        struct joined_row *row = &part_of(s, part)->view.rows[loose->r];
-        if (loose->part == part) row->lo = row->hi = s->dense.lambda[3 * s->contacts + i];
+        if (s->loose_row[i].part != part) continue;
+        struct joined_row *row = &part_of(s, part)->view.rows[s->loose_row[i].r];
+        row->lo = row->hi = s->dense.lambda[3 * s->contacts + i];
     }
 }
 
@@ -277,7 +276,7 @@ static bool loosen(struct island *s, const uint8_t *before, const uint8_t *after
             if (before[r] == after[r] || after[r] == JOINED_GIVEN) continue;
             if (s->loose == MOST_LOOSE) return false;
             const int32_t number = 3 * s->contacts + s->loose;
-            s->loose_row[s->loose] = (struct direct_loose){k, r, v->rows[r].lo, v->rows[r].hi};
+            s->loose_row[s->loose] = (struct direct_loose){k, r};
             s->d->laws[s->contacts + s->loose] = (struct direct_law){
                 .first = number, .count = 1, .lo = v->rows[r].lo, .hi = v->rows[r].hi,
                 .response = v->rows[r].gain * joined_scale(v, r) + v->rows[r].compliance};
@@ -467,12 +466,16 @@ static void store_best(const struct island *s)
 
 /* ---- all islands -------------------------------------------------------------------------------------------------- */
 
+static int32_t island_of(const struct sadmm_direct *d, int32_t body_a, int32_t body_b)
+{
+    return d->label[body_a >= 0 ? body_a : body_b];
+}
+
 /* Lists by island, ascending: its bodies from the first one, which is its label, its pairs. Last ones are kept meanwhile
  * in `number` and `points`. */
 static void list_islands(struct sadmm_direct *d, const struct sadmm_system *system)
 {
     const struct sadmm_contact_set *contacts = system->contacts;
-    sadmm_islands(system, d->label);
     for (int32_t i = 0; i < system->body_count; ++i) {
         const int32_t label = d->label[i];
         d->next_body[i] = d->first_pair[i] = -1;
@@ -480,8 +483,7 @@ static void list_islands(struct sadmm_direct *d, const struct sadmm_system *syst
         d->number[label] = i;
     }
     for (size_t p = 0; p < contacts->pair_count; ++p) {
-        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
-        const int32_t label = d->label[pair->body_a >= 0 ? pair->body_a : pair->body_b];
+        const int32_t label = island_of(d, contacts->pairs[p].body_a, contacts->pairs[p].body_b);
         d->next_pair[p] = -1;
         if (d->first_pair[label] < 0) d->first_pair[label] = (int32_t)p;
         else d->next_pair[d->points[label]] = (int32_t)p;
@@ -489,22 +491,34 @@ static void list_islands(struct sadmm_direct *d, const struct sadmm_system *syst
     }
 }
 
-/* What is known of them: how many points they have, and whether all their rows are solved directly. */
+/* What is known of them: how many points they have, and whether they are whole parts with rows and nothing else has rows.
+ * Constraints may be left out of parts (joined.h), and parts hang together by constraints that have no rows at the time: a
+ * slack rope. Such islands are left to the iteration. Rows without a part are counted in `number`. */
 static void describe_islands(struct sadmm_direct *d, const struct sadmm_joined *joined,
-                             const struct sadmm_system *system)
+                             const struct sadmm_system *system, const struct sadmm_row_constraint *slots)
 {
     const struct sadmm_contact_set *contacts = system->contacts;
-    memset(d->points, 0, (size_t)system->body_count * sizeof *d->points);
-    memset(d->kind, 0, (size_t)system->body_count);
-    for (size_t p = 0; p < contacts->pair_count; ++p) {
-        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
-        d->points[d->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]] += pair->count;
-    }
+    const size_t n = (size_t)system->body_count;
+    memset(d->points, 0, n * sizeof *d->points);
+    memset(d->number, 0, n * sizeof *d->number);
+    memset(d->kind, 0, n);
+    for (size_t p = 0; p < contacts->pair_count; ++p)
+        d->points[island_of(d, contacts->pairs[p].body_a, contacts->pairs[p].body_b)] += contacts->pairs[p].count;
     for (size_t k = 0; k < system->rows->constraint_count; ++k) {
         const struct sadmm_row_constraint *constraint = &system->rows->constraints[k];
-        const int32_t body = constraint->body_a >= 0 ? constraint->body_a : constraint->body_b;
-        if (body >= 0) d->kind[d->label[body]] |= joined->part[body] < 0 ? ISLAND_LEFT : ISLAND_JOINED;
+        if (constraint->body_a >= 0 || constraint->body_b >= 0)
+            d->number[island_of(d, constraint->body_a, constraint->body_b)] += constraint->count;
     }
+    for (int32_t k = 0; k < joined->order.parts; ++k) {
+        const struct joined_structure *s = &joined->parts[k].view.s;
+        const int32_t label = d->label[s->body[0]];
+        if (d->number[label] > 0) d->kind[label] |= ISLAND_JOINED;
+        for (int32_t e = 1; e < s->bodies; ++e)
+            if (d->label[s->body[e]] != label) d->kind[label] |= ISLAND_LEFT, d->kind[d->label[s->body[e]]] |= ISLAND_LEFT;
+        for (int32_t p = 0; p < s->places; ++p) d->number[label] -= slots[s->constraint[p]].count;
+    }
+    for (size_t i = 0; i < n; ++i)
+        if (d->number[i] != 0) d->kind[i] |= ISLAND_LEFT;
 }
 
 static bool is_taken(const struct sadmm_direct *d, int32_t label, const struct sadmm_settings *settings)
@@ -583,8 +597,9 @@ sadmm_status sadmm_direct_solve(struct sadmm_direct *direct, struct sadmm_joined
         !sadmm_grow_empty(&direct->next_pair, &direct->pair_list_capacity, system->contacts->pair_count,
                           sizeof *direct->next_pair))
         return sadmm_fail_memory(error, "islands that are solved directly");
+    sadmm_islands(&down, direct->label);
     list_islands(direct, &down);
-    describe_islands(direct, joined, &down);
+    describe_islands(direct, joined, &down, slots);
     if (!make_room(direct, joined, &down, settings))
         return sadmm_fail_memory(error, "islands that are solved directly");
     for (int32_t i = 0; i < system->body_count; ++i)

@@ -31,7 +31,7 @@ struct sadmm_joined;
 struct sadmm_joined *sadmm_joined_create(void);
 void sadmm_joined_destroy(struct sadmm_joined *joined);
 
-/* Constraints at one body; more of them are left to the iteration, since all are coupled to each other. */
+/* Constraints at one body; a part with more of them is left to the iteration, since all are coupled to each other. */
 enum { SADMM_JOINED_AROUND = 64 };
 
 /* A step, or sub-step, begins: nothing of the last one is kept, however that ended. */

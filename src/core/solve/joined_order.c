@@ -18,6 +18,7 @@ struct maker {
     int32_t *part;           /* constraint -> the part it is of; -1: of none */
     int32_t *member;         /* constraints, part by part */
     int32_t *first_member;   /* parts + 1 */
+    uint8_t *seen;           /* bodies whose constraints have been listed */
     int32_t parts;
 };
 
@@ -28,6 +29,7 @@ static void free_maker(struct maker *m)
     sadmm_free(m->part);
     sadmm_free(m->member);
     sadmm_free(m->first_member);
+    sadmm_free(m->seen);
 }
 
 static bool list_around(struct maker *m)
@@ -37,7 +39,8 @@ static bool list_around(struct maker *m)
     m->part = (int32_t *)sadmm_alloc((size_t)m->constraints + 1, sizeof *m->part);
     m->member = (int32_t *)sadmm_alloc((size_t)m->constraints + 1, sizeof *m->member);
     m->first_member = (int32_t *)sadmm_alloc((size_t)m->constraints + 2, sizeof *m->first_member);
-    if (!m->first || !m->around || !m->part || !m->member || !m->first_member) return false;
+    m->seen = (uint8_t *)sadmm_alloc((size_t)m->body_count + 1, sizeof *m->seen);
+    if (!m->first || !m->around || !m->part || !m->member || !m->first_member || !m->seen) return false;
     for (int32_t s = 0; s < 2 * m->constraints; ++s)
         if (m->bodies[s] >= 0) ++m->first[m->bodies[s] + 1];
     for (int32_t i = 0; i < m->body_count; ++i) m->first[i + 1] += m->first[i];
@@ -49,33 +52,37 @@ static bool list_around(struct maker *m)
     return true;
 }
 
-/* Constraints that hang together, breadth first from the lowest number. */
+/* Adds what is at a body to the part that is found; once. Is it more than may be at one? */
+static bool add_around(struct maker *m, int32_t body, int32_t most_around, int32_t *taken)
+{
+    if (body < 0 || m->seen[body]) return false;
+    m->seen[body] = 1;
+    for (int32_t j = m->first[body]; j < m->first[body + 1]; ++j) {
+        const int32_t other = m->around[j];
+        if (m->part[other] != -2) continue;
+        m->part[other] = m->parts;
+        m->member[(*taken)++] = other;
+    }
+    return m->first[body + 1] - m->first[body] > most_around;
+}
+
+/* Constraints that hang together, breadth first from the lowest number. They are solved together or not at all: what is
+ * left out presses on bodies, too, and a part knows nothing of it. */
 static void find_parts(struct maker *m, int32_t most_around)
 {
     int32_t taken = 0;
     m->parts = 0;
     for (int32_t k = 0; k < m->constraints; ++k) m->part[k] = -2;
-    for (int32_t k = 0; k < m->constraints; ++k)
-        for (int s = 0; s < 2; ++s) {
-            const int32_t body = m->bodies[2 * k + s];
-            if (body >= 0 && m->first[body + 1] - m->first[body] > most_around) m->part[k] = -1;
-        }
     for (int32_t k = 0; k < m->constraints; ++k) {
         const int32_t begin = taken;
+        bool crowded = false;
         if (m->part[k] != -2 || (m->bodies[2 * k] < 0 && m->bodies[2 * k + 1] < 0)) continue;
         m->part[k] = m->parts;
         m->member[taken++] = k;
         for (int32_t at = begin; at < taken; ++at)
-            for (int s = 0; s < 2; ++s) {
-                const int32_t body = m->bodies[2 * m->member[at] + s];
-                for (int32_t j = body < 0 ? 0 : m->first[body]; body >= 0 && j < m->first[body + 1]; ++j) {
-                    const int32_t other = m->around[j];
-                    if (m->part[other] != -2) continue;
-                    m->part[other] = m->parts;
-                    m->member[taken++] = other;
-                }
-            }
-        if (taken - begin > MOST_OF_PART) {
+            for (int s = 0; s < 2; ++s)
+                crowded = add_around(m, m->bodies[2 * m->member[at] + s], most_around, &taken) || crowded;
+        if (crowded || taken - begin > MOST_OF_PART) {
             for (int32_t at = begin; at < taken; ++at) m->part[m->member[at]] = -1;
             taken = begin;
             continue;

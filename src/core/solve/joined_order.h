@@ -17,7 +17,7 @@ struct sadmm_joined_order {
 };
 
 /* bodies: two a constraint, < 0: not solved for. Left out, so that the iteration alone solves them, are constraints of
- * no body, those at a body that has more than `most_around`, and parts that are large or whose factor fills up. False:
+ * no body, and parts that have more than `most_around` of them at a body, are large or whose factor fills up. False:
  * no memory, nothing has changed. */
 bool sadmm_joined_order_make(struct sadmm_joined_order *order, const int32_t *bodies, int32_t constraints,
                              int32_t body_count, int32_t most_around);
