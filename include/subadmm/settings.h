@@ -89,9 +89,10 @@ typedef struct sadmm_settings {
     int direct_points;           /* worlds: islands with joints and at most so many contact points are solved directly
                                     after the iterations (docs/algorithm.md, section 10), contacts and rows to rounding:
                                     robots that stand, walk, grasp. In [0, SADMM_MOST_DIRECT_POINTS = 128]; 0: none;
-                                    default 0. It costs what the iterations leave to do: nothing where the natural map
-                                    is below 1e-9 m/s, else some 10 us an island of ten points and 1 ms of sixty on one
-                                    core. On CUDA such steps go through the host */
+                                    default 0. It costs what the iterations leave to do: little where they leave less
+                                    than 1e-9 m/s, else 0.1 to 0.5 ms a robot of ten points on one core, and 10 to 20 ms
+                                    an island that nothing solves (links deep in a table). On CUDA such steps go through
+                                    the host */
 
     double residual_tolerance;   /* stop when |r_primal|_inf (m/s) and |r_dual|_inf (N s) are both <= this;
                                     0 = never; finite, >= 0; default 0 */

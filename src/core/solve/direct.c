@@ -12,11 +12,11 @@
 /* m/s: what is left alone, of the natural map and of velocities against what the impulses make them; what is aimed at;
  * what Newton's steps go for, which solve for what rows in their states give. */
 static const double ENOUGH = 1e-9, AIM = 1e-11, NEWTON_AIM = 1e-13;
-/* Multiplications of the eliminations for an island, so that one that does not come to an end takes 0.05 s or less. */
-static const double BUDGET = 1e8;
+/* Multiplications for an island, so that one that does not come to an end takes some 10 ms. */
+static const double BUDGET = 4e7;
 /* Rows that are solved for together with the contacts, since they changed their states; how often it goes from contacts to
- * rows and back, and in between from solve to solve of the rows. */
-enum { MOST_LOOSE = 96, MOST_ROUNDS = 16, MOST_PASSES = 6 };
+ * rows and back, in all and without coming nearer; and in between from solve to solve of the rows. */
+enum { MOST_LOOSE = 96, MOST_ROUNDS = 16, MOST_IDLE = 4, MOST_PASSES = 6 };
 
 struct direct_contact {
     int32_t pair, point;
@@ -368,6 +368,9 @@ static void answer(struct island *s, const struct impulse_side side[2], int side
 static void make_responses(struct island *s, double *G)
 {
     const size_t n = (size_t)s->dense.size;
+    int32_t places = 0;
+    for (int32_t k = 0; k < s->parts; ++k) places += part_of(s, k)->view.s.places;
+    s->dense.budget -= (double)n * (20 * (double)n + 1000 * places / fmax(1, s->parts)); /* columns, solves of a part */
     for (int32_t k = 0; k < s->parts; ++k) {
         const struct joined_view *v = &part_of(s, k)->view;
         make_linear(v);
@@ -431,13 +434,15 @@ static void search(struct island *s, double *G, uint8_t *states, uint8_t *next, 
     bool changed = true;
     take_states(s, states);
     if (!settle(s, states, next, rows, &changed)) return;
-    for (int round = 0; round < MOST_ROUNDS && s->best > AIM; ++round) {
+    for (int round = 0, idle = 0;
+         round < MOST_ROUNDS && idle < MOST_IDLE && s->best > AIM && s->dense.budget > 0; ++round) {
         const double last = s->best;
         if (changed) make_responses(s, G);
         changed = false;
         direct_newton(&s->dense, NEWTON_AIM);
         if (!settle(s, states, next, rows, &changed)) return;
         if (!changed && s->best > last / 2) return; /* what is left is rounding */
+        idle = s->best > 0.9 * last ? idle + 1 : 0;
     }
 }
 

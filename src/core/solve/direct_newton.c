@@ -193,6 +193,8 @@ static bool make_step(struct newton *s)
     int32_t row = 0;
     sort_numbers(s);
     for (int32_t i = 0; i < d->laws; ++i) enter_law(s, &d->law[i], &row);
+    const double solved_for = s->count, all = d->size;
+    d->budget -= solved_for * solved_for * (solved_for / 3 + 4) + 2 * all * all;
     if (!eliminate(s->M, s->right, s->count)) return false;
     for (int32_t r = 0; r < s->count; ++r) s->step[s->number[r]] = s->right[r];
     for (int32_t n = 0; n < d->size; ++n) {
@@ -233,8 +235,6 @@ static double go(struct newton *s, const struct way *way, double size, double be
     for (int step = 0; step < way->steps && best > enough && map < HUGE_VAL; ++step) {
         const double share = way->proximal > 0 ? way->proximal * map / size : way->most;
         s->proximal = fmax(LEAST, way->most > 0 ? fmin(way->most, share) : LEAST);
-        const double n = d->size;
-        d->budget -= n * n * n / 3;
         if (d->budget < 0 || !make_step(s)) return best;
         map = direct_natural_map(d);
         if (!(map < best)) continue;

@@ -30,7 +30,7 @@ struct direct_dense {
     const double *G;         /* (size x size), row-major */
     double *lambda, *u;      /* (size) start in, the best that was found out */
     double *work;            /* direct_work_size(size) */
-    double budget;           /* multiplications that eliminations may still take: what is left of it out */
+    double budget;           /* multiplications that steps may still take: what is left of it out */
 };
 
 /* Doubles. */
