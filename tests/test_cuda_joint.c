@@ -734,12 +734,14 @@ START_TEST(islands_are_solved_directly)
     struct sadmm_scene scene = open_scene("ragdolls:1");
     sadmm_world *world = build_scene(&scene);
     sadmm_settings settings = scene.def.settings;
+    const int steps = EMULATED ? 110 : 200; /* it falls for 90 of them */
     int above = 0, pressed = 0;
     use_device(world, _i, 0);
+    if (EMULATED) settings.iterations = 4;
     settings.certify = true;
     settings.direct_points = 128;
     MUST(world, sadmm_world_set_settings(world, &settings));
-    for (int step = 0; step < 200; ++step) {
+    for (int step = 0; step < steps; ++step) {
         step_world(world, 1);
         above += world_report(world).certificate.ncp_max > 1e-8; /* some rows pass on 1e3 times what they hold by */
         const int32_t contacts = sadmm_world_contact_count(world), bodies = sadmm_world_body_count(world);
@@ -761,10 +763,10 @@ START_TEST(islands_are_solved_directly)
         pressed += contacts > 0;
     }
     ck_assert_int_le(above, 2);
-    ck_assert_int_gt(pressed, 50);
+    ck_assert_int_gt(pressed, EMULATED ? 10 : 50);
     settings.direct_points = 0;
     MUST(world, sadmm_world_set_settings(world, &settings));
-    step_world(world, 20);
+    step_world(world, EMULATED ? 2 : 20);
     sadmm_world_destroy(world);
 }
 END_TEST
