@@ -1,6 +1,7 @@
 /* Islands that are solved directly after the iterations (core/solve/direct.h): contacts and rows to rounding, whatever
  * the iterations. */
 #include "scene_tools.h"
+#include "solvers.h"
 
 #include "core/solve/direct_newton.h"
 
@@ -81,8 +82,8 @@ START_TEST(dense_problems_are_solved)
         ck_assert(after <= before + 1e-11);
         solved += after < 1e-11;
     }
-    /* Friction of random directions need not have a solution, nor Newton find it: 1 or 2 of 100 it does not. */
-    ck_assert_int_ge(solved, 190);
+    /* Friction of random directions need not have a solution, nor Newton find it: 3 of 200 may stay. */
+    ck_assert_msg(solved >= 197, "%d of 200", solved);
 }
 END_TEST
 
@@ -107,16 +108,6 @@ START_TEST(one_contact_by_hand)
 END_TEST
 
 /* ---- worlds ------------------------------------------------------------------------------------------------------- */
-
-static const struct {
-    sadmm_backend backend;
-    sadmm_precision precision;
-    sadmm_method method;
-} solvers[] = {{SADMM_BACKEND_CPU, SADMM_F64, SADMM_METHOD_FAST},
-               {SADMM_BACKEND_CPU, SADMM_F32, SADMM_METHOD_FAST},
-               {SADMM_BACKEND_CPU, SADMM_F64, SADMM_METHOD_PAPER},
-               {SADMM_BACKEND_REF, SADMM_F64, SADMM_METHOD_FAST}};
-enum { SOLVERS = sizeof solvers / sizeof *solvers };
 
 static sadmm_world *scene_world(const char *spec, int solver, int iterations, int direct_points)
 {

@@ -1,22 +1,13 @@
 /* Bodies joined by rows, solved directly (core/solve/joined.h): where loads and masses are far beyond what an iteration
  * of few steps brings along a mechanism. */
 #include "scene_tools.h"
+#include "solvers.h"
 
 #include "core/solve/joined_order.h"
 
 static const double UNIT[4] = {1, 0, 0, 0};
 static const double ABOUT_Y[4] = {0.70710678118654752, -0.70710678118654752, 0, 0}; /* z of the frame along y */
 static const sadmm_body_id WORLD = {0, 0};
-
-static const struct {
-    sadmm_backend backend;
-    sadmm_precision precision;
-    sadmm_method method;
-} solvers[] = {{SADMM_BACKEND_CPU, SADMM_F64, SADMM_METHOD_FAST},
-               {SADMM_BACKEND_CPU, SADMM_F32, SADMM_METHOD_FAST},
-               {SADMM_BACKEND_CPU, SADMM_F64, SADMM_METHOD_PAPER},
-               {SADMM_BACKEND_REF, SADMM_F64, SADMM_METHOD_FAST}};
-enum { SOLVERS = sizeof solvers / sizeof *solvers };
 
 static sadmm_world *new_world(int solver, double dt, int iterations)
 {

@@ -187,22 +187,24 @@ def loaded_of(path, given, options):
     return subadmm.load(path, backend=given.backend, precision=given.precision, **options)
 
 
-def set_iterations(world, iterations, direct_points):
+def set_iterations(world, iterations, given):
     settings = world.settings
     settings.certify, settings.iterations, settings.dt = True, iterations, min(settings.dt, 0.005)
-    if direct_points is not None:
-        settings.direct_points = direct_points
+    if given.dt is not None:
+        settings.dt = given.dt
+    if given.direct_points is not None:
+        settings.direct_points = given.direct_points
     world.settings = settings
 
 
 def maps_by_iterations(path, given):
     world = loaded_of(path, given, {}).world
-    set_iterations(world, STEP_ITERATIONS[0], given.direct_points)
+    set_iterations(world, STEP_ITERATIONS[0], given)
     world.step(round(1 / world.settings.dt) - 1)
     state, maps = world.save(), []
     for iterations in STEP_ITERATIONS:
         world.restore(state)
-        set_iterations(world, iterations, given.direct_points)
+        set_iterations(world, iterations, given)
         world.step()
         maps.append(world.report.certificate.ncp_max)
     return maps
@@ -235,7 +237,7 @@ def run(path, given, iterations, motion, options):
     its certificate)"""
     loaded = loaded_of(path, given, options)
     world, loops, joints = loaded.world, [j for j in loaded.loops.values() if j.enabled], tree_joints(loaded)
-    set_iterations(world, iterations, given.direct_points)
+    set_iterations(world, iterations, given)
     steps = round(DURATION / world.settings.dt)
     maps, worst, loop_off, joint_off, spent = np.zeros(steps), {}, 0.0, 0.0, 0.0
     for k in range(steps):
@@ -266,6 +268,7 @@ def main():
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--backend", default="cpu")
     parser.add_argument("--precision", default="f64")
+    parser.add_argument("--dt", type=float, help="time step, s, in place of the file's or 5 ms")
     parser.add_argument("--direct-points", type=int, help="in place of the model's: 0: contacts by iteration alone")
     parser.add_argument("--iterations", type=int, action="append", help="of the runs, in place of the table's")
     parser.add_argument("--worst", action="store_true",

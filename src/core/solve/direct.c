@@ -163,17 +163,24 @@ static void add_row_loads(struct island *s, const struct joined_view *v)
     }
 }
 
+/* What the contacts press bodies with, to dv. */
+static void add_contact_loads(struct island *s)
+{
+    for (int32_t i = 0; i < s->contacts; ++i) {
+        const struct direct_contact *c = &s->d->contacts[i];
+        for (int side = 0; side < 2; ++side)
+            for (int k = 0; c->body[side] >= 0 && k < 3; ++k)
+                for (int j = 0; j < 6; ++j)
+                    s->d->bodies[c->body[side]].dv[j] += c->row[side][k][j] * s->dense.lambda[3 * i + k];
+    }
+}
+
 /* How far velocities are from those that go with the impulses, m/s or rad/s. */
 static double momentum_missing(struct island *s)
 {
     double most = 0, owed[6];
     for (int32_t n = 0; n < s->bodies; ++n) memcpy(s->d->bodies[n].dv, s->d->bodies[n].b, 6 * sizeof(double));
-    for (int32_t i = 0; i < s->contacts; ++i)
-        for (int side = 0; side < 2; ++side)
-            for (int k = 0; s->d->contacts[i].body[side] >= 0 && k < 3; ++k)
-                for (int j = 0; j < 6; ++j)
-                    s->d->bodies[s->d->contacts[i].body[side]].dv[j] +=
-                        s->d->contacts[i].row[side][k][j] * s->dense.lambda[3 * i + k];
+    add_contact_loads(s);
     for (int32_t k = 0; k < s->parts; ++k) add_row_loads(s, &s->joined->parts[s->d->parts[k]].view);
     for (int32_t n = 0; n < s->bodies; ++n) {
         const struct direct_body *body = &s->d->bodies[n];
@@ -187,27 +194,20 @@ static double momentum_missing(struct island *s)
 
 static struct joined_part *part_of(const struct island *s, int32_t k) { return &s->joined->parts[s->d->parts[k]]; }
 
-/* A load (force, torque) dt on a body. */
-static void add_load(struct island *s, int32_t number, const double row[6], double lambda)
-{
-    struct direct_body *body = &s->d->bodies[number];
-    const int32_t part = s->joined->part[body->body];
-    double *to = part < 0 ? body->dv
-                          : s->joined->parts[part].impulse + 6 * (size_t)s->joined->entry[body->body];
-    for (int k = 0; k < 6; ++k) to[k] += row[k] * lambda;
-}
-
+/* To single bodies with what acts on them besides, to parts alone: they add the rest when they are loaded. */
 static void put_loads(struct island *s)
 {
+    for (int32_t n = 0; n < s->bodies; ++n) {
+        struct direct_body *body = &s->d->bodies[n];
+        if (s->joined->part[body->body] < 0) memcpy(body->dv, body->b, sizeof body->dv);
+        else memset(body->dv, 0, sizeof body->dv);
+    }
+    add_contact_loads(s);
     for (int32_t k = 0; k < s->parts; ++k) {
         struct joined_part *part = part_of(s, k);
-        memset(part->impulse, 0, 6 * (size_t)part->view.s.bodies * sizeof *part->impulse);
+        for (int32_t e = 0; e < part->view.s.bodies; ++e)
+            memcpy(part->impulse + 6 * (size_t)e, s->d->bodies[s->d->number[part->view.s.body[e]]].dv, 6 * sizeof(double));
     }
-    for (int32_t n = 0; n < s->bodies; ++n) memcpy(s->d->bodies[n].dv, s->d->bodies[n].b, 6 * sizeof(double));
-    for (int32_t i = 0; i < s->contacts; ++i)
-        for (int side = 0; side < 2; ++side)
-            for (int k = 0; s->d->contacts[i].body[side] >= 0 && k < 3; ++k)
-                add_load(s, s->d->contacts[i].body[side], s->d->contacts[i].row[side][k], s->dense.lambda[3 * i + k]);
 }
 
 /* Its multiplier is given, whatever its law says. */
