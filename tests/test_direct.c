@@ -3,6 +3,7 @@
 #include "scene_tools.h"
 #include "solvers.h"
 
+#include "core/solve/direct_interior.h"
 #include "core/solve/direct_newton.h"
 
 /* ---- Newton's steps on dense problems ----------------------------------------------------------------------------- */
@@ -17,7 +18,7 @@ static double uniform(uint32_t *random)
 
 struct dense_problem {
     struct direct_law law[MOST_CONTACTS + MOST_ROWS];
-    double J[SIZE][6 * MOST_CONTACTS], G[SIZE * SIZE], lambda[SIZE], u[SIZE], work[SIZE * (SIZE + 8)];
+    double J[SIZE][6 * MOST_CONTACTS], G[SIZE * SIZE], lambda[SIZE], u[SIZE], work[SIZE * (SIZE + DIRECT_VECTORS)];
     struct direct_dense dense;
 };
 
@@ -54,6 +55,39 @@ static void make_dense(struct dense_problem *p, int contacts, int rows, int free
     p->dense = (struct direct_dense){contacts + rows, n, p->law, p->G, p->lambda, p->u, p->work, 1e9};
 }
 
+/* Twelve contacts of one body, four each with a floor and two walls; it falls, and slips by so much. */
+static void make_corner(struct dense_problem *p, double speed, uint32_t *random)
+{
+    const int n = 3 * MOST_CONTACTS;
+    double motion[6] = {0};
+    for (int i = 0; i < MOST_CONTACTS; ++i) {
+        const int up = i % 3;
+        double at[3], axis[3];
+        for (int k = 0; k < 3; ++k) at[k] = uniform(random);
+        at[up] = -1;
+        for (int k = 0; k < 3; ++k) {
+            double *J = p->J[3 * i + k];
+            memset(axis, 0, sizeof axis);
+            axis[(up + k) % 3] = 1;
+            memcpy(J, axis, sizeof axis);
+            for (int q = 0; q < 3; ++q)
+                J[3 + q] = at[(q + 1) % 3] * axis[(q + 2) % 3] - at[(q + 2) % 3] * axis[(q + 1) % 3];
+        }
+        p->law[i] = (struct direct_law){.first = 3 * i, .count = 3, .friction = 0.4};
+    }
+    for (int k = 0; k < 3; ++k) motion[k] = -0.05, motion[3 + k] = speed * uniform(random);
+    for (int i = 0; i < n; ++i) {
+        p->u[i] = p->lambda[i] = 0;
+        for (int k = 0; k < 6; ++k) p->u[i] += p->J[i][k] * motion[k];
+        for (int j = 0; j < n; ++j) {
+            p->G[i * n + j] = 0;
+            for (int k = 0; k < 6; ++k) p->G[i * n + j] += p->J[i][k] * p->J[j][k];
+        }
+        p->law[i / 3].response = fmax(p->law[i / 3].response, p->G[i * (n + 1)]);
+    }
+    p->dense = (struct direct_dense){MOST_CONTACTS, n, p->law, p->G, p->lambda, p->u, p->work, 1e9};
+}
+
 /* With its own u from the start, not the one that is carried along. */
 static double map_from_scratch(struct dense_problem *p, const double *start)
 {
@@ -82,8 +116,31 @@ START_TEST(dense_problems_are_solved)
         ck_assert(after <= before + 1e-11);
         solved += after < 1e-11;
     }
-    /* Friction of random directions need not have a solution, nor Newton find it: 3 of 200 may stay. */
-    ck_assert_msg(solved >= 197, "%d of 200", solved);
+    ck_assert_msg(solved == 200, "%d of 200", solved);
+}
+END_TEST
+
+/* A body with six degrees of freedom and twelve contacts in a corner, nearly at rest: most impulses do what others do, and
+ * what is left of its motion slips by 1e-9 to 1e-1 m/s. From an interior point, the pieces of all laws are plain to see. */
+START_TEST(redundant_contacts_near_rest_are_solved)
+{
+    enum { SEEDS = 100 };
+    static struct dense_problem p;
+    double start[SIZE];
+    int solved = 0, inside = 0;
+    for (int k = 0; k < SEEDS; ++k) {
+        const double speed = pow(10, -1 - 8 * k / (double)SEEDS);
+        uint32_t random = (uint32_t)(104729 * k + 3);
+        make_corner(&p, speed, &random);
+        memcpy(start, p.u, sizeof start);
+        inside += direct_interior(&p.dense, 0) < 1e-4 * speed;
+        memcpy(p.u, start, sizeof start);
+        memset(p.lambda, 0, sizeof p.lambda);
+        direct_newton(&p.dense, 1e-13);
+        solved += map_from_scratch(&p, start) < 1e-11;
+    }
+    ck_assert_msg(solved == SEEDS, "%d of %d", solved, SEEDS);
+    ck_assert_msg(inside == SEEDS, "%d of %d", inside, SEEDS);
 }
 END_TEST
 
@@ -98,7 +155,7 @@ START_TEST(one_contact_by_hand)
         {{-1, 3, 4}, 0, {0.5, 0, 0}},                                                     /* smooth */
         {{0.5, 1, 0}, 0.5, {0, 0, 0}},                                                    /* leaves */
     };
-    double G[9] = {2, 0, 0, 0, 2, 0, 0, 0, 2}, lambda[3] = {0.3, 0, 0}, u[3], work[3 * 11];
+    double G[9] = {2, 0, 0, 0, 2, 0, 0, 0, 2}, lambda[3] = {0.3, 0, 0}, u[3], work[3 * (3 + DIRECT_VECTORS)];
     const struct direct_law law = {.first = 0, .count = 3, .response = 2, .friction = cases[_i].friction};
     struct direct_dense dense = {1, 3, &law, G, lambda, u, work, 1e6};
     for (int k = 0; k < 3; ++k) u[k] = cases[_i].u[k] + 2 * lambda[k];
@@ -136,9 +193,9 @@ static double largest_map(sadmm_world *world, int steps, int *above)
     return most;
 }
 
-/* What falls, limps and grips. A step in a hundred may be left as the iterations have it: friction of a mechanism need
- * not have a solution that is found (core/solve/direct_newton.c). Others end at the rounding of numbers around 1 m/s that
- * rows of 1e3 times the response of what they hold pass on: 1e-8 m/s. */
+/* What falls, limps and grips, on its way through hundreds of steps that differ from build to build in the last digits. One
+ * step of a run may miss 2e-9 m/s: of 33,600 steps of such runs 2 did. The others end at the rounding of numbers around
+ * 1 m/s that rows of 1e3 times the response of what they hold pass on. */
 START_TEST(mechanisms_in_contact_are_exact)
 {
     static const struct {
@@ -153,7 +210,7 @@ START_TEST(mechanisms_in_contact_are_exact)
     world = scene_world(runs[run].spec, solver, runs[run].iterations, 0);
     largest_map(world, runs[run].steps, &without);
     sadmm_world_destroy(world);
-    ck_assert_int_le(above, runs[run].steps / 100);
+    ck_assert_int_le(above, 1);
     ck_assert_int_ge(without, runs[run].steps / 10); /* else this says nothing */
 }
 END_TEST
@@ -351,6 +408,7 @@ int main(void)
     TCase *tests = tcase_create("direct");
     tcase_set_timeout(tests, 120);
     tcase_add_loop_test(tests, dense_problems_are_solved, 0, 2);
+    tcase_add_test(tests, redundant_contacts_near_rest_are_solved);
     tcase_add_loop_test(tests, one_contact_by_hand, 0, 4);
     tcase_add_loop_test(tests, mechanisms_in_contact_are_exact, 0, 3 * SOLVERS);
     tcase_add_loop_test(tests, scenes_without_joints_are_as_before, 0, SOLVERS);

@@ -90,7 +90,7 @@ typedef struct sadmm_settings {
                                     after the iterations (docs/algorithm.md, section 10), contacts and rows to rounding:
                                     robots that stand, walk, grasp. In [0, SADMM_MOST_DIRECT_POINTS = 128]; 0: none;
                                     default 0. It costs what the iterations leave to do: little where they leave less
-                                    than 1e-9 m/s, else 0.1 to 0.5 ms a robot of ten points on one core, and 10 to 20 ms
+                                    than 1e-9 m/s, else 0.1 to 0.5 ms a robot of ten points on one core, and some 10 ms
                                     an island that nothing solves (links deep in a table). On CUDA such steps go through
                                     the host */
 

@@ -15,8 +15,8 @@ static const double ENOUGH = 1e-9, AIM = 1e-11, NEWTON_AIM = 1e-13;
 /* Multiplications for an island, so that one that does not come to an end takes some 10 ms. */
 static const double BUDGET = 4e7;
 /* Rows that are solved for together with the contacts, since they changed their states; how often it goes from contacts to
- * rows and back, in all and without coming nearer; and in between from solve to solve of the rows. */
-enum { MOST_LOOSE = 96, MOST_ROUNDS = 16, MOST_IDLE = 4, MOST_PASSES = 6 };
+ * rows and back, in all and without coming nearer though no row changed; and in between from solve to solve of the rows. */
+enum { MOST_LOOSE = 96, MOST_ROUNDS = 40, MOST_IDLE = 4, MOST_PASSES = 6 };
 
 struct direct_contact {
     int32_t pair, point;
@@ -266,14 +266,16 @@ static void take_states(const struct island *s, uint8_t *states)
     }
 }
 
-/* Rows that are no longer as they were become loose. False: too many. */
-static bool loosen(struct island *s, const uint8_t *before, const uint8_t *after, bool *any)
+/* Rows that are no longer as they were become loose, or all with bounds. False: too many. */
+static bool loosen(struct island *s, const uint8_t *before, const uint8_t *after, bool all, bool *any)
 {
     *any = false;
     for (int32_t k = 0; k < s->parts; ++k) {
         const struct joined_view *v = &part_of(s, k)->view;
         for (int32_t r = 0; r < JOINED_ROWS * v->s.places; ++r) {
-            if (before[r] == after[r] || after[r] == JOINED_GIVEN) continue;
+            const bool bounded = v->rows[r].lo > -HUGE_VAL || v->rows[r].hi < HUGE_VAL;
+            if (after[r] == JOINED_GIVEN || after[r] == JOINED_ABSENT) continue;
+            if (before[r] == after[r] && !(all && bounded)) continue;
             if (s->loose == MOST_LOOSE) return false;
             const int32_t number = 3 * s->contacts + s->loose;
             s->loose_row[s->loose] = (struct direct_loose){k, r};
@@ -338,30 +340,44 @@ static const double *change_of(const struct island *s, int32_t number)
     return part < 0 ? body->dv : s->joined->parts[part].view.dv + 6 * (size_t)s->joined->entry[body->body];
 }
 
-/* What an impulse of 1 changes the velocities of its bodies by, and of those that rows join to them; of others dv is 0,
- * as before and after. */
-static void answer(struct island *s, const struct impulse_side side[2], int sides, double scale)
+/* NULL: of a body that no row joins. */
+static const struct joined_view *view_of(const struct island *s, const struct impulse_side *side)
 {
-    const struct joined_view *moved[2] = {NULL, NULL};
+    const int32_t part = s->joined->part[s->d->bodies[side->number].body];
+    return part < 0 ? NULL : &s->joined->parts[part].view;
+}
+
+/* What it is put to: of joined bodies, what their rows have yet to answer. */
+static double *change_at(const struct island *s, const struct impulse_side *side)
+{
+    struct direct_body *body = &s->d->bodies[side->number];
+    const struct joined_view *v = view_of(s, side);
+    return v ? v->missing + 6 * (size_t)s->joined->entry[body->body] : body->dv;
+}
+
+/* What an impulse of 1 changes the velocities of its bodies by, and of those that rows join to them; of others dv is 0, as
+ * before and after. */
+static void answer(const struct island *s, const struct impulse_side side[2], int sides)
+{
     for (int k = 0; k < sides; ++k) {
-        struct direct_body *body = &s->d->bodies[side[k].number];
-        const int32_t part = s->joined->part[body->body];
-        double *to = body->dv;
-        if (part >= 0) {
-            moved[k] = &s->joined->parts[part].view;
-            to = moved[k]->missing + 6 * (size_t)s->joined->entry[body->body];
-        }
-        for (int j = 0; j < 6; ++j) to[j] = scale * side[k].answer[j] + (part >= 0 && scale != 0 ? to[j] : 0);
+        double *to = change_at(s, &side[k]);
+        for (int j = 0; j < 6; ++j) to[j] += side[k].answer[j];
     }
-    for (int k = 0; k < 2; ++k) {
-        if (!moved[k] || (k == 1 && moved[1] == moved[0])) continue;
-        if (scale == 0) {
-            memset(moved[k]->dv, 0, 6 * (size_t)moved[k]->s.bodies * sizeof *moved[k]->dv);
-            continue;
-        }
+    for (int k = 0; k < sides; ++k) {
+        const struct joined_view *v = view_of(s, &side[k]);
+        if (!v || (k == 1 && view_of(s, &side[0]) == v)) continue;
         /* Twice: along what rows hold, what they give by is all there is. */
-        sadmm_joined_part_solve_rows(moved[k], false);
-        sadmm_joined_part_solve_rows(moved[k], true);
+        sadmm_joined_part_solve_rows(v, false);
+        sadmm_joined_part_solve_rows(v, true);
+    }
+}
+
+static void take_back(const struct island *s, const struct impulse_side side[2], int sides)
+{
+    for (int k = 0; k < sides; ++k) {
+        const struct joined_view *v = view_of(s, &side[k]);
+        memset(change_at(s, &side[k]), 0, 6 * sizeof(double));
+        if (v) memset(v->dv, 0, 6 * (size_t)v->s.bodies * sizeof *v->dv);
     }
 }
 
@@ -380,7 +396,7 @@ static void make_responses(struct island *s, double *G)
     for (size_t c = 0; c < n; ++c) {
         struct impulse_side by[2], on[2];
         const int sides = sides_of(s, (int32_t)c, by);
-        answer(s, by, sides, 1);
+        answer(s, by, sides);
         for (size_t r = 0; r < n; ++r) {
             const int others = sides_of(s, (int32_t)r, on);
             double x = 0;
@@ -392,7 +408,7 @@ static void make_responses(struct island *s, double *G)
             }
             G[r * n + c] = x;
         }
-        answer(s, by, sides, 0);
+        take_back(s, by, sides);
     }
 }
 
@@ -412,8 +428,8 @@ static void keep_best(struct island *s)
     }
 }
 
-/* Velocities and rows for the impulses as they are, where rows that change their states become loose, until none does.
- * changed: is set where G is no longer right. False: rows do not settle. */
+/* Velocities and rows for the impulses as they are, where rows that change their states become loose, until none does: all
+ * of them, where they go round. changed: is set where G is no longer right. False: rows do not settle. */
 static bool settle(struct island *s, uint8_t *states, uint8_t *next, size_t rows, bool *changed)
 {
     for (int pass = 0; pass < MOST_PASSES; ++pass) {
@@ -421,7 +437,8 @@ static bool settle(struct island *s, uint8_t *states, uint8_t *next, size_t rows
         memcpy(next, states, rows);
         const bool settled = solve_for_impulses(s, next);
         if (settled) keep_best(s);
-        if (!loosen(s, states, next, &loose)) return false;
+        if (!loosen(s, states, next, false, &loose)) return false;
+        if (!loose && !settled && !loosen(s, states, next, true, &loose)) return false;
         if (!loose) return settled;
         memcpy(states, next, rows);
         *changed = true;
@@ -442,7 +459,7 @@ static void search(struct island *s, double *G, uint8_t *states, uint8_t *next, 
         direct_newton(&s->dense, NEWTON_AIM);
         if (!settle(s, states, next, rows, &changed)) return;
         if (!changed && s->best > last / 2) return; /* what is left is rounding */
-        idle = s->best > 0.9 * last ? idle + 1 : 0;
+        idle = !changed && s->best > 0.9 * last ? idle + 1 : 0;
     }
 }
 

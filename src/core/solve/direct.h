@@ -6,7 +6,7 @@
  * momentum is off by more than 1e-9 m/s, is solved as a whole:
  *
  *     G = J_c (A - rows)^-1 J_c^T, dense: how its contacts respond to each other, with rows in the states that they are in
- *     contacts by semismooth Newton steps (direct_newton.h)
+ *     contacts by semismooth Newton steps, where need be from an interior point (direct_newton.h)
  *     rows again by those impulses; one that changes its state becomes one more number of G, from then on
  *
  * until no row changes. What it ends with is taken where it is off by less than the iterations are; else all stays as it
