@@ -179,7 +179,7 @@ static sadmm_world *scene_world(const char *spec, int solver, int iterations, in
     return world;
 }
 
-/* The largest natural map of so many steps, and how many have one above 1e-9 m/s. */
+/* The largest natural map of so many steps, and how many have one above 1e-8 m/s. */
 static double largest_map(sadmm_world *world, int steps, int *above)
 {
     double most = 0;
@@ -187,15 +187,16 @@ static double largest_map(sadmm_world *world, int steps, int *above)
     for (int k = 0; k < steps; ++k) {
         step_world(world, 1);
         const double map = world_report(world).certificate.ncp_max;
-        *above += map > 2e-9;
+        *above += map > 1e-8;
         most = fmax(most, map);
     }
     return most;
 }
 
-/* What falls, limps and grips, on its way through hundreds of steps that differ from build to build in the last digits. One
- * step of a run may miss 2e-9 m/s: of 33,600 steps of such runs 2 did. The others end at the rounding of numbers around
- * 1 m/s that rows of 1e3 times the response of what they hold pass on. */
+/* What falls, limps and grips, on its way through hundreds of steps that differ from build to build in the last digits.
+ * Islands are solved where they are off by more than 1e-9 m/s; what the solve ends with is the rounding of numbers around
+ * 1 m/s that rows of 1e3 times the response of what they hold pass on, at most 5e-9 but for one of 40,000 steps of such runs: a
+ * run may have one. */
 START_TEST(mechanisms_in_contact_are_exact)
 {
     static const struct {
@@ -402,6 +403,58 @@ START_TEST(constraints_left_out_are_not_forgotten)
 }
 END_TEST
 
+/* A car on four wheels, whose loads are not unique: as much as two wheels across bear more, the others bear less. Of all
+ * that solve, the least is that where the two are even. Without looking for it they are 0.8 N apart in the end, one way with
+ * f64 and the other way with f32, and in the paper's hand scene a wheel bears nothing and ceases to roll. */
+START_TEST(wheels_bear_evenly)
+{
+    static const double radius = 0.02, about_y[4] = {0.70710678118654752, -0.70710678118654752, 0, 0};
+    sadmm_world *world = floor_world(_i);
+    sadmm_settings settings = sadmm_world_settings(world);
+    sadmm_body_def def = sadmm_body_def_default();
+    sadmm_shape_def sphere = sadmm_shape_def_default();
+    sadmm_body_id car, wheel[4];
+    sadmm_joint_id axle[4];
+    settings.iterations = 5, settings.dt = 0.004;
+    MUST(world, sadmm_world_set_settings(world, &settings));
+    def.mass = 0.2, def.inertia[0] = 2e-4, def.inertia[1] = 3e-4, def.inertia[2] = 4e-4, def.position[2] = 0.03;
+    MUST(world, sadmm_world_add_body(world, &def, &car));
+    def.mass = 0.04, sphere.type = SADMM_SHAPE_SPHERE, sphere.size[0] = radius;
+    for (int k = 0; k < 3; ++k) def.inertia[k] = 0.4 * def.mass * radius * radius;
+    for (int k = 0; k < 4; ++k) {
+        sadmm_joint_def hinge = sadmm_joint_def_default();
+        def.position[0] = k < 2 ? 0.04 : -0.04, def.position[1] = k % 2 ? 0.05 : -0.05, def.position[2] = radius;
+        MUST(world, sadmm_world_add_body(world, &def, &wheel[k]));
+        MUST(world, sadmm_world_add_shape(world, wheel[k], &sphere, NULL));
+        hinge.kind = SADMM_JOINT_REVOLUTE, hinge.body_a = car, hinge.body_b = wheel[k];
+        hinge.coordinates[5].friction = 1e-3;
+        MUST(world, sadmm_world_place_joint(world, &hinge, def.position, about_y));
+        MUST(world, sadmm_world_add_joint(world, &hinge, &axle[k]));
+    }
+    for (int step = 0; step < 250; ++step) {
+        /* Pushed ahead, and to and fro across, which the axles do not give way to. */
+        const double push[3] = {step < 200 ? 0.3 : 0, 2 * sin(0.3 * step), 0}, torque[3] = {0, 0, 0.002 * sin(0.7 * step)};
+        MUST(world, sadmm_world_set_body_wrench(world, car, push, torque));
+        step_world(world, 1);
+    }
+    const double way = body_state(world, car).position[0];
+    double weight = 0, across = 0;
+    ck_assert_double_gt(way, 0.1);
+    for (int k = 0; k < 4; ++k) {
+        sadmm_joint_state state;
+        double wrench[6];
+        MUST(world, sadmm_world_joint_state(world, axle[k], &state));
+        MUST(world, sadmm_world_body_contact_wrench(world, wheel[k], wrench));
+        weight += wrench[2], across += k == 0 || k == 3 ? wrench[2] : -wrench[2];
+        /* They slip when it is pushed across. */
+        ck_assert_double_lt(fabs(radius * state.position[5] - way), 0.02 * way);
+    }
+    ck_assert_double_lt(fabs(weight - 0.36 * 9.81), 1e-6);
+    ck_assert_double_lt(fabs(across), 0.1);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("direct");
@@ -415,6 +468,7 @@ int main(void)
     tcase_add_loop_test(tests, momentum_is_kept, 0, SOLVERS);
     tcase_add_loop_test(tests, a_slack_rope_joins_two_islands, 0, SOLVERS);
     tcase_add_loop_test(tests, constraints_left_out_are_not_forgotten, 0, SOLVERS);
+    tcase_add_loop_test(tests, wheels_bear_evenly, 0, SOLVERS);
     suite_add_tcase(suite, tests);
     return run_suite(suite);
 }

@@ -11,7 +11,10 @@
 
 /* m/s: what is left alone, of the natural map and of velocities against what the impulses make them; what is aimed at;
  * what Newton's steps go for, which solve for what rows in their states give. */
-static const double ENOUGH = 1e-9, AIM = 1e-11, NEWTON_AIM = 1e-13;
+static const double ENOUGH = 1e-9, AIM = 1e-10, NEWTON_AIM = 1e-13;
+/* m/s: by how much the contact that bears most gives in G, others in proportion, for the least of the impulses that solve:
+ * else wheels of a car bear by twos across, and which two changes from step to step. */
+static const double GIVE = 3e-12;
 /* Multiplications for an island, so that one that does not come to an end takes some 10 ms. */
 static const double BUDGET = 4e7;
 /* Rows that are solved for together with the contacts, since they changed their states; how often it goes from contacts to
@@ -70,6 +73,7 @@ struct island {
     struct direct_dense dense;
     double *best_lambda, *best_velocity; /* contacts x 3; bodies x 6 */
     double best;                         /* natural map, m/s */
+    double give;                         /* of contacts, in shares of their response */
 };
 
 struct sadmm_direct *sadmm_direct_create(void)
@@ -406,6 +410,7 @@ static void make_responses(struct island *s, double *G)
                 const struct joined_row *row = &part_of(s, loose->part)->view.rows[loose->r];
                 x = row->gain * x + (r == c ? row->compliance : 0);
             }
+            if (r == c && r < 3 * (size_t)s->contacts) x += s->give * s->d->laws[r / 3].response;
             G[r * n + c] = x;
         }
         take_back(s, by, sides);
@@ -446,16 +451,33 @@ static bool settle(struct island *s, uint8_t *states, uint8_t *next, size_t rows
     return false;
 }
 
+static void find_give(struct island *s)
+{
+    double most = 0;
+    for (int32_t n = 0; n < 3 * s->contacts; ++n)
+        most = fmax(most, s->d->laws[n / 3].response * fabs(s->dense.lambda[n]));
+    s->give = GIVE < most ? GIVE / most : 0;
+}
+
+/* What the matrix has them give is in their velocities, too. */
+static void add_give(struct island *s)
+{
+    for (int32_t n = 0; n < 3 * s->contacts; ++n)
+        s->dense.u[n] += s->give * s->d->laws[n / 3].response * s->dense.lambda[n];
+}
+
 static void search(struct island *s, double *G, uint8_t *states, uint8_t *next, size_t rows)
 {
     bool changed = true;
     take_states(s, states);
+    find_give(s);
     if (!settle(s, states, next, rows, &changed)) return;
     for (int round = 0, idle = 0;
          round < MOST_ROUNDS && idle < MOST_IDLE && s->best > AIM && s->dense.budget > 0; ++round) {
         const double last = s->best;
         if (changed) make_responses(s, G);
         changed = false;
+        add_give(s);
         direct_newton(&s->dense, NEWTON_AIM);
         if (!settle(s, states, next, rows, &changed)) return;
         if (!changed && s->best > last / 2) return; /* what is left is rounding */
