@@ -145,6 +145,13 @@ START_TEST(gears_come_and_go)
     check_refused(t.world, bad, "def->ratio = nan");
     bad = good, bad.offset = INFINITY;
     check_refused(t.world, bad, "def->offset (or NaN: as it is) = inf");
+    sadmm_body_state turned = body_state(t.world, t.body[1]);
+    const sadmm_body_state straight = turned;
+    turned.orientation[0] = cos(1), turned.orientation[3] = sin(1); /* by 2 rad */
+    MUST(t.world, sadmm_world_set_body_state(t.world, t.body[1], &turned));
+    bad = good, bad.ratio = -1e9;
+    check_refused(t.world, bad, "def->offset (NaN: as it is) = -2e+09: must be in [-1e+09, 1e+09]");
+    MUST(t.world, sadmm_world_set_body_state(t.world, t.body[1], &straight));
     bad = good, bad.joint_2 = planet;
     check_refused(t.world, bad, "between 3 dynamic bodies, must be 2 at most");
     bad = good, ++bad.joint_1.generation;

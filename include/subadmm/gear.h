@@ -32,8 +32,8 @@ typedef struct sadmm_gear_def {
     int32_t coordinate_1, coordinate_2; /* free ones, in [0, 6): any translation or distance; rotations that are the
                                            only free one or one of two. No default */
     double ratio;                /* |ratio| in [1e-9, 1e9], unit of coordinate 1 over that of 2; default 1 */
-    double offset;               /* |offset| <= 1e9, unit of coordinate 1, or NaN: as it is when the gear is added (what
-                                    is read back); default NaN */
+    double offset;               /* |offset| <= 1e9, unit of coordinate 1, or NaN: as it is when the gear is added, in
+                                    the same range (what is read back); default NaN */
     bool enabled;                /* default true. One that is not does nothing, nor does one with a joint that is not */
 } sadmm_gear_def;
 

@@ -92,12 +92,17 @@ SADMM_INLINE vec3 pose_axis(const struct pair_pose *pose)
 /* A direction (unit) in the upper 27 bits of a cache word: 9 bits a coordinate, to 0.2 degrees. */
 enum { MANIFOLD_DIRECTION_SHIFT = 5 };
 
+/* A coordinate, in [1, 511]. What is no direction, of bodies so far apart that squares overflow, is 0. */
+SADMM_INLINE uint32_t manifold_coordinate_bits(real x)
+{
+    const real scale = 255, middle = (real)256.5, most = (real)1.001; /* from below: rounds to the nearest */
+    return x >= -most && x <= most ? (uint32_t)(int32_t)(middle + scale * x) : 0;
+}
+
 SADMM_INLINE uint32_t manifold_direction_bits(vec3 n)
 {
-    const real scale = 255, middle = (real)256.5; /* from below: rounds to the nearest, in [1, 511] */
-    uint32_t x = (uint32_t)(int32_t)(middle + scale * n.x), y = (uint32_t)(int32_t)(middle + scale * n.y),
-             z = (uint32_t)(int32_t)(middle + scale * n.z);
-    return (x | y << 9 | z << 18) << MANIFOLD_DIRECTION_SHIFT;
+    return (manifold_coordinate_bits(n.x) | manifold_coordinate_bits(n.y) << 9 | manifold_coordinate_bits(n.z) << 18)
+           << MANIFOLD_DIRECTION_SHIFT;
 }
 
 /* The direction in a cache word, unit but for the rounding to 9 bits. */

@@ -97,7 +97,10 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *def,
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "def->joint_1, def->joint_2: on a dynamic body, with the same axis or the same direction: no force "
                           "between the other two bodies moves both (a wheel in between, with two gears, does)");
-    if (isnan(def->offset)) TRY(measure(world, def, &made.def.offset));
+    if (isnan(def->offset)) {
+        TRY(measure(world, def, &made.def.offset));
+        TRY(sadmm_check_range("def->offset (NaN: as it is)", made.def.offset, -OFFSET_LIMIT, OFFSET_LIMIT, error));
+    }
     size_t slot = world->gear_slots;
     if ((size_t)world->gear_count < slot) slot = sadmm_slot_free(&world->gear_marks, world, alive);
     if (slot >= MOST_GEARS)
