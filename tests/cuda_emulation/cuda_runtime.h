@@ -219,6 +219,7 @@ inline unsigned __ballot_sync(unsigned mask, bool vote)
 template <class T> static inline T __ldcs(const T *from) { return *from; }
 template <class T> static inline T __ldcg(const T *from) { return *from; }
 inline void __threadfence(void) {}
+inline void __threadfence_system(void) {}
 inline int __popc(unsigned bits) { return __builtin_popcount(bits); }
 inline int __ffs(int bits) { return __builtin_ffs(bits); }
 
@@ -283,6 +284,7 @@ enum cudaError_t {
     cudaSuccess = 0,
     cudaErrorInvalidValue,
     cudaErrorMemoryAllocation,
+    cudaErrorNotReady,
     cudaErrorInvalidDevice,
     cudaErrorGraphExecUpdateFailure,
     cudaErrorLaunchFailure,
@@ -490,7 +492,8 @@ inline cudaError_t cudaStreamWaitEvent(cudaStream_t, cudaEvent_t, unsigned)
     CUDA_EMULATION_CALL;
     return cudaSuccess;
 }
-inline cudaError_t cudaEventSynchronize(cudaEvent_t)
+/* What was enqueued has been done: who asks need not wait, but would. */
+inline cudaError_t cudaEventQuery(cudaEvent_t)
 {
     ++cuda_emulation_waits;
     CUDA_EMULATION_CALL;

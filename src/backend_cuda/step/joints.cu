@@ -224,16 +224,26 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
     double finite = 0;
     for (int32_t c = 0; c < joint->constraints; ++c) {
         const int32_t count = v.raw.constraints[first + c].count;
-        for (int32_t r = 0; r < count; ++r) {
-            const size_t slot = (size_t)(first + c) * SADMM_MAX_ROWS + (size_t)r;
-            const struct sadmm_joint_source source = v.joints.sources[slot];
-            const struct raw_row *row = &v.raw.rows[slot];
-            const bool direct = v.joints.is_direct[v.model.bodies + first + c];
-            const double lambda = direct ? v.joints.solution[slot] : (double)v.rows.data[slot].lambda;
-            finite += lambda - lambda;
-            if (!direct) v.joints.solution[slot] = lambda;
-            joint_keep_row(&memory, middle->axis, source.role, source.coordinate, source.sign * lambda / settings.dt);
-            if (joint_limit_jolts(&source, lambda, row->jacobian[0], row->jacobian[1], bodies, &settings))
+        const size_t slots = (size_t)(first + c) * SADMM_MAX_ROWS;
+        const bool direct = v.joints.is_direct[v.model.bodies + first + c];
+        /* All rows are fetched before the first is looked at: one wait for memory, not one a row. */
+        struct sadmm_joint_source source[SADMM_MAX_ROWS];
+        double lambda[SADMM_MAX_ROWS];
+#pragma unroll
+        for (int r = 0; r < SADMM_MAX_ROWS; ++r) {
+            if (r >= count) continue;
+            source[r] = v.joints.sources[slots + (size_t)r];
+            lambda[r] = direct ? v.joints.solution[slots + (size_t)r] : (double)v.rows.data[slots + (size_t)r].lambda;
+        }
+#pragma unroll
+        for (int r = 0; r < SADMM_MAX_ROWS; ++r) {
+            if (r >= count) continue;
+            const struct raw_row *row = &v.raw.rows[slots + (size_t)r];
+            finite += lambda[r] - lambda[r];
+            if (!direct) v.joints.solution[slots + (size_t)r] = lambda[r];
+            joint_keep_row(&memory, middle->axis, source[r].role, source[r].coordinate,
+                           source[r].sign * lambda[r] / settings.dt);
+            if (joint_limit_jolts(&source[r], lambda[r], row->jacobian[0], row->jacobian[1], bodies, &settings))
                 bits |= ISLAND_LEADS_STAY;
         }
     }

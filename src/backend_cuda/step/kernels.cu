@@ -268,20 +268,27 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
 
 static __device__ double double_of(unsigned long long bits) { return __longlong_as_double((long long)bits); }
 
-/* A thread a body where some may have to be moved again, else one block; the report is one thread's. */
+/* Blocks of bodies (args.most_bodies of them) where some may have to be moved again; blocks of joints that bodies are moved
+ * by; the last one's first thread reports, beside them. */
 static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const bool planned = as_planned(v.model, v.step);
+    const bool planned = as_planned(v.model, v.step), reports = blockIdx.x == gridDim.x - 1;
     const int32_t aborted = v.model.live->abort_code;
     struct cuda_step_control *control = v.step.control;
-    const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
+    const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x), body_blocks = args.most_bodies;
     wait_for_stream();
-    /* Blocks that begin late may see what the first one says of the step: only where what they move is of no use. */
-    const bool on = !aborted && planned, again = on && moves_again(v),
-               joined = on && v.joints.count > 0 && !v.joints.apart;
-    if ((again || joined) && i < v.model.bodies) move_once_more(v, i, again, joined);
-    if (joined) end_joints(v, i);
-    if (blockIdx.x > 0 || threadIdx.x > 0) return;
+    if (!reports) {
+        /* Blocks that begin late may see what the report says of the step: only where what they move is of no use. */
+        const bool on = !aborted && planned, joined = on && v.joints.count > 0 && !v.joints.apart;
+        if ((int32_t)blockIdx.x >= body_blocks) {
+            if (joined) end_joints(v, i - body_blocks * STEP_THREADS);
+            return;
+        }
+        const bool again = on && moves_again(v);
+        if ((again || joined) && i < v.model.bodies) move_once_more(v, i, again, joined);
+        return;
+    }
+    if (threadIdx.x > 0) return;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
     const int32_t offending_body = control->offending_body,
                   abort_code = abort_of(aborted, planned, offending_body);
@@ -299,6 +306,8 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     report->primal = v.step.measured ? double_of(v.iteration.residual[0]) : -1;
     report->dual = v.step.measured ? double_of(v.iteration.residual[1]) : -1;
     report->totals = totals_of(v, args);
+    __threadfence_system();
+    *(volatile int64_t *)&report->ready = report->sequence + 1;
 }
 
 /* ---- launches -------------------------------------------------------------------------------------------------- */
@@ -347,7 +356,8 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *er
     cuda_args args = {};
     args.checks = c->checks;
     args.count = c->settings.iterations;
-    const int64_t joints = moved_last(c), bodies = c->view.step.limits || joints ? c->view.model.bodies : 1,
-                  blocks = ((bodies > joints ? bodies : joints) - 1) / STEP_THREADS + 1;
+    const int64_t joints = moved_last(c), bodies = c->view.step.limits || joints ? c->view.model.bodies : 0;
+    args.most_bodies = (int32_t)((bodies + STEP_THREADS - 1) / STEP_THREADS);
+    const int64_t blocks = args.most_bodies + (joints + STEP_THREADS - 1) / STEP_THREADS + 1;
     return CUDA(launch_early)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
 }

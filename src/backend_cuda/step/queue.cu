@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include <algorithm>
+#include <atomic>
 
 #include "core/base/memory.h"
 #include "world.h"
@@ -13,6 +14,8 @@
 static sadmm_status prepare(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
+    if (s->planned && s->recorded) return SADMM_OK;
+    TRY(CUDA(wait)(c, error)); /* reports are seen before the last blocks of a step have ended */
     if (!s->planned) TRY(CUDA(guess_step)(c, error));
     if (s->recorded) return SADMM_OK;
     for (int into = 0; into < 2; ++into) TRY(CUDA(record_step)(c, into, error));
@@ -34,6 +37,7 @@ static sadmm_status launch_step(struct sadmm_context *c, int64_t sequence, struc
 {
     struct cuda_step *s = c->step;
     c->kernel = "a step's graph";
+    ((volatile struct cuda_step_report *)&step_reports(c)[sequence % STEPS_AHEAD])->ready = 0;
     CUDA_CALL(c, cudaGraphLaunch(s->graphs[s->into], c->stream), "cudaGraphLaunch");
     CUDA_CALL(c, cudaEventRecord(slot_of(s, sequence)->done, c->stream), "cudaEventRecord");
     s->into = 1 - s->into;
@@ -151,11 +155,26 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     return repeat_steps(c, first, end, error);
 }
 
+/* Until a step's report is there: a few us before the driver knows of the step's end. That is asked for first, and now and
+ * then: a step that has failed makes no report. */
+static cudaError_t wait_for_report(const struct sadmm_context *c, int64_t sequence)
+{
+    enum { LOOKS = 128 };
+    const volatile int64_t *ready = &step_reports(c)[sequence % STEPS_AHEAD].ready;
+    for (int look = 0; look % LOOKS == 0 || *ready != sequence + 1; ++look) {
+        if (look % LOOKS > 0) continue;
+        const cudaError_t code = cudaEventQuery(slot_of(c->step, sequence)->done);
+        if (code != cudaErrorNotReady) return code;
+    }
+    std::atomic_thread_fence(std::memory_order_acquire);
+    return cudaSuccess;
+}
+
 /* Wait for the oldest step of the queue and read its report. */
 static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    cudaError_t code = cudaEventSynchronize(slot_of(s, s->seen)->done);
+    const cudaError_t code = wait_for_report(c, s->seen);
     if (code != cudaSuccess) TRY(CUDA(wait)(c, error)); /* says what failed */
     /* A copy: recover() reuses the place. */
     const struct cuda_step_report report = step_reports(c)[s->seen % STEPS_AHEAD];

@@ -81,6 +81,7 @@ extern "C" sadmm_status CUDA(view_world)(struct sadmm_context *c, struct sadmm_r
 {
     const struct cuda_step *s = c->step;
     CUDA_ENTER(c);
+    TRY(CUDA(wait)(c, error)); /* whoever reads it may do so on another stream */
     CUDA(view_into)(c, s->into, 0);
     out->rigid = c->view.step.before;
     out->wrench = buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * (size_t)s->bodies;

@@ -77,34 +77,34 @@ static __global__ void respond_rows_kernel(const __grid_constant__ cuda_view v, 
     v.rows.responses[slot] = out;
 }
 
-/* B = diag(weight) + along along^T */
-static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first, double floor)
+/* B = diag(weight) + along along^T. A thread a constraint. What the islands' sums do not say is fetched before the kernel
+ * that makes them has ended. */
+static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const row_constraint about = v.rows.constraints[k];
+    const int32_t k = thread_index();
+    const bool live = k < live_rows(v.model, v.rows);
+    row_constraint about = {};
+    if (live) about = v.rows.constraints[k];
     row_data *rows = v.rows.data + (size_t)k * SADMM_MAX_ROWS;
-    if (about.rows == 0) return; /* a joint may have fewer than there is room for */
-    cuda_island *island =
-        &v.islands.info[v.graph.label[is_dynamic(v.model, about.body_a) ? about.body_a : about.body_b]];
-    struct weight_row_sums sums = {0, 0, 0};
-    if (first) island->rows = island->held = 1; /* left alone */
     const row_response *responses = v.rows.responses + (size_t)k * SADMM_MAX_ROWS;
+    struct weight_row_sums sums = {0, 0, 0};
     for (int r = 0; r < about.rows; ++r)
         weight_add_row(&sums, (double)rows[r].lambda, responses[r].scale, responses[r].response, about.rows);
+    const int32_t label =
+        about.rows > 0 ? v.graph.label[is_dynamic(v.model, about.body_a) ? about.body_a : about.body_b] : 0;
+    wait_for_stream();
+    if (about.rows == 0) return; /* a joint may have fewer than there is room for */
+    cuda_island *island = &v.islands.info[label];
+    if (args.start) island->rows = island->held = 1; /* left alone */
     const double share = weight_share(&island->weights, sums.load2);
     for (int r = 0; r < about.rows; ++r) {
         const struct weight_law law = {
             about.cone, sadmm_law_is_coupled((double)rows[r].compliance, (double)rows[r].lo, (double)rows[r].hi),
-            (double)rows[r].gain, (double)rows[r].compliance, (double)rows[r].lo, (double)rows[r].hi, floor};
+            (double)rows[r].gain, (double)rows[r].compliance, (double)rows[r].lo, (double)rows[r].hi, args.row_floor};
         const struct weight_row B = weight_of_row(&sums, share, &law, (double)rows[r].lambda, responses[r].response);
         rows[r].weight = (solver_real)B.weight;
         rows[r].along = (solver_real)B.along;
     }
-}
-
-static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
-{
-    const int32_t k = thread_index();
-    if (k < live_rows(v.model, v.rows)) weigh_rows(v, k, args.start, args.row_floor);
 }
 
 /* ---- launches ---------------------------------------------------------------------------------------------------- */
@@ -140,7 +140,8 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *
                                       : (rows ? terms_kernel<false, true> : terms_kernel<false, false>);
     TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
                                 error));
-    return CUDA(launch)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), &args, error);
+    return CUDA(launch_early)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), THREADS, &args,
+                                error);
 }
 
 sadmm_status CUDA(enqueue_loads)(struct sadmm_context *c, struct sadmm_error *error)
