@@ -5,7 +5,7 @@
  *
  * 1. The optimum beside the last step's direction, by Newton's method alone, if that is certain of it. If it parts the
  *    two there is no other; else it is the one to stay with while they are not apart, nor deep in each other.
- * 2. Else, apart: the same from the shortest vector.
+ * 2. Else, apart: the same from the shortest vector; where Newton's method is not certain, also from what is beside.
  * 3. Else of all of them the best one. A polytope inside a - b grows where its faces are nearest to the origin (epa.h).
  *    No direction across a face is less deep than the face; the optimum that Newton's method, or a flat, has beside it is
  *    no less deep than the least. A face that is no nearer than the best optimum that has been found is done with, until
@@ -145,20 +145,65 @@ SADMM_INLINE int convex_own_directions(const struct convex *c, vec3 n, vec3 to_o
     return count;
 }
 
-SADMM_CALLED void convex_ask_beside(struct convex_pair *pair, struct convex_axis *axis, struct convex_active *active)
+/* Caps of both within a degree of n: between their normals h is that of two rims, each with its kink at one end. As far
+ * as they are parallel it is ra |x| + rb |x - tilt| - w . x, x from a's normal to n, tilt to b's, w from a's centre to
+ * b's. Where that is least the ways to x from the two kinks, u and v, are those of a triangle, w = ra u + rb v: where
+ * the rims cross, seen along n. There are two such places, and x is at most at one of them, where it is ahead of both
+ * kinks. False: at none; one of the caps' normals is better. */
+SADMM_INLINE bool convex_where_rims_cross(const struct convex_pair *pair, vec3 n, vec3 *crossing)
+{
+    const struct convex *a = &pair->a, *b = &pair->b;
+    const int of_a = a->form == CONVEX_POLYTOPE ? -1 : convex_flat(a, m3_tmul(pair->R, n), CONVEX_BESIDE),
+              of_b = b->form == CONVEX_POLYTOPE ? -1 : convex_flat(b, v3_neg(n), CONVEX_BESIDE);
+    vec3 normal, other, centres, w, across;
+    real length, ra, rb, u1, u2, v1, v2, sine, along;
+    int way;
+    if (of_a < 0 || of_b < 0) return false;
+    ra = a->size.x;
+    rb = b->size.x;
+    normal = m3_mul(pair->R, convex_flat_normal(a, of_a));
+    other = v3_neg(convex_flat_normal(b, of_b));
+    centres = v3_neg(v3_madd(v3_madd(pair->t, a->size.y, normal), b->size.y, other));
+    w = v3_madd(centres, -v3_dot(centres, normal), normal);
+    length = v3_norm(w);
+    if (!(length > 0)) return false;
+    u1 = (ra * ra + length * length - rb * rb) / (2 * ra * length);
+    if (!(real_abs(u1) < 1)) return false; /* one within the other, or beside it */
+    u2 = real_sqrt(1 - u1 * u1);
+    v1 = (length - ra * u1) / rb;
+    v2 = ra * u2 / rb;
+    sine = u1 * v2 + u2 * v1;
+    w = v3_scale(w, 1 / length);
+    across = v3_cross(normal, w);
+    along = v3_dot(other, w);
+    for (way = -1; way <= 1; way += 2) {
+        const real beside = (real)way * v3_dot(other, across), from_a = along * v2 + beside * v1,
+                   from_b = beside * u1 - along * u2;
+        if (!(from_a > 0 && from_b > 0 && sine > 0)) continue;
+        *crossing = convex_turned(normal, from_a / sine * u1, w, (real)way * from_a / sine * u2, across);
+        return true;
+    }
+    return false;
+}
+
+SADMM_RARE void convex_ask_beside(struct convex_pair *pair, struct convex_axis *axis, struct convex_active *active)
 {
     const vec3 n = axis->n;
     int s, k;
-    for (s = 0; s < 2; ++s) {
+    for (s = 0; s < 3; ++s) { /* a's, b's, and of both */
         vec3 own[CONVEX_OWN];
-        const int count = convex_own_directions(s ? &pair->b : &pair->a, s ? v3_neg(n) : m3_tmul(pair->R, n),
-                                                s ? pair->t : v3_neg(m3_tmul(pair->R, pair->t)), own);
+        const int count = s == 2 ? convex_where_rims_cross(pair, n, own)
+                                 : convex_own_directions(s ? &pair->b : &pair->a, s ? v3_neg(n) : m3_tmul(pair->R, n),
+                                                         s ? pair->t : v3_neg(m3_tmul(pair->R, pair->t)), own);
         for (k = 0; k < count; ++k) {
-            const vec3 from = s ? v3_neg(own[k]) : m3_mul(pair->R, own[k]);
+            const vec3 from = s == 2 ? own[k] : s ? v3_neg(own[k]) : m3_mul(pair->R, own[k]);
+            const real beside = v3_norm2(v3_cross(from, n));
             struct convex_axis other;
             struct convex_active of_other;
-            if (v3_norm2(v3_cross(from, n)) <= 16 * SADMM_EPSILON) continue; /* no depth changes by more so near */
+            if (beside <= 256 * SADMM_EPSILON * SADMM_EPSILON) continue; /* the same */
             convex_axis_along(pair, from, &other, &of_other);
+            /* so near to n the way from there leads back, unless it is better already */
+            if (beside <= 16 * SADMM_EPSILON && other.separation <= axis->separation + pair->equal) continue;
             convex_local(pair, &other, &of_other);
             if (other.separation > axis->separation + pair->equal) convex_take(&other, &of_other, axis, active);
         }
@@ -283,7 +328,7 @@ SADMM_INLINE bool convex_find(struct convex_pair *pair, vec3 side, bool known, r
         pair->enough = enough;
         if (end == GJK_APART && convex_apart(pair, &s, v, axis, active)) return true;
         if (end == GJK_APART && axis->separation + convex_radii(pair) > CONVEX_NEAR * pair->thin) {
-            convex_local(pair, axis, active);
+            if (!convex_local(pair, axis, active)) convex_ask_beside(pair, axis, active);
             return true;
         }
     }

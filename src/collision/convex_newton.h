@@ -19,7 +19,10 @@
  * which it is not beside a rim's axis: a corner may be that near to a rim. */
 #define CONVEX_SINGULAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-9)
 #define CONVEX_SINGULAR_NEAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-11)
-enum { CONVEX_STEPS = 16 };
+/* Steps along the tangent of the curve where two pairs of pieces reach equally far that are longer (rad) go back to it,
+ * so often at most: Newton's next step takes the rest, the square of this, with it. */
+#define CONVEX_LONG ((real)0.03)
+enum { CONVEX_STEPS = 16, CONVEX_BACK = 3 };
 
 /* Pairs of pieces, with their share of the nearest point. */
 struct convex_active {
@@ -200,21 +203,34 @@ SADMM_INLINE real convex_gain(real off, real mean, real length)
     return off * real_min(1, mean < 0 ? off / -mean : length);
 }
 
-/* n by Newton's method. False: it is not certain that this is the optimum; where s has not grown, all is as it was. */
+/* Two active pairs reach equally far along a curve, which a long step along its tangent leaves; what reaches farther
+ * beside the curve says nothing of what does so on it. x: the way back to it. False: here it is, or all but. */
+SADMM_INLINE bool convex_back(const struct convex_plane *p, real slack, real x[2])
+{
+    const real u0 = p->g[1][0] - p->g[0][0], u1 = p->g[1][1] - p->g[0][1], uu = u0 * u0 + u1 * u1,
+               apart = p->h[0] - p->h[1];
+    if (real_abs(apart) <= slack || !(4 * apart * apart <= uu)) return false; /* of so much the tangent says nothing */
+    x[0] = apart / uu * u0;
+    x[1] = apart / uu * u1;
+    return true;
+}
+
+/* n by Newton's method. False: it is not certain that this is the optimum, only the best that there was on the way;
+ * where s has not grown, all is as it was. */
 SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_active *active, vec3 *n, real *separation)
 {
-    struct convex_active now = *active;
+    struct convex_active now = *active, best = *active;
     const struct difference_point zero = {{0, 0, 0}, 0, 0};
-    vec3 at = *n;
-    real s, length = 2, last = 2, first = 0, miss = 0;
-    bool certain = false, singular = true; /* until a step has said what the Hessian is */
-    int step, ended = 0;
+    vec3 at = *n, best_at = *n;
+    real s, least_reach = -(*separation + convex_radii(pair)), length = 2, last = 2, first = 0, miss = 0;
+    bool certain = false, failed = false, singular = true; /* until a step has said what the Hessian is */
+    int step, ended = 0, back = 0;
     for (step = 0;; ++step) {
         const struct difference_point next = convex_support(pair, at, &zero);
         const vec3 from = at;
         struct convex_plane p;
         vec3 t1, t2;
-        real x[2], mean = 0, off0 = 0, off1 = 0, off, lack;
+        real x[2], mean = 0, off0 = 0, off1 = 0, off, lack, reach;
         int k, least = 0;
         v3_tangents(at, &t1, &t2);
         p.m[0] = p.m[1] = p.m[2] = 0;
@@ -231,7 +247,20 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
             off0 += now.weight[k] * p.g[k][0];
             off1 += now.weight[k] * p.g[k][1];
         }
-        lack = v3_dot(at, next.w) - mean;
+        if (back > 0 && now.count == 2 && convex_back(&p, pair->slack, x)) {
+            at = convex_turned(at, x[0], t1, x[1], t2);
+            --back;
+            --step; /* it is a part of the last one */
+            continue;
+        }
+        back = 0;
+        reach = v3_dot(at, next.w);
+        if (reach < least_reach - pair->slack) {
+            least_reach = reach;
+            best_at = at;
+            best = now;
+        }
+        lack = reach - mean;
         off = real_sqrt(off0 * off0 + off1 * off1);
         certain = lack + convex_gain(off, mean, length) <= 8 * pair->slack && !(singular && mean > 8 * pair->slack);
         miss = lack + off;
@@ -251,7 +280,10 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
         p.m[2] -= mean;
         last = length;
         if (!convex_newton(&p, pair->size, pair->slack, &now, x, &singular)) {
-            if (now.count == 1) return false;
+            if (now.count == 1) {
+                failed = true;
+                break;
+            }
             for (k = 1; k < now.count; ++k)
                 if (now.weight[k] < now.weight[least]) least = k;
             convex_drop(&now, least);
@@ -262,13 +294,17 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
             continue;
         }
         length = real_sqrt(x[0] * x[0] + x[1] * x[1]);
-        if (!(length <= 16 / CONVEX_SINGULAR)) return false; /* NaN as well */
+        if (!(length <= 16 / CONVEX_SINGULAR)) { /* NaN as well */
+            failed = true;
+            break;
+        }
         if (length > 1) { /* the Hessian says nothing of what is so far away */
             x[0] /= 2 * length;
             x[1] /= 2 * length;
             length = 2;
         }
         at = convex_turned(at, x[0], t1, x[1], t2);
+        if (now.count == 2 && length > CONVEX_LONG) back = CONVEX_BACK;
         if (now.count == 1 && length > (real)1e-6) { /* near a rim's axis the bend is another one from place to place */
             int half;
             for (half = 0; half < 6; ++half) {
@@ -288,6 +324,12 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
         }
     }
     s = convex_separation(pair, at);
+    if (failed) certain = false;
+    if (failed || (!certain && !(s >= -least_reach - convex_radii(pair) - pair->slack / 4))) { /* better on the way */
+        now = best;
+        at = best_at;
+        s = convex_separation(pair, at);
+    }
     if (!(s >= *separation - pair->slack / 4)) return false;
     if (!certain && s <= *separation + pair->slack && miss > first) return false; /* the points were better before */
     *active = now;
