@@ -133,11 +133,11 @@ START_TEST(redundant_contacts_near_rest_are_solved)
         uint32_t random = (uint32_t)(104729 * k + 3);
         make_corner(&p, speed, &random);
         memcpy(start, p.u, sizeof start);
-        inside += direct_interior(&p.dense, 0) < 1e-4 * speed;
+        inside += direct_interior(&p.dense, 0) < 1e-4 * speed; /* near enough to tell what slips from what sticks */
         memcpy(p.u, start, sizeof start);
         memset(p.lambda, 0, sizeof p.lambda);
         direct_newton(&p.dense, 1e-13);
-        solved += map_from_scratch(&p, start) < 1e-11;
+        solved += map_from_scratch(&p, start) < 1e-11; /* rounding of u, as above */
     }
     ck_assert_msg(solved == SEEDS, "%d of %d", solved, SEEDS);
     ck_assert_msg(inside == SEEDS, "%d of %d", inside, SEEDS);
@@ -179,7 +179,7 @@ static sadmm_world *scene_world(const char *spec, int solver, int iterations, in
     return world;
 }
 
-/* The largest natural map of so many steps, and how many have one above 1e-8 m/s. */
+/* The largest natural map of so many steps, and how many have one above 2e-9 m/s. */
 static double largest_map(sadmm_world *world, int steps, int *above)
 {
     double most = 0;
@@ -187,31 +187,52 @@ static double largest_map(sadmm_world *world, int steps, int *above)
     for (int k = 0; k < steps; ++k) {
         step_world(world, 1);
         const double map = world_report(world).certificate.ncp_max;
-        *above += map > 1e-8;
+        *above += map > 2e-9;
         most = fmax(most, map);
     }
     return most;
 }
 
+/* Seed 0: as it is; else up to 0.5 mm/s to every velocity. */
+static void nudge(sadmm_world *world, uint32_t seed)
+{
+    enum { MOST = 64, COLUMNS = 13, VELOCITY = 7 };
+    double states[MOST * COLUMNS];
+    int32_t rows[MOST], count, bodies = sadmm_world_body_count(world);
+    if (seed == 0) return;
+    ck_assert_int_le(bodies, MOST);
+    MUST(world, sadmm_world_get_array(world, SADMM_ARRAY_BODY_STATE, 0, bodies, states));
+    MUST(world, sadmm_world_dynamic_bodies(world, rows, MOST, &count));
+    for (int32_t k = 0; k < count; ++k)
+        for (int j = 0; j < 3; ++j) states[COLUMNS * rows[k] + VELOCITY + j] += 5e-4 * uniform(&seed);
+    MUST(world, sadmm_world_set_array(world, SADMM_ARRAY_BODY_STATE, 0, bodies, states));
+}
+
 /* What falls, limps and grips, on its way through hundreds of steps that differ from build to build in the last digits.
- * Islands are solved where they are off by more than 1e-9 m/s; what the solve ends with is the rounding of numbers around
- * 1 m/s that rows of 1e3 times the response of what they hold pass on, at most 5e-9 but for one of 40,000 steps of such runs: a
- * run may have one. */
+ * Islands are solved where they are off by more than 1e-9 m/s; a run may have one step in which that does not come to its
+ * end. With SADMM_TEST_ALL each runs twenty times, from slightly different velocities (a minute): 11 of 64,000 steps, one
+ * in a run. */
 START_TEST(mechanisms_in_contact_are_exact)
 {
     static const struct {
         const char *spec;
         int iterations, steps;
     } runs[] = {{"ragdolls:1", 20, 300}, {"ragdolls:1", 1, 300}, {"bridge", 20, 200}};
-    const int run = _i / SOLVERS, solver = _i % SOLVERS;
+    const int run = _i / SOLVERS, solver = _i % SOLVERS, seeds = getenv("SADMM_TEST_ALL") ? 20 : 1;
     int above, without;
-    sadmm_world *world = scene_world(runs[run].spec, solver, runs[run].iterations, 128);
-    largest_map(world, runs[run].steps, &above);
-    sadmm_world_destroy(world);
+    sadmm_world *world;
+    for (int seed = 0; seed < seeds; ++seed) {
+        world = scene_world(runs[run].spec, solver, runs[run].iterations, 128);
+        nudge(world, (uint32_t)seed);
+        const double largest = largest_map(world, runs[run].steps, &above);
+        sadmm_world_destroy(world);
+        if (above > 0) printf("%s, %d iterations, way %d, seed %d: %d above, %.1e\n", runs[run].spec,
+                              runs[run].iterations, solver, seed, above, largest);
+        ck_assert_int_le(above, 1);
+    }
     world = scene_world(runs[run].spec, solver, runs[run].iterations, 0);
     largest_map(world, runs[run].steps, &without);
     sadmm_world_destroy(world);
-    ck_assert_int_le(above, 1);
     ck_assert_int_ge(without, runs[run].steps / 10); /* else this says nothing */
 }
 END_TEST
@@ -449,6 +470,8 @@ START_TEST(wheels_bear_evenly)
         /* They slip when it is pushed across. */
         ck_assert_double_lt(fabs(radius * state.position[5] - way), 0.02 * way);
     }
+    /* It does not leave the ground: 1e-6 N is 1e-8 m/s of 0.36 kg in a step. 0.04 N stay between the pairs: a solve goes
+     * a small part of the way to the least. */
     ck_assert_double_lt(fabs(weight - 0.36 * 9.81), 1e-6);
     ck_assert_double_lt(fabs(across), 0.1);
     sadmm_world_destroy(world);

@@ -76,8 +76,8 @@ struct cuda_step_report {
     struct cuda_joint_counts joints; /* of the sub-step that contacts were found for last */
     int32_t apart;      /* as in cuda_step_guess */
     struct cuda_step_totals totals;
-    int64_t ready;      /* sequence + 1, once all else is there; the host sets 0 before the step. What follows in the stream
-                           finds the step done; its last blocks may still move bodies when this is seen */
+    int64_t ready;      /* sequence + 1, once all else is there; the host sets 0 before the step. What follows in the
+                           stream finds the step done; its last blocks may still move bodies when this is seen */
 };
 
 /* In device memory, of the step that runs. */

@@ -268,8 +268,8 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
 
 static __device__ double double_of(unsigned long long bits) { return __longlong_as_double((long long)bits); }
 
-/* Blocks of bodies (args.most_bodies of them) where some may have to be moved again; blocks of joints that bodies are moved
- * by; the last one's first thread reports, beside them. */
+/* Blocks of bodies (args.most_bodies of them) where some may have to be moved again; blocks of joints that bodies are
+ * moved by; the last one's first thread reports, beside them. */
 static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const bool planned = as_planned(v.model, v.step), reports = blockIdx.x == gridDim.x - 1;

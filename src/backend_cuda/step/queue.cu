@@ -10,7 +10,7 @@
 
 /* ---- running --------------------------------------------------------------------------------------------------- */
 
-/* Clear the abort code, plan if need be, record if need be. Nothing is running. */
+/* Plan and record, if need be, with the abort code cleared, once nothing is running. */
 static sadmm_status prepare(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
@@ -155,8 +155,8 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     return repeat_steps(c, first, end, error);
 }
 
-/* Until a step's report is there: a few us before the driver knows of the step's end. That is asked for first, and now and
- * then: a step that has failed makes no report. */
+/* Until a step's report is there: a few us before the driver knows of the step's end. That is asked for first, and now
+ * and then: a step that has failed makes no report. */
 static cudaError_t wait_for_report(const struct sadmm_context *c, int64_t sequence)
 {
     enum { LOOKS = 1 << 14 }; /* some 10 us between questions, each of which takes longer than many looks */

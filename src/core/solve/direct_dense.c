@@ -30,15 +30,15 @@ void direct_project(const struct direct_law *law, const double y[3], double to[3
     }
 }
 
-void direct_arrive(const struct direct_dense *d, const struct direct_law *law, double w, double y[3])
+void direct_arrive(const struct direct_dense *d, const struct direct_law *law, double y[3])
 {
-    for (int32_t k = 0; k < law->count; ++k) y[k] = d->lambda[law->first + k] - d->u[law->first + k] / w;
+    for (int32_t k = 0; k < law->count; ++k) y[k] = d->lambda[law->first + k] - d->u[law->first + k] / law->response;
 }
 
 static double map_of(const struct direct_dense *d, const struct direct_law *law)
 {
     double y[3], to[3], D[3][3], sum = 0;
-    direct_arrive(d, law, law->response, y);
+    direct_arrive(d, law, y);
     direct_project(law, y, to, D);
     for (int32_t k = 0; k < law->count; ++k) {
         const double missing = d->lambda[law->first + k] - to[k];

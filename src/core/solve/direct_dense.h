@@ -31,14 +31,15 @@ struct direct_dense {
     double budget;           /* multiplications that steps may still take: what is left of it out */
 };
 
-/* Doubles: a matrix and so many vectors (direct_newton.c, direct_interior.c). */
-enum { DIRECT_VECTORS = 40 };
+/* Doubles: a matrix, which both searches use, and vectors of each (direct_newton.c, direct_interior.c). */
+enum { DIRECT_NEWTON_VECTORS = 8, DIRECT_INTERIOR_VECTORS = 26 };
+enum { DIRECT_VECTORS = DIRECT_NEWTON_VECTORS + DIRECT_INTERIOR_VECTORS };
 static inline size_t direct_work_size(size_t size) { return size * (size + DIRECT_VECTORS); }
 
 /* The projection Pi(y), and its derivative, row by row. */
 void direct_project(const struct direct_law *law, const double y[3], double to[3], double derivative[3][3]);
-/* y = lambda - u/w of a law, with another w than its own. */
-void direct_arrive(const struct direct_dense *d, const struct direct_law *law, double w, double y[3]);
+/* y = lambda - u/w of a law. */
+void direct_arrive(const struct direct_dense *d, const struct direct_law *law, double y[3]);
 /* The largest natural map, m/s (rows: w times what lambda misses). */
 double direct_natural_map(const struct direct_dense *d);
 /* u += G x, of one number x of lambda. */

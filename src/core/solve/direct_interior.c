@@ -121,8 +121,10 @@ static void add_law(struct interior *s, const struct direct_law *law)
     struct cone c = {.at = s->count, .count = law->count, .hi = HUGE_VAL};
     for (int32_t k = 0; k < law->count; ++k) d->lambda[law->first + k] = 0;
     if (law->count == 1) {
-        if (!(law->lo < law->hi)) d->lambda[law->first] = law->lo;
-        if (!(law->lo < law->hi)) return;
+        if (!(law->lo < law->hi)) {
+            d->lambda[law->first] = law->lo;
+            return;
+        }
         c.lo = law->lo / scale, c.hi = law->hi / scale;
     } else if (!(law->friction > 0)) c.count = 1;
     add_number(s, law->first, c.count == 3 ? scale / law->friction : scale);
@@ -148,13 +150,13 @@ static void begin(struct interior *s, double size)
     }
 }
 
-/* The work, cut up. */
+/* The work, cut up: behind the matrix and what Newton's search keeps meanwhile. */
 static void open_work(struct interior *s)
 {
+    _Static_assert(7 * sizeof(double) + sizeof(struct cone) <= DIRECT_INTERIOR_VECTORS * sizeof(double), "its vectors");
     const size_t n = (size_t)s->d->size;
     double *at = s->d->work;
-    s->M = at, at += n * n;
-    at += 8 * n; /* the search's (direct_newton.c) */
+    s->M = at, at += n * (n + DIRECT_NEWTON_VECTORS);
     double **vectors[] = {&s->free, &s->scale, &s->x, &s->y, &s->off, &s->dx};
     for (size_t k = 0; k < sizeof vectors / sizeof *vectors; ++k) *vectors[k] = at, at += n;
     s->number = (int32_t *)at, at += n;

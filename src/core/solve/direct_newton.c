@@ -7,10 +7,10 @@
 
 /* Steps from where the iterations are, which is what most problems need, and from an interior point. */
 enum { STEPS_FROM_START = 20, STEPS_FROM_INTERIOR = 200, STEPS_IN_TURN = 50 };
-/* What is added to the diagonal of a step's matrix, whose entries are shares of a law's own response: `share` of the natural
- * map, by the size of velocities, within bounds. It keeps impulses that do the same from running away; along those a step
- * finds rounding / `least`. In turn, since no one of them suits all: a rag doll at rest takes the first, the many contacts
- * of a bridge's plank the second. */
+/* What is added to the diagonal of a step's matrix, whose entries are shares of a law's own response: `share` of the
+ * natural map, by the size of velocities, within bounds. It keeps impulses that do the same from running away; along those
+ * a step finds rounding / `least`. In turn, since no one of them suits all: a rag doll at rest takes the first, the many
+ * contacts of a bridge's plank the second. */
 static const struct damping {
     double share, least, most;
 } damping[] = {{100, 1e-8, 1e-5}, {1, 1e-10, 1e-3}};
@@ -31,7 +31,7 @@ struct newton {
     double proximal;
 };
 
-/* The work, cut up. */
+/* The work, cut up: DIRECT_NEWTON_VECTORS behind the matrix. */
 static struct newton newton_of(struct direct_dense *d)
 {
     const size_t n = (size_t)d->size;
@@ -58,7 +58,7 @@ static void sort_numbers(struct newton *s)
     for (int32_t i = 0; i < d->laws; ++i) {
         const struct direct_law *law = &d->law[i];
         double y[3], to[3], D[3][3];
-        direct_arrive(d, law, law->response, y);
+        direct_arrive(d, law, y);
         direct_project(law, y, to, D);
         for (int32_t k = 0; k < law->count; ++k) {
             const int32_t n = law->first + k;
@@ -74,7 +74,7 @@ static void enter_law(struct newton *s, const struct direct_law *law, int32_t *r
 {
     const struct direct_dense *d = s->d;
     double y[3], to[3], D[3][3];
-    direct_arrive(d, law, law->response, y);
+    direct_arrive(d, law, y);
     direct_project(law, y, to, D);
     for (int32_t k = 0; k < law->count && *row < s->count; ++k) {
         if (s->number[*row] != law->first + k) continue;
