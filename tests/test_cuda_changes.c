@@ -275,6 +275,37 @@ START_TEST(queries_between_changes)
 }
 END_TEST
 
+/* Changes come with every step: a few, and then more than there was room for. They are in the steps' graphs then, which
+ * are recorded for that once, and once more for the room. */
+START_TEST(changes_with_every_step)
+{
+    enum { TOWERS = 34, FEW = 3, MANY = 2 * TOWERS, MORE_FROM = 24, STEPS = 32 };
+    const int precision = _i / 2, fast = _i % 2;
+    sadmm_world *worlds[2];
+    for (int w = 0; w < 2; ++w) {
+        worlds[w] = towers(TOWERS, 2, 0.5, precision);
+        if (fast) use_fast(worlds[w], 9);
+    }
+    by_host(worlds[0]);
+#ifdef CUDA_EMULATED
+    long graphs = 0;
+#endif
+    for (int step = 0; step < STEPS; ++step) {
+        for (int w = 0; w < 2; ++w) {
+            for (int body = 1; body <= (step < MORE_FROM ? FEW : MANY); ++body)
+                set_wrench(worlds[w], body, 0.01 * step, 0.02 * body);
+            MUST(worlds[w], sadmm_world_step_async(worlds[w]));
+        }
+        if (step % 8 == 7) expect_same_world(worlds[0], worlds[1], "changes with every step");
+#ifdef CUDA_EMULATED
+        if (step == 20 || step == 26) graphs = cuda_emulation_graphs_made;
+        if (step == 23 || step == 31) ck_assert_int_eq(cuda_emulation_graphs_made, graphs);
+#endif
+    }
+    for (int w = 0; w < 2; ++w) sadmm_world_destroy(worlds[w]);
+}
+END_TEST
+
 /* ---- settings ---------------------------------------------------------------------------------------------------- */
 
 /* Every number of the settings changes, a few at every step. */
@@ -552,6 +583,7 @@ int main(void)
     ADD_CASE(suite, queries_between_changes, 0, parts);
     ADD_CASE(suite, numbers_of_the_settings_change_at_every_step, 0, 2 * parts);
     ADD_CASE(suite, steps_done_again_have_their_own_settings, 0, parts);
+    ADD_CASE(suite, changes_with_every_step, 0, 2 * parts);
     ADD_CASE(suite, arrays_are_where_the_device_has_them, 0, parts);
     ADD_CASE(suite, a_saved_world_goes_on, 0, 2 * parts);
     ADD_CASE(suite, a_saved_scene_goes_on, 0, 3 * parts);

@@ -313,6 +313,40 @@ START_TEST(slots_are_reused)
 }
 END_TEST
 
+static double waves(double x, double y) { return 0.2 * sin(1.3 * x) + 0.1 * cos(2.1 * y); }
+
+/* One ball that all of a large mesh is near: more of its tree waits than lanes of a warp may go through side by side. */
+START_TEST(a_ball_near_a_whole_mesh)
+{
+    struct soup *ground = soup_ground(100, 100, 0.5, 0.2, 7, waves);
+    sadmm_mesh *mesh = soup_mesh(ground);
+    struct test_pool *pool = test_pool_new();
+    const size_t own = pool->used;
+    ck_assert_uint_le(own + mesh->doubles, TEST_POOL);
+    memcpy(pool->numbers + own, mesh->block, mesh->doubles * sizeof *pool->numbers);
+    pool->used += mesh->doubles;
+    struct sadmm_collision_body bodies[2] = {
+        {.orientation = {1, 0, 0, 0}, .system_body = -1},
+        {.position = {0.3, -0.2, 39.8}, .orientation = {1, 0, 0, 0}, .system_body = 0},
+    };
+    struct sadmm_geometry geometries[2] = {{.type = SADMM_SHAPE_MESH, .hull = (uint32_t)own}, ball(40)};
+    memcpy(geometries[0].size, mesh->half, sizeof mesh->half);
+    struct sadmm_shape shapes[2] = {shape_of(0), shape_of(1)};
+    struct sadmm_collision_input input = {.shapes = shapes, .shape_count = 2, .geometries = geometries,
+                                          .geometry_count = 2, .bodies = bodies, .body_count = 2, .dt = 0.01,
+                                          .margin = 0.02, .hulls = pool->numbers, .hull_doubles = pool->used,
+                                          .hull_revision = 1};
+    struct both b = both_new(_i ? 1 : 1000000);
+    const struct sadmm_cuda_contacts out = both_find(&b, &input, "a ball near a whole mesh");
+    ck_assert_int_eq(out.counts.candidates, 2 * 99 * 99);
+    ck_assert_int_gt(out.counts.pairs, 0);
+    both_free(&b);
+    sadmm_mesh_destroy(mesh);
+    free(pool);
+    free(ground);
+}
+END_TEST
+
 /* A world puts its hulls closer together when some are gone: contents stay, places change. */
 START_TEST(hulls_move_in_the_pool)
 {
@@ -671,6 +705,7 @@ int main(void)
     tcase_add_loop_test(tests, few_shapes, 0, 2);
     tcase_add_test(tests, one_place);
     tcase_add_test(tests, slots_are_reused);
+    tcase_add_loop_test(tests, a_ball_near_a_whole_mesh, 0, 2);
     tcase_add_loop_test(tests, hulls_move_in_the_pool, 0, 2);
     tcase_add_loop_test(tests, children_are_matched_by_number, 0, 4);
     tcase_add_test(tests, shapes_without_manifolds_are_refused);

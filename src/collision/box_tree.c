@@ -11,8 +11,8 @@
 
 enum {
     BINS = 16,
-    TASKS = 64,     /* from so many ranges that wait on they are split in the middle, ... */
-    MORE_TASKS = 32 /* ... which no 2^28 boxes take more often than this */
+    MORE_TASKS = 32,                      /* no 2^28 boxes are split in the middle more often, ... */
+    TASKS = BOX_TREE_WAITING - MORE_TASKS /* ... which is done from so many ranges that wait on */
 };
 
 struct range {

@@ -22,6 +22,9 @@ static inline void float_box_set(double lo, double hi, int axis, struct float_bo
     if ((double)box->hi[axis] < hi) box->hi[axis] = nextafterf(box->hi[axis], HUGE_VALF);
 }
 
+/* So many nodes wait at most when a tree is gone through depth first, first parts first. */
+enum { BOX_TREE_WAITING = 96 };
+
 struct box_tree {
     int32_t *order;          /* boxes as the tree comes to them */
     struct mesh_node *nodes; /* depth first */

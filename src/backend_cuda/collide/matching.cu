@@ -96,6 +96,8 @@ enum { EMIT_BLOCKS = 4 };
 static __global__ void __launch_bounds__(COLLISION_THREADS, EMIT_BLOCKS)
 emit_kernel(const __grid_constant__ collision_view v)
 {
+    wait_for_stream();
+    let_next_begin();
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
     const int32_t lane = (int32_t)(thread % POINT_LANES), found = usable_candidates(v);
     const step_lengths dt = lengths_of(v);
@@ -127,6 +129,8 @@ struct emit_sums {
 static __global__ void __launch_bounds__(EMIT_CANDIDATES *POINT_LANES)
 emit_few_kernel(const __grid_constant__ collision_view v)
 {
+    wait_for_stream();
+    let_next_begin();
     COLLISION_SHARED(emit_sums, shared);
     const int32_t t = (int32_t)threadIdx.x, first = (int32_t)blockIdx.x * EMIT_CANDIDATES;
     const int32_t i = first + t / POINT_LANES, lane = t % POINT_LANES, found = usable_candidates(v);

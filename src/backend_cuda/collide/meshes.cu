@@ -1,14 +1,16 @@
 /* Pairs with a mesh: which triangles they may touch.
  *
- * The pairs stage lists such pairs without order. A thread walks through the mesh for each (collision/mesh_walk.h) and
- * appends a candidate a triangle; from there on these are candidates like all others, sorted with them.
+ * The pairs stage lists such pairs without order. A warp looks through the mesh for each (mesh_lanes.h) and appends a
+ * candidate a triangle; from there on these are candidates like all others, sorted with them.
  */
 #include "batch.h"
+#include "mesh_lanes.h"
 #define SADMM_WITHOUT_SMOOTH
 #include "touch.h"
 
-/* The walk of a thread a pair; launched for as many as run at once. */
+/* A warp a pair; launched for as many as run at once. */
 enum { EXPAND_WARPS = 1024 };
+static_assert((int)MESH_THREADS == (int)WARP_LANES, "a block is a warp");
 
 /* The box of the shape that is no mesh, in all of the time that candidates are looked for. */
 template <bool SUBSTEPS>
@@ -31,24 +33,25 @@ static __device__ struct sadmm_box3 box_of_candidates(const collision_view &v, c
 
 template <bool SUBSTEPS>
 static __device__ void expand(const collision_view &v, const struct collision_step &step, uint64_t first,
-                              struct batch *out)
+                              struct waiting_nodes *waiting, struct batch *out)
 {
     const struct candidate pair = candidate_of(v, first);
     const struct sadmm_proxy &a = v.proxies[pair.a], &b = v.proxies[pair.b];
     const struct sadmm_box3 own = box_of_candidates<SUBSTEPS>(v, step, pair.a, a);
     struct sadmm_box3 box;
-    struct mesh_walk walk;
     struct mesh mesh;
     mesh_at(v.hulls, b.geometry.hull, &mesh);
     mesh_reach(&a, &b, &own, step.margin, step.gravity, step.dt, time_of_candidates(v, step), &box);
-    mesh_walk_begin(&mesh, &box, &walk);
-    for (int32_t triangle = mesh_walk_next(&mesh, &walk); triangle >= 0; triangle = mesh_walk_next(&mesh, &walk))
-        add(v, out, first + (uint32_t)triangle, 1);
+    each_triangle_near(&mesh, &box, (int)threadIdx.x, waiting,
+                       [&](int32_t triangle) { add(v, out, first + (uint32_t)triangle, 1); });
 }
 
 template <bool SUBSTEPS>
 static __global__ void __launch_bounds__(MESH_THREADS) expand_kernel(const __grid_constant__ collision_view v)
 {
+    wait_for_stream();
+    let_next_begin();
+    COLLISION_SHARED(waiting_nodes, waiting);
     const unsigned long long listed = v.candidate_count[COUNT_MESH_PAIRS];
     const struct collision_step step = step_of(v);
     struct batch out;
@@ -58,15 +61,16 @@ static __global__ void __launch_bounds__(MESH_THREADS) expand_kernel(const __gri
         return;
     }
     out.count = 0;
-    for (int64_t i = collision_thread(MESH_THREADS); i < (int64_t)listed; i += (int64_t)gridDim.x * MESH_THREADS)
-        expand<SUBSTEPS>(v, step, v.mesh_pairs[i], &out);
+    for (int64_t i = blockIdx.x; i < (int64_t)listed; i += gridDim.x)
+        expand<SUBSTEPS>(v, step, v.mesh_pairs[i], &waiting, &out);
     finish_batches(v, out);
 }
 
 void COLLISION(mesh_kernels)(struct collision_kernels *kernels)
 {
-    kernels->expand = {expand_kernel<false>, MESH_THREADS, 0, "triangles of pairs"};
-    kernels->expand_first = {expand_kernel<true>, MESH_THREADS, 0, "triangles of pairs"};
+    const size_t shared = sizeof(struct waiting_nodes);
+    kernels->expand = {expand_kernel<false>, MESH_THREADS, shared, "triangles of pairs"};
+    kernels->expand_first = {expand_kernel<true>, MESH_THREADS, shared, "triangles of pairs"};
     touch_kernels(&kernels->with_meshes);
     kernels->expand_warps = EXPAND_WARPS;
 }

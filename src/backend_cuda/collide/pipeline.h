@@ -34,6 +34,7 @@ struct sadmm_cuda_collision_stats {
 struct sadmm_cuda_find {
     int from, into;
     int substep, substeps; /* substeps 1: nothing is taken from, or left for, another find */
+    bool early;            /* kernels are launched early (device/early.h) */
 };
 enum { SADMM_CUDA_SETS = 3 }; /* the third for what lies between two sub-steps */
 

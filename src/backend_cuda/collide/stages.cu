@@ -166,9 +166,9 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, s
         TRY(launch(c, tiles, rows * tiles.threads * columns, error));
     }
     if (v->mesh_count > 0) {
-        const int64_t most = (int64_t)v->leaf_count * v->mesh_count,
-                      warps = (int64_t)c->kernels.expand_warps * MESH_THREADS;
-        TRY(launch(c, v->substeps == 1 ? c->kernels.expand : c->kernels.expand_first, std::min(most, warps), error));
+        const int64_t most = (int64_t)v->leaf_count * v->mesh_count, warps = c->kernels.expand_warps;
+        TRY(launch(c, v->substeps == 1 ? c->kernels.expand : c->kernels.expand_first,
+                   std::min(most, warps) * MESH_THREADS, error));
     }
     return sort_candidates(c, error);
 }
@@ -338,6 +338,7 @@ extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void 
 {
     const bool tree = c->view.leaf_count >= c->tree_from;
     c->stream = (cudaStream_t)stream;
+    c->early = find->early;
     c->pending = true;
     c->view.substeps = find->substeps;
     c->view.substep = find->substep;

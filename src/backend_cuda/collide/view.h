@@ -4,7 +4,7 @@
  *   place    pose, box and filter of every shape                                   a thread a shape
  *   tree     Morton codes, radix sort, Karras' hierarchy, boxes bottom up          (few shapes: not needed)
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
- *            (a pair with a mesh is listed; `expand` finds its triangles: meshes.cu)
+ *            (a pair with a mesh is listed; a warp of `expand` finds its triangles: meshes.cu)
  *   sort     candidates by (slot of a, slot of b, child), the host's order
  *   narrow   the last step's pair (a guess or a search), manifold by candidate     a thread a candidate
  *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
@@ -41,6 +41,7 @@
 
 #include <cuda_runtime.h>
 
+#include "backend_cuda/device/early.h"
 #include "backend_cuda/device/layout.h"
 #include "backend_cuda/device/wide.h"
 #include "collision/contact_emit.h"

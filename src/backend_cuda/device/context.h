@@ -30,6 +30,7 @@ enum cuda_buffer_name {
     BUFFER_JOINED, BUFFER_JOINED_SIDES,
     /* pinned */
     PINNED_LIVE, PINNED_SETTINGS, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_ROWS, PINNED_OUT, PINNED_REPORTS,
+    PINNED_EDITS,
     BUFFER_COUNT
 };
 
@@ -87,22 +88,20 @@ sadmm_status CUDA(fail)(struct sadmm_context *, cudaError_t code, const char *wh
 void CUDA(release_buffers)(struct sadmm_context *);
 /* At least `bytes` in a buffer; what it held is lost when it grows. */
 sadmm_status CUDA(reserve)(struct sadmm_context *, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error);
+/* Are kernels launched early (early.h)? In recorded steps, but for cooperative launches. */
+static inline bool begins_early(const struct sadmm_context *c) { return c->early && c->recording; }
 /* Launch blocks of THREADS on the stream; 0 blocks: nothing to do. */
 sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
                           const cuda_args *args, struct sadmm_error *error);
 /* The same with blocks of so many threads. */
 sadmm_status CUDA(launch_of)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
                              const cuda_args *args, struct sadmm_error *error);
-/* The same for a kernel that waits itself (wait_for_stream): in a whole step it comes to its multiprocessors while the
- * ones before it end. */
-sadmm_status CUDA(launch_early)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
-                                int threads, const cuda_args *args, struct sadmm_error *error);
 /* How many of the partition's clusters the device runs side by side; 0: clusters that large do not exist. */
 cudaError_t CUDA(active_clusters)(const struct sadmm_context *, cuda_kernel kernel,
                                   const struct cuda_partition *partition, int *clusters);
-/* Launch a kernel on the partition's blocks; `early` as above, but for cooperative launches. */
+/* Launch a kernel on the partition's blocks. */
 sadmm_status CUDA(launch_partition)(struct sadmm_context *, cuda_kernel kernel, const char *name,
-                                    const struct cuda_partition *partition, bool early, const cuda_args *args,
+                                    const struct cuda_partition *partition, const cuda_args *args,
                                     struct sadmm_error *error);
 /* Set a scalar to 0, unless this step has. */
 sadmm_status CUDA(clear)(struct sadmm_context *, enum cuda_scalar scalar, struct sadmm_error *error);

@@ -23,6 +23,12 @@ static __device__ __forceinline__ void stamp_assembled(const cuda_step_view &ste
     if (blockIdx.x == 0 && threadIdx.x == 0) step.control->stamps[STAMP_ASSEMBLED] = nanoseconds();
 }
 
+/* The iterations have ended. */
+static __device__ __forceinline__ void stamp_solved(const cuda_step_view &step)
+{
+    step.control->stamps[STAMP_SOLVED] = nanoseconds();
+}
+
 /* Are contacts what the step was planned for? */
 static __device__ __forceinline__ bool contacts_as_planned(const model_view &model, const cuda_step_view &step)
 {

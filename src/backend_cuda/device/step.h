@@ -1,6 +1,6 @@
 /* Whole steps on the device (core/solve/resident.h): what the world is there, and how the host follows.
  *
- *     edit        states, wrenches and settings' numbers set since the last step (when there are any)
+ *     edit        states, wrenches, targets and settings' numbers set since the last step (where there are any)
  *     start       where a solve starts from; bodies as collision sees them
  *     find        contacts, from one set into the other (collide/view.h); beside it A, b of the bodies, rows of joints
  *                 (where there are driven bodies A and b wait for the layout: step/driven.cu)
@@ -28,11 +28,12 @@
  *
  * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, warm or
  * cold. All of it goes into a graph that is launched again and again, two of them in turn, because states and contact
- * sets change places at every step. Where a plan does not hold, the step sets cuda_live.abort_code (with c->prologue
- * only its last kernel does: what runs until then keeps to what was planned for), what was enqueued behind it does
- * nothing, and the host, when it sees the report, reads the statistics, plans again and enqueues the same steps again:
- * a repeated step starts from the same state, settings included, and gives the same bits. The settings' numbers are
- * data in device memory, so that a change of them is an edit like others: nothing is recorded again or waited for.
+ * sets change places at every step; where edits come often steps with them have two of their own. Where a plan does
+ * not hold, the step sets cuda_live.abort_code (with c->prologue only its last kernel does: what runs until then keeps
+ * to what was planned for), what was enqueued behind it does nothing, and the host, when it sees the report, reads the
+ * statistics, plans again and enqueues the same steps again: a repeated step starts from the same state, settings
+ * included, and gives the same bits. The settings' numbers are data in device memory, so that a change of them is an
+ * edit like others: nothing is recorded again or waited for.
  * Reports and edits travel through pinned memory, a ring of STEPS_AHEAD, written and read by the device itself.
  */
 #ifndef SADMM_CUDA_DEVICE_STEP_H
@@ -80,6 +81,11 @@ struct cuda_step_report {
                            stream finds the step done; its last blocks may still move bodies when this is seen */
 };
 
+/* Written by the host: the edits of a step, which follow. */
+struct cuda_edits {
+    int64_t count;
+};
+
 /* In device memory, of the step that runs. */
 struct cuda_step_control {
     int64_t sequence;
@@ -118,6 +124,8 @@ struct cuda_step_view {
     struct cuda_step_guess guess;
     struct cuda_step_control *control;
     struct cuda_step_report *reports;     /* pinned: STEPS_AHEAD */
+    const struct cuda_edits *edits;       /* likewise, each with edit_capacity places behind it (edits_of_step) */
+    int32_t edit_capacity;
     int32_t measured;                     /* residuals of the last iteration are in view.iteration.residual */
     int32_t limits;                       /* there are contacts: momentum is restored, energies are limited
                                              (view.islands) */

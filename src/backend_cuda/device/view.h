@@ -50,6 +50,7 @@
 #include "core/solve/kernels.h"
 #include "layout.h"
 #include "line.h"
+#include "early.h"
 #include "step.h"
 
 typedef SADMM_REAL solver_real;
@@ -96,9 +97,8 @@ struct cuda_stop {
     int32_t last;              /* the most iterations of those that have */
 };
 
-/* Of the first devices with clusters of thread blocks, and of those that launch kernels early. */
+/* Of the first devices with clusters of thread blocks. */
 #define CLUSTER_ARCH 900
-#define EARLY_ARCH 900
 
 enum { TERMS = 6 }; /* of a body, in sums over islands */
 /* The same of islands that are not held (iterate/motions.h): seven numbers a lane. */
@@ -316,27 +316,20 @@ struct cuda_view {
     struct driven_view driven;  /* likewise */
 };
 
+/* In pinned memory: the edits of step `sequence`; and them, one after the other. */
+static __host__ __device__ inline const struct cuda_edits *edits_of_step(const struct cuda_edits *ring, int32_t capacity,
+                                                                         int64_t sequence)
+{
+    const size_t bytes = sizeof *ring + (size_t)capacity * sizeof(struct sadmm_resident_edit);
+    return (const struct cuda_edits *)((const char *)ring + (size_t)(sequence % STEPS_AHEAD) * bytes);
+}
+static __host__ __device__ inline const struct sadmm_resident_edit *first_edit(const struct cuda_edits *edits)
+{
+    return (const struct sadmm_resident_edit *)(edits + 1);
+}
+
 /* In a whole step: is what the solve gives to be added to the motion that bodies are carried by? */
 static __device__ __forceinline__ bool is_carried(const cuda_view &v) { return v.driven.count > 0 && *v.driven.carries; }
-
-/* Programmatic dependent launch (launch_early): wait until all kernels enqueued before have ended. To be called before
- * anything is read that the kernel before writes. What that kernel does not write may be fetched earlier: the kernels
- * before it have ended, because it has waited itself or was not launched early. */
-static __device__ __forceinline__ void wait_for_stream(void)
-{
-#if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
-    asm volatile("griddepcontrol.wait;" ::: "memory");
-#endif
-}
-
-/* Programmatic dependent launch: the next kernel, where launched early, may begin and run up to its own wait. To be
- * called after this one's wait. */
-static __device__ __forceinline__ void let_next_begin(void)
-{
-#if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
-    asm volatile("griddepcontrol.launch_dependents;");
-#endif
-}
 
 /* Where the data of point k of pair p is. */
 template <int LANES_A_PAIR>
@@ -403,7 +396,6 @@ struct cuda_args {
     int32_t under_iterated;   /* fast: and those that bounce (math/limit.h) */
     int32_t paper;      /* the method: energies are compared, nothing is slowed down */
     int32_t relax;      /* fast, STREAM: bits of enum cuda_relax */
-    const struct sadmm_resident_edit *edits;
     double factor;
     double row_floor;   /* fast: weight_row_floor */
 };

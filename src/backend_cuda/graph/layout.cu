@@ -38,6 +38,8 @@ static size_t place_arrays(const struct sadmm_context *c, int32_t *base, struct 
     return used * sizeof(int32_t);
 }
 
+static struct layout_stream stream_of(const struct sadmm_context *c) { return {c->stream, begins_early(c)}; }
+
 /* 0, 1, ...: values of the sorts, the same in every step. */
 static sadmm_status number(struct sadmm_context *c, size_t count, struct sadmm_error *error)
 {
@@ -48,7 +50,7 @@ static sadmm_status number(struct sadmm_context *c, size_t count, struct sadmm_e
     c->numbered = false;
     CUDA_CALL(
         c,
-        LAYOUT(number)((int32_t *)numbers->data, (int32_t)(numbers->capacity / sizeof(int32_t)), c->stream, &c->kernel),
+        LAYOUT(number)((int32_t *)numbers->data, (int32_t)(numbers->capacity / sizeof(int32_t)), stream_of(c), &c->kernel),
         c->kernel);
     c->numbered = true;
     return SADMM_OK;
@@ -119,8 +121,8 @@ sadmm_status CUDA(enqueue_statistics)(struct sadmm_context *c, bool islands, str
 {
     bind_raw(c);
     CUDA_CALL(c,
-              c->one_block ? LAYOUT(one_block)(&c->layout, true, islands, nullptr, c->stream, &c->kernel)
-                           : LAYOUT(statistics)(&c->layout, islands, c->stream, &c->kernel),
+              c->one_block ? LAYOUT(one_block)(&c->layout, true, islands, nullptr, stream_of(c), &c->kernel)
+                           : LAYOUT(statistics)(&c->layout, islands, stream_of(c), &c->kernel),
               c->kernel);
     return SADMM_OK;
 }
@@ -130,8 +132,8 @@ sadmm_status CUDA(enqueue_layout)(struct sadmm_context *c, const struct cuda_par
 {
     TRY(check_partition(c, partition, error));
     CUDA_CALL(c,
-              c->one_block ? LAYOUT(one_block)(&c->layout, false, false, partition, c->stream, &c->kernel)
-                           : LAYOUT(make)(&c->layout, partition, c->stream, &c->kernel),
+              c->one_block ? LAYOUT(one_block)(&c->layout, false, false, partition, stream_of(c), &c->kernel)
+                           : LAYOUT(make)(&c->layout, partition, stream_of(c), &c->kernel),
               c->kernel);
     return SADMM_OK;
 }
@@ -145,7 +147,7 @@ sadmm_status CUDA(enqueue_statistics_and_layout)(struct sadmm_context *c, bool i
     }
     bind_raw(c);
     TRY(check_partition(c, partition, error));
-    CUDA_CALL(c, LAYOUT(one_block)(&c->layout, true, islands, partition, c->stream, &c->kernel), c->kernel);
+    CUDA_CALL(c, LAYOUT(one_block)(&c->layout, true, islands, partition, stream_of(c), &c->kernel), c->kernel);
     return SADMM_OK;
 }
 

@@ -20,6 +20,8 @@ static int64_t few_blocks_for(const struct layout_view *v, int64_t threads)
 
 static __global__ void clear_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
+    wait_for_stream();
+    let_next_begin();
     if (v.live->abort_code) return;
     const int32_t i = thread_index();
     if (i == 0) {
@@ -47,6 +49,8 @@ static __device__ __forceinline__ void find_statistics(const layout_view &v, int
 static __global__ void __launch_bounds__(LAYOUT_THREADS)
     records_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
+    wait_for_stream();
+    let_next_begin();
     if (v.live->abort_code) return;
     const int32_t pairs = v.live->pairs, records = v.pair_capacity + v.rows;
     find_statistics(v, records, [&](int32_t record, cuda_graph_statistics *own) {
@@ -57,6 +61,8 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
 static __global__ void __launch_bounds__(LAYOUT_THREADS)
     bodies_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
+    wait_for_stream();
+    let_next_begin();
     if (v.live->abort_code) return;
     find_statistics(v, v.bodies,
                     [&](int32_t i, cuda_graph_statistics *own) { statistics_of_body<false>(v, i, args.islands, own); });
@@ -66,12 +72,16 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
 
 static __global__ void slots_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t s = thread_index();
     if (s < v.bodies && !v.live->abort_code) v.slot_of[v.body_of[s]] = s;
 }
 
 static __global__ void side_slots_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t h = thread_index();
     if (h >= 2 * (v.pair_capacity + v.rows) || v.live->abort_code) return;
     const int32_t body = v.side_body[h];
@@ -81,6 +91,8 @@ static __global__ void side_slots_kernel(const __grid_constant__ layout_view v, 
 /* Where each body's sides begin among the sorted ones; slots that are raw indices. */
 static __global__ void offsets_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t s = thread_index();
     if (s > v.bodies || v.live->abort_code) return;
     int32_t first = 0, last = v.statistics->sides;
@@ -97,12 +109,16 @@ static __global__ void offsets_kernel(const __grid_constant__ layout_view v, con
 static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
     parts_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
+    wait_for_stream();
+    let_next_begin();
     LAYOUT_SHARED(memory);
     if (!v.live->abort_code) make_parts(v, args.partition, ONE_BLOCK_THREADS, (int32_t *)memory);
 }
 
 static __global__ void number_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t i = thread_index();
     if (i < v.bodies) v.label[i] = i;
 }
@@ -116,7 +132,7 @@ static __global__ void number_kernel(const __grid_constant__ layout_view v, cons
         if (launch_code != cudaSuccess) return launch_code;                                                   \
     } while (0)
 
-cudaError_t LAYOUT(statistics)(const struct layout_view *v, bool islands, cudaStream_t stream, const char **kernel)
+cudaError_t LAYOUT(statistics)(const struct layout_view *v, bool islands, const struct layout_stream &stream, const char **kernel)
 {
     layout_args args = {};
     args.islands = islands;
@@ -137,15 +153,15 @@ static int bits_of(int32_t most)
 }
 
 static cudaError_t sort(const struct layout_view *v, const int32_t *keys, int32_t *sorted_keys, int32_t *sorted_values,
-                        int32_t count, cudaStream_t stream)
+                        int32_t count, const struct layout_stream &stream)
 {
     size_t bytes = v->temp_bytes;
     if (count == 0) return cudaSuccess;
     return COLLISION(sort_numbers)(v->temp, &bytes, keys, sorted_keys, v->numbers, sorted_values, count,
-                                   bits_of(v->bodies), stream);
+                                   bits_of(v->bodies), stream.stream);
 }
 
-cudaError_t LAYOUT(make)(const struct layout_view *v, const struct cuda_partition *partition, cudaStream_t stream,
+cudaError_t LAYOUT(make)(const struct layout_view *v, const struct cuda_partition *partition, const struct layout_stream &stream,
                          const char **kernel)
 {
     const int32_t sides = 2 * (v->pair_capacity + v->rows);
@@ -183,7 +199,7 @@ cudaError_t LAYOUT(temp_bytes)(int32_t bodies, int32_t sides, size_t *bytes)
     return code;
 }
 
-cudaError_t LAYOUT(number)(int32_t *numbers, int32_t count, cudaStream_t stream, const char **kernel)
+cudaError_t LAYOUT(number)(int32_t *numbers, int32_t count, const struct layout_stream &stream, const char **kernel)
 {
     layout_view to = {}, *v = &to;
     layout_args args = {};

@@ -20,6 +20,7 @@
 #include <cuda_runtime.h>
 
 #include "core/model/system.h"
+#include "backend_cuda/device/early.h"
 #include "backend_cuda/device/layout.h"
 
 enum { LAYOUT_THREADS = 256, ONE_BLOCK_THREADS = 1024 };
@@ -29,6 +30,12 @@ struct layout_args {
     int32_t statistics, layout; /* of one_block: which */
     int32_t islands;        /* statistics: find them; layout: slots by island */
     struct cuda_partition partition;
+};
+
+/* Where kernels go; early: in a recorded step (device/early.h). */
+struct layout_stream {
+    cudaStream_t stream;
+    bool early;
 };
 
 static __host__ __device__ inline bool slots_by_island(const struct cuda_partition *partition)
@@ -43,19 +50,19 @@ static __host__ __device__ inline bool slots_by_island(const struct cuda_partiti
 #endif
 
 /* On failure *kernel tells what was launched; after success, what was launched last. */
-cudaError_t LAYOUT(statistics)(const struct layout_view *, bool islands, cudaStream_t stream, const char **kernel);
-cudaError_t LAYOUT(make)(const struct layout_view *, const struct cuda_partition *, cudaStream_t stream,
+cudaError_t LAYOUT(statistics)(const struct layout_view *, bool islands, const struct layout_stream &stream, const char **kernel);
+cudaError_t LAYOUT(make)(const struct layout_view *, const struct cuda_partition *, const struct layout_stream &stream,
                          const char **kernel);
 /* Either or both by one block: statistics, and a layout where there is a partition. `shared`: bytes it takes, SIZE_MAX:
  * such a scene is too large. `allow`: let it take so many. */
 size_t LAYOUT(one_block_shared)(int32_t bodies, int32_t sides);
 cudaError_t LAYOUT(one_block_allow)(int bytes);
 cudaError_t LAYOUT(one_block)(const struct layout_view *, bool statistics, bool islands, const struct cuda_partition *,
-                              cudaStream_t stream, const char **kernel);
+                              const struct layout_stream &stream, const char **kernel);
 /* What view.temp has to hold. */
 cudaError_t LAYOUT(temp_bytes)(int32_t bodies, int32_t sides, size_t *bytes);
 /* view.numbers */
-cudaError_t LAYOUT(number)(int32_t *numbers, int32_t count, cudaStream_t stream, const char **kernel);
+cudaError_t LAYOUT(number)(int32_t *numbers, int32_t count, const struct layout_stream &stream, const char **kernel);
 
 /* Shared memory of a block, sized at launch. */
 #ifdef SADMM_CUDA_EMULATED
@@ -67,7 +74,8 @@ cudaError_t LAYOUT(number)(int32_t *numbers, int32_t count, cudaStream_t stream,
 typedef void (*layout_kernel)(const layout_view, const layout_args);
 
 static inline cudaError_t layout_launch(layout_kernel kernel, int64_t blocks, int threads, size_t shared,
-                                        const layout_view *view, const layout_args *args, cudaStream_t stream)
+                                        const layout_view *view, const layout_args *args,
+                                        const struct layout_stream &stream)
 {
     if (blocks <= 0) return cudaSuccess;
 #ifdef SADMM_CUDA_EMULATED
@@ -75,8 +83,8 @@ static inline cudaError_t layout_launch(layout_kernel kernel, int64_t blocks, in
     return cuda_emulation_launch(kernel, (unsigned)blocks, (unsigned)threads, shared, *view, *args);
 #else
     void *parameters[] = {const_cast<layout_view *>(view), const_cast<layout_args *>(args)};
-    return cudaLaunchKernel((const void *)kernel, dim3((unsigned)blocks), dim3((unsigned)threads), parameters, shared,
-                            stream);
+    return launch_on(stream.stream, stream.early, (const void *)kernel, dim3((unsigned)blocks), dim3((unsigned)threads),
+                     shared, parameters);
 #endif
 }
 

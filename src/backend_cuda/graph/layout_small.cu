@@ -222,6 +222,8 @@ static __device__ void list_sides(const layout_view &v, const layout_view &globa
 static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
     one_block_kernel(const __grid_constant__ layout_view global, const __grid_constant__ layout_args args)
 {
+    wait_for_stream();
+    let_next_begin();
     LAYOUT_SHARED(memory);
     one_block_memory m;
     layout_view v = global; /* with the arrays in shared memory where there is one */
@@ -277,7 +279,7 @@ cudaError_t LAYOUT(one_block_allow)(int bytes)
 }
 
 cudaError_t LAYOUT(one_block)(const struct layout_view *v, bool with_statistics, bool islands,
-                              const struct cuda_partition *partition, cudaStream_t stream, const char **kernel)
+                              const struct cuda_partition *partition, const struct layout_stream &stream, const char **kernel)
 {
     layout_args args = {};
     args.statistics = with_statistics;

@@ -30,7 +30,7 @@ static sadmm_status persistent_iterations(struct sadmm_context *c, int count, en
     cuda_kernel kernel = CUDA(persistent_kernel)(c->statistics.point_slots, partition->tier, partition->threads,
                                                  c->view.rows.count > 0, c->fast, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID) TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
-    TRY(CUDA(launch_partition)(c, kernel, name, partition, true, &args, error));
+    TRY(CUDA(launch_partition)(c, kernel, name, partition, &args, error));
     c->starting = false;
     c->settled = true;
     return SADMM_OK;
@@ -87,6 +87,8 @@ extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool m
 /* (17) as the momentum residual A v - b - J^T lambda. */
 static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     int32_t i = (int32_t)(blockIdx.x * (unsigned)THREADS + threadIdx.x) / LANES, r = (int32_t)threadIdx.x % LANES;
     double dual = 0;
     if (i < live_bodies(v.model) && r < 6) {

@@ -27,6 +27,7 @@ static __device__ __forceinline__ bool suspect(const body_view &bodies, const bo
     const bool speaks = t.live && t.lane == 0;
     const double free = speaks ? bodies.free_energy[t.body] : 0;
     wait_for_stream(); /* of all that, iterations change velocities alone */
+    let_next_begin();
     const double velocity = t.live && t.lane < 6 ? (double)bodies.state[t.body * ROW + (size_t)t.lane] : 0;
     return suspect_body(under_iterated, speaks, free, velocity, row.b, row.a);
 }
@@ -64,6 +65,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     motions_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_for_stream();
+    let_next_begin();
     if (!args.paper && !*v.islands.loose) return; /* paper does not ask */
     const body_thread t = body_of_thread(v.model, v.graph);
     find_motions(v, t, is_loose(v, t));
@@ -78,6 +80,7 @@ static __global__ void __launch_bounds__(BODY_THREADS, LIMIT_BLOCKS)
     const body_thread t = body_of_thread(v.model, v.graph); /* iterations do not change the layout */
     const int32_t label = t.live ? v.graph.label[t.body] : 0;
     wait_for_stream();
+    let_next_begin();
     const bool loose = v.islands.motions && t.live && !v.islands.info[label].held; /* neither waits for the other */
     const bool suspected = *v.islands.suspects != 0, held = t.live && suspected && !loose;
     if (__ballot_sync((unsigned)ALL_LANES, loose || held) == 0) return;
@@ -89,6 +92,8 @@ static __global__ void __launch_bounds__(BODY_THREADS, LIMIT_BLOCKS)
 
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     solver_real *state = v.bodies.state + (size_t)i * ROW, velocity[6];
@@ -99,6 +104,8 @@ static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __
 /* Islands that driven bodies push are left alone, as those with rows are. A thread a pair. */
 static __global__ void driven_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t p = thread_index();
     if (p >= live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
@@ -113,7 +120,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
     cuda_args args = {};
     args.paper = !c->fast;
     args.under_iterated = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
-    return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
+    return CUDA(launch_of)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
 sadmm_status CUDA(enqueue_motions)(struct sadmm_context *c, struct sadmm_error *error)

@@ -25,6 +25,8 @@ static __device__ __forceinline__ void place(const cuda_view &v, int32_t slot, c
 
 static __global__ void driven_start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t k = thread_index();
     if (k >= v.driven.count || v.model.live->abort_code) return;
     const struct sadmm_driven_body body = v.driven.before[k];
@@ -41,6 +43,8 @@ static __global__ void driven_start_kernel(const __grid_constant__ cuda_view v, 
 
 static __global__ void carry_clear_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t i = thread_index();
     if (i == 0) *v.driven.moves = *v.driven.carries = 0;
     if (i >= v.model.bodies) return;
@@ -62,6 +66,8 @@ static __device__ __forceinline__ int32_t label_of(const graph_view &graph, int3
 /* A thread a pair; then one a constraint of joints. */
 static __global__ void carry_find_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t p = thread_index(), r = p - v.contacts.pair_capacity;
     if (r >= 0) {
         if (r >= live_rows(v.model, v.rows) || v.raw.constraints[r].count == 0) return;
@@ -77,6 +83,8 @@ static __global__ void carry_find_kernel(const __grid_constant__ cuda_view v, co
 
 static __global__ void carry_compare_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t p = thread_index();
     if (p >= live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
@@ -89,6 +97,8 @@ static __global__ void carry_compare_kernel(const __grid_constant__ cuda_view v,
 
 static __global__ void carry_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     const int32_t label = v.graph.label[i], pair = v.driven.support[label];
@@ -184,6 +194,8 @@ static __device__ __forceinline__ double add_pairs(const struct driven_shared *s
 static __global__ void __launch_bounds__(DRIVEN_THREADS)
     driven_finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     CUDA_DYNAMIC_SHARED(memory);
     struct driven_shared *shared = (struct driven_shared *)memory;
     const int32_t k = (int32_t)blockIdx.x, t = (int32_t)threadIdx.x, pairs = live_pairs(v.model);
@@ -234,7 +246,7 @@ sadmm_status CUDA(launch_driven_finish)(struct sadmm_context *c, struct sadmm_er
     blocks.cluster = 1;
     blocks.threads = DRIVEN_THREADS;
     blocks.shared = sizeof(struct driven_shared);
-    return CUDA(launch_partition)(c, driven_finish_kernel, "driven bodies", &blocks, false, &args, error);
+    return CUDA(launch_partition)(c, driven_finish_kernel, "driven bodies", &blocks, &args, error);
 }
 
 /* ---- where they are ---------------------------------------------------------------------------------------------- */

@@ -228,7 +228,7 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
 
 /* Never reads offending bodies found by this same kernel: which body is named must not depend on timing. */
 static __global__ void __launch_bounds__(FINISH_THREADS, 2)
-    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
     struct finish_shared *shared = (struct finish_shared *)memory;
@@ -242,7 +242,7 @@ static __global__ void __launch_bounds__(FINISH_THREADS, 2)
     static_assert(FINISH_THREADS - FINISH_SIDES > FINISH_BODIES, "there is one");
     if (block == 0 && t == FINISH_THREADS - 1) {
         wait_for_stream();
-        v.step.control->stamps[STAMP_SOLVED] = nanoseconds();
+        if (args.begin) stamp_solved(v.step);
     }
     if (!on) return;
     if (block >= end.free) finish_pair(v, (block - end.free) * FINISH_THREADS + t);
@@ -255,13 +255,14 @@ static __global__ void __launch_bounds__(FINISH_THREADS, 2)
     if (t >= FINISH_SIDES) end_move(v, dt, move, shared);
 }
 
-sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
+sadmm_status CUDA(launch_finish)(struct sadmm_context *c, bool first, struct sadmm_error *error)
 {
     cuda_args args = {};
+    args.begin = first;
     struct cuda_partition blocks = {};
     blocks.parts = finish_blocks_of(c->view.model, c->view.contacts).pairs;
     blocks.cluster = 1;
     blocks.threads = FINISH_THREADS;
     blocks.shared = sizeof(struct finish_shared);
-    return CUDA(launch_partition)(c, finish_kernel, "finish", &blocks, true, &args, error);
+    return CUDA(launch_partition)(c, finish_kernel, "finish", &blocks, &args, error);
 }

@@ -158,6 +158,6 @@ sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error
     TRY(CUDA(reserve_joined)(c, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
     s->planned = true;
-    s->recorded = false;
+    forget_graphs(s);
     return SADMM_OK;
 }

@@ -2,6 +2,7 @@
  * constraints that hang together. Once before the iterations, from what they start with, and once after them, from what
  * they end with. */
 #include "backend_cuda/device/double.h"
+#include "backend_cuda/device/plan_check.h"
 
 #include "joined_contacts.h"
 #include "world.h"
@@ -29,8 +30,8 @@ template <bool SMALL> static __device__ __forceinline__ joined_view view_of_bloc
 
 /* ---- what there is ----------------------------------------------------------------------------------------------- */
 
-/* Rows as their constraints have them; multipliers as the iterations leave them, or begin. */
-static __device__ __forceinline__ void load_rows(const cuda_view &v, const joined_view &p, bool after)
+/* Rows as their constraints have them. */
+static __device__ __forceinline__ void load_rows(const cuda_view &v, const joined_view &p)
 {
     static_assert(sizeof(struct raw_row) == sizeof(struct joined_row), "rows are copied");
     enum { NUMBERS = sizeof(struct joined_row) / sizeof(double), OF_PLACE = JOINED_ROWS * NUMBERS };
@@ -38,13 +39,20 @@ static __device__ __forceinline__ void load_rows(const cuda_view &v, const joine
     copy(p.s.places * OF_PLACE, (double *)p.rows, [&](int32_t at) {
         const int32_t constraint = p.s.constraint[at / OF_PLACE], k = at % OF_PLACE;
         const bool there = k / NUMBERS < v.raw.constraints[constraint].count; /* fetched beside the number */
-        double number = rows[(size_t)constraint * OF_PLACE + (size_t)k];
-        if (after && k % NUMBERS == NUMBERS - 1)
-            number = (double)v.rows.data[constraint * SADMM_MAX_ROWS + k / NUMBERS].lambda;
+        const double number = rows[(size_t)constraint * OF_PLACE + (size_t)k];
         return there ? number : 0;
     });
     each(p.s.places * JOINED_ROWS, [&](int32_t r) {
         joined_put_row(&p, r, r % JOINED_ROWS < v.raw.constraints[p.s.constraint[r / JOINED_ROWS]].count);
+    });
+}
+
+/* Multipliers as the iterations leave them. */
+static __device__ __forceinline__ void load_multipliers(const cuda_view &v, const joined_view &p)
+{
+    each(p.s.places * JOINED_ROWS, [&](int32_t r) {
+        const double lambda = (double)v.rows.data[row_in_world(p, r)].lambda;
+        if (p.state[r] != JOINED_ABSENT) p.rows[r].lambda = lambda;
     });
 }
 
@@ -66,7 +74,16 @@ static __device__ __forceinline__ double velocity_of(const cuda_view &v, int32_t
     return out;
 }
 
-/* Velocities, A, and the contacts' impulses on bodies, into `dv`, which is not in use yet. */
+static __device__ __forceinline__ void load_inertia(const cuda_view &v, const joined_view &p)
+{
+    each_component(p, [&](int32_t e, int k) {
+        const int32_t body = p.s.body[e];
+        if (k >= 6) return;
+        for (int q = 0; q < 6; ++q) p.factor[36 * e + 6 * k + q] = rigid_entry(v.joints.bodies[body], k, q);
+    });
+}
+
+/* Velocities, and the contacts' impulses on bodies, into `dv`, which is not in use yet. */
 template <bool SMALL>
 static __device__ __forceinline__ void load_bodies(const cuda_view &v, const joined_view &p, bool after,
                                                    struct joined_shared *shared)
@@ -76,7 +93,6 @@ static __device__ __forceinline__ void load_bodies(const cuda_view &v, const joi
         double sum = 0;
         if (k >= 6) return;
         p.velocity[6 * e + k] = velocity_of(v, body, k, after);
-        for (int q = 0; q < 6; ++q) p.factor[36 * e + 6 * k + q] = rigid_entry(v.joints.bodies[body], k, q);
         each_contact<SMALL>(v, p, e, after, &shared->sides, [&](const joined_side &s, int32_t) {
             shared->touched = 1;
 #pragma unroll 4
@@ -151,7 +167,7 @@ template <bool SMALL>
 static __device__ __forceinline__ void load_part(const cuda_view &v, const joined_view &p, bool after,
                                                  struct joined_shared *shared)
 {
-    load_rows(v, p, after);
+    if (after) load_multipliers(v, p);
     load_bodies<SMALL>(v, p, after, shared);
     __syncthreads();
     const bool touched = shared->touched != 0;
@@ -200,7 +216,8 @@ static __device__ __forceinline__ void look_for_sides(const cuda_view &v, bool a
     }
 }
 
-/* args.count: after the iterations; args.start: it ran before them, too. */
+/* args.count: after the iterations; args.start: it ran before them, too. What the iterations and contacts do not change
+ * is fetched while the kernel before this one ends; where joints are apart that is the one that makes rows. */
 template <bool SMALL>
 static __global__ void __launch_bounds__(JOINED_THREADS)
     joined_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -214,8 +231,18 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
         shared->touched = shared->sides.count = shared->sides.first = 0;
     }
     __syncthreads();
-    if (shared->aborted) return;
+    if (shared->aborted) {
+        wait_for_stream();
+        return;
+    }
     const joined_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
+    if (v.joints.apart) wait_for_stream();
+    load_rows(v, p);
+    load_inertia(v, p);
+    wait_for_stream();
+    let_next_begin();
+    if (after && blockIdx.x == 0 && threadIdx.x == 0) stamp_solved(v.step);
+    __syncthreads();
     if (SMALL) look_for_sides(v, again, shared);
     const bool kept = again && v.joints.kept[blockIdx.x]; /* it was solved before the iterations; it is so still: */
     if (kept && !is_touched<SMALL>(v, p, &shared->sides, &shared->touched)) return;
@@ -227,6 +254,8 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
 /* Which part the bodies of a pair are of: a thread a side. Small parts find their contacts by it. */
 static __global__ void pair_parts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t code = thread_index();
     if (code >= 2 * live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];
@@ -246,7 +275,7 @@ sadmm_status CUDA(launch_joined)(struct sadmm_context *c, bool after, struct sad
     args.count = after;
     args.start = c->settings.warm_start;
     return CUDA(launch_partition)(c, joined_is_small(c) ? joined_kernel<true> : joined_kernel<false>, "joined bodies",
-                                  &blocks, false, &args, error);
+                                  &blocks, &args, error);
 }
 
 sadmm_status CUDA(launch_pair_parts)(struct sadmm_context *c, struct sadmm_error *error)

@@ -1,6 +1,8 @@
 /* The step's own kernels (device/step.h): edits, start, admit, turn, commit. */
 #include <stddef.h>
 
+#include <algorithm>
+
 #include "backend_cuda/device/double.h"
 
 #include "collision/bounds.h"
@@ -14,6 +16,7 @@
 #include "world.h"
 
 enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocessors */
+enum { EDIT_THREADS = 64, MOST_EDIT_BLOCKS = 64 }; /* enough on their way to keep the bus to the host busy */
 enum { TURN_THREADS = 256 }; /* more: bodies that are moved again have a thread each, side by side */
 
 /* ---- edits ----------------------------------------------------------------------------------------------------- */
@@ -59,12 +62,8 @@ static __device__ __forceinline__ void edit_driven(const driven_view &driven, co
     body->dt = values[8];
 }
 
-/* A thread an edit: no two have the same kind and target. */
-static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+static __device__ __forceinline__ void make_edit(const cuda_view &v, const struct sadmm_resident_edit &edit)
 {
-    int32_t i = thread_index();
-    if (i >= args.count || v.model.live->abort_code) return;
-    const struct sadmm_resident_edit edit = args.edits[i]; /* all of it at once: from the host's memory */
     const double *values = edit.values;
     if (edit.kind == SADMM_EDIT_SETTINGS) {
         struct cuda_settings *kept = (struct cuda_settings *)v.model.settings; /* its first member */
@@ -94,6 +93,22 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
 static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13 &&
                   (int)SADMM_EDIT_VALUES >= (int)JOINT_COORDINATE_NUMBERS,
               "every kind fits");
+
+/* No two edits have the same kind and target. An edit is fetched, all of it, from the host's memory before it is known
+ * to be one: the number of edits is as far away. */
+static __global__ void __launch_bounds__(EDIT_THREADS)
+    edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    wait_for_stream();
+    let_next_begin();
+    const struct cuda_edits *edits = edits_of_step(v.step.edits, v.step.edit_capacity, v.step.control->sequence);
+    const int32_t stride = (int32_t)gridDim.x * EDIT_THREADS, abort_code = v.model.live->abort_code;
+    for (int32_t i = (int32_t)(blockIdx.x * (unsigned)EDIT_THREADS + threadIdx.x); i < v.step.edit_capacity; i += stride) {
+        const struct sadmm_resident_edit edit = first_edit(edits)[i];
+        if (i >= edits->count || abort_code) return;
+        make_edit(v, edit);
+    }
+}
 
 /* ---- start ----------------------------------------------------------------------------------------------------- */
 
@@ -135,6 +150,8 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
 /* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
 static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
     const int32_t lane = (int32_t)(t % START_LANES);
     if (v.model.live->abort_code) return;
@@ -153,6 +170,8 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
 /* One thread. What was found is this step's when it fits. */
 static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     if (threadIdx.x > 0 || v.model.live->abort_code) return;
     const struct sadmm_cuda_contact_counts counts = *v.step.counts;
     v.step.control->stamps[STAMP_FOUND] = nanoseconds();
@@ -242,6 +261,8 @@ static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cu
 static __global__ void __launch_bounds__(TURN_THREADS, 4)
     turn_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int64_t t = (int64_t)blockIdx.x * TURN_THREADS + threadIdx.x, i = t / START_LANES,
                   own = (int64_t)blockIdx.x * (TURN_THREADS / START_LANES) + threadIdx.x;
     const int32_t lane = (int32_t)(t % START_LANES);
@@ -312,13 +333,13 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
 
 /* ---- launches -------------------------------------------------------------------------------------------------- */
 
-sadmm_status CUDA(launch_edits)(struct sadmm_context *c, const struct sadmm_resident_edit *edits, size_t count,
-                                struct sadmm_error *error)
+/* Of the step whose turn it is on the device. */
+sadmm_status CUDA(launch_edits)(struct sadmm_context *c, struct sadmm_error *error)
 {
-    cuda_args args = {};
-    args.count = (int32_t)count;
-    args.edits = edits;
-    return CUDA(launch)(c, edit_kernel, "edit", blocks_for((int64_t)count), &args, error);
+    const cuda_args args = {};
+    const int64_t blocks = ((int64_t)c->step->edit_capacity + EDIT_THREADS - 1) / EDIT_THREADS;
+    return CUDA(launch_of)(c, edit_kernel, "edit", std::min<int64_t>(blocks, MOST_EDIT_BLOCKS), EDIT_THREADS, &args,
+                           error);
 }
 
 sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *error)
@@ -359,5 +380,5 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *er
     const int64_t joints = moved_last(c), bodies = c->view.step.limits || joints ? c->view.model.bodies : 0;
     args.most_bodies = (int32_t)((bodies + STEP_THREADS - 1) / STEP_THREADS);
     const int64_t blocks = args.most_bodies + (joints + STEP_THREADS - 1) / STEP_THREADS + 1;
-    return CUDA(launch_early)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
+    return CUDA(launch_of)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
 }

@@ -10,35 +10,40 @@
 
 /* ---- running --------------------------------------------------------------------------------------------------- */
 
-/* Plan and record, if need be, with the abort code cleared, once nothing is running. */
-static sadmm_status prepare(struct sadmm_context *c, struct sadmm_error *error)
+static struct queued_step *slot_of(struct cuda_step *s, int64_t sequence) { return &s->queue[sequence % STEPS_AHEAD]; }
+
+/* Plan and record, if need be, once nothing is running. What a step is like is seen with its edits made. */
+static sadmm_status prepare(struct sadmm_context *c, bool edited, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    if (s->planned && s->recorded) return SADMM_OK;
+    struct step_graphs *graphs = &s->graphs[edited];
+    if (s->planned && graphs->recorded) return SADMM_OK;
     TRY(CUDA(wait)(c, error)); /* reports are seen before the last blocks of a step have ended */
     if (!s->planned) TRY(CUDA(guess_step)(c, error));
-    if (s->recorded) return SADMM_OK;
-    for (int into = 0; into < 2; ++into) TRY(CUDA(record_step)(c, into, error));
-    s->recorded = true;
+    if (graphs->recorded) return SADMM_OK;
+    for (int into = 0; into < 2; ++into) TRY(CUDA(record_step)(c, edited, into, error));
+    graphs->recorded = true;
     return SADMM_OK;
 }
 
-static struct queued_step *slot_of(struct cuda_step *s, int64_t sequence) { return &s->queue[sequence % STEPS_AHEAD]; }
-
-static sadmm_status launch_edits_of(struct sadmm_context *c, int64_t sequence, struct sadmm_error *error)
-{
-    struct cuda_step *s = c->step;
-    const struct queued_step *q = slot_of(s, sequence);
-    CUDA(view_into)(c, s->into, 0);
-    return CUDA(launch_edits)(c, q->edits, q->edit_count, error);
-}
+/* Edits are launched before the step, by themselves; once they are seen to come again and again they are in graphs of
+ * their own, which takes less, but is recorded once more. */
+enum { FEW_EDITED = 16 };
 
 static sadmm_status launch_step(struct sadmm_context *c, int64_t sequence, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
+    const bool edits = slot_of(s, sequence)->edit_count > 0;
+    s->edited += edits;
+    const bool edited = edits && s->planned && s->edited > FEW_EDITED;
+    if (edits && !edited) {
+        CUDA(view_into)(c, s->into, 0);
+        TRY(CUDA(launch_edits)(c, error));
+    }
+    TRY(prepare(c, edited, error));
     c->kernel = "a step's graph";
     ((volatile struct cuda_step_report *)&step_reports(c)[sequence % STEPS_AHEAD])->ready = 0;
-    CUDA_CALL(c, cudaGraphLaunch(s->graphs[s->into], c->stream), "cudaGraphLaunch");
+    CUDA_CALL(c, cudaGraphLaunch(s->graphs[edited].into[s->into], c->stream), "cudaGraphLaunch");
     CUDA_CALL(c, cudaEventRecord(slot_of(s, sequence)->done, c->stream), "cudaEventRecord");
     s->into = 1 - s->into;
     return SADMM_OK;
@@ -58,9 +63,7 @@ static sadmm_status repeat_steps(struct sadmm_context *c, int64_t first, int64_t
 {
     struct cuda_step *s = c->step;
     for (int64_t sequence = first; sequence < end; ++sequence) {
-        sadmm_status status = launch_edits_of(c, sequence, error);
-        if (status == SADMM_OK) status = prepare(c, error);
-        if (status == SADMM_OK) status = launch_step(c, sequence, error);
+        const sadmm_status status = launch_step(c, sequence, error);
         if (status != SADMM_OK) { /* no memory: this step and those behind it are lost */
             drop_steps(c, sequence, end);
             return status;
@@ -210,42 +213,40 @@ static sadmm_status next_place(struct sadmm_context *c, struct sadmm_error *erro
     return SADMM_OK;
 }
 
-/* The edits of a step, and the settings' numbers where the device has others, into its place in the queue. */
-static sadmm_status take_edits(struct sadmm_context *c, struct queued_step *q, const struct sadmm_settings *settings,
-                               const struct sadmm_resident_edit *edits, size_t count, struct sadmm_error *error)
+/* Room for so many edits a step. Nothing is enqueued. */
+static sadmm_status reserve_edits(struct sadmm_context *c, size_t count, struct sadmm_error *error)
 {
+    struct cuda_step *s = c->step;
+    const size_t capacity = sadmm_grown_capacity((size_t)s->edit_capacity, count, 64);
+    if (capacity > INT32_MAX)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu changes in a step: too many, at most %d", count, INT32_MAX);
+    s->edit_capacity = 0; /* if there is no memory */
+    TRY(CUDA(reserve)(c, PINNED_EDITS,
+                      STEPS_AHEAD * (sizeof(struct cuda_edits) + capacity * sizeof(struct sadmm_resident_edit)), error));
+    s->edit_capacity = (int32_t)capacity;
+    s->graphs[true].recorded = false; /* they know where edits are */
+    return SADMM_OK;
+}
+
+/* The edits of a step, and the settings' numbers where the device has others, into its place in the queue, which has
+ * room for them. */
+static void take_edits(struct sadmm_context *c, int64_t sequence, const struct sadmm_settings *settings,
+                       const struct sadmm_resident_edit *edits, size_t count)
+{
+    struct queued_step *q = slot_of(c->step, sequence);
     struct sadmm_resident_edit numbers = {SADMM_EDIT_SETTINGS, 0, {}};
     const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     sadmm_settings_numbers(&share, numbers.values);
     const bool other = memcmp(numbers.values, c->numbers, sizeof c->numbers) != 0;
-    const size_t total = count + other;
-    if (total > q->edit_capacity) {
-        const size_t capacity = sadmm_grown_capacity(q->edit_capacity, total, 16);
-        if (sadmm_test_allocation_fails())
-            return CUDA(fail)(c, cudaErrorMemoryAllocation, "allocation of changes of bodies", error);
-        if (q->edits) (void)cudaFreeHost(q->edits);
-        q->edits = nullptr;
-        q->edit_capacity = 0;
-        CUDA_CALL(c, cudaMallocHost((void **)&q->edits, capacity * sizeof *q->edits),
-                  "allocation of changes of bodies");
-        q->edit_capacity = capacity;
-    }
-    if (count > 0) memcpy(q->edits, edits, count * sizeof *edits);
-    if (other) q->edits[count] = numbers;
+    struct cuda_edits *to = const_cast<struct cuda_edits *>(
+        edits_of_step(buffer<struct cuda_edits>(c, PINNED_EDITS), c->step->edit_capacity, sequence));
+    struct sadmm_resident_edit *at = const_cast<struct sadmm_resident_edit *>(first_edit(to));
+    if (count > 0) memcpy(at, edits, count * sizeof *edits);
+    if (other) at[count] = numbers;
+    q->edit_count = count + other;
+    to->count = (int64_t)q->edit_count;
     memcpy(c->numbers, numbers.values, sizeof c->numbers);
     q->settings = *settings;
-    q->edit_count = total;
-    return SADMM_OK;
-}
-
-static sadmm_status enqueue_next(struct sadmm_context *c, struct queued_step *q, const struct sadmm_settings *settings,
-                                 const struct sadmm_resident_edit *edits, size_t count, struct sadmm_error *error)
-{
-    struct cuda_step *s = c->step;
-    TRY(take_edits(c, q, settings, edits, count, error));
-    TRY(launch_edits_of(c, s->enqueued, error));
-    TRY(prepare(c, error));
-    return launch_step(c, s->enqueued, error);
 }
 
 extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct sadmm_settings *settings,
@@ -256,14 +257,18 @@ extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct s
     const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     CUDA_ENTER(c);
     TRY(next_place(c, error));
+    if (count >= (size_t)s->edit_capacity) { /* settings may be one more */
+        TRY(see_all(c, error));
+        TRY(reserve_edits(c, count + 1, error));
+    }
     if (!sadmm_settings_same_but_numbers(&c->settings, &share)) {
         TRY(see_all(c, error));
         s->planned = false;
     }
     if (!s->planned) TRY(see_all(c, error));
     CUDA(plan_settings)(c, &share); /* kernels know sub-steps alone */
-    struct queued_step *q = slot_of(s, s->enqueued);
-    sadmm_status status = enqueue_next(c, q, settings, edits, count, error);
+    take_edits(c, s->enqueued, settings, edits, count);
+    const sadmm_status status = launch_step(c, s->enqueued, error);
     if (status != SADMM_OK) {
         drop_steps(c, s->enqueued, s->enqueued + 1);
         return status;

@@ -17,7 +17,7 @@ sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, int substep, struct sad
     const bool alone = s->careful > 0; /* each with candidates of its own */
     const struct sadmm_cuda_find find = {step_state(s->into, substep - 1, substeps),
                                          step_state(s->into, substep, substeps), alone ? 0 : substep,
-                                         alone ? 1 : substeps};
+                                         alone ? 1 : substeps, begins_early(c)};
     TRY(COLLISION(enqueue)(s->collision, c->stream, &find, error));
     return CUDA(launch_admit)(c, error);
 }
@@ -88,13 +88,13 @@ static sadmm_status record_joints(struct sadmm_context *c, struct sadmm_error *e
     return SADMM_OK;
 }
 
-/* Joined bodies before the iterations or after them, beside what the main stream does then. */
-static sadmm_status record_joined(struct sadmm_context *c, bool after, struct sadmm_error *error)
+/* Joined bodies before the iterations, beside what the main stream does then. */
+static sadmm_status record_joined(struct sadmm_context *c, struct sadmm_error *error)
 {
     side_branch side(c, c->joint_side);
     CUDA_CALL(c, side.code, "a branch of the step");
-    if (!after && joined_is_small(c)) TRY(CUDA(launch_pair_parts)(c, error));
-    if (after || c->settings.warm_start) TRY(CUDA(launch_joined)(c, after, error));
+    if (joined_is_small(c)) TRY(CUDA(launch_pair_parts)(c, error));
+    if (c->settings.warm_start) TRY(CUDA(launch_joined)(c, false, error));
     CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
     return SADMM_OK;
 }
@@ -123,7 +123,7 @@ static sadmm_status record_driven_plan(struct sadmm_context *c, struct sadmm_err
     if (c->view.joints.count == 0) return SADMM_OK;
     TRY(CUDA(assemble_rows)(c, error));
     if (c->fast) TRY(CUDA(enqueue_row_responses)(c, error));
-    TRY(record_joined(c, false, error));
+    TRY(record_joined(c, error));
     return wait_for_joints(c, error);
 }
 
@@ -134,7 +134,7 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
     if (c->view.driven.count > 0) return record_driven_plan(c, error);
     const bool together = c->view.joints.count > 0 && !c->view.joints.apart, beside = together && joined_is_small(c);
     if (together) TRY(wait_for_joints(c, error)); /* the graph is of their rows, too */
-    if (beside) TRY(record_joined(c, false, error));
+    if (beside) TRY(record_joined(c, error));
     {
         side_branch side(c, c->side);
         CUDA_CALL(c, side.code, "a branch of the step");
@@ -143,7 +143,7 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
     }
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
-    if (together && !beside) TRY(record_joined(c, false, error));
+    if (together && !beside) TRY(record_joined(c, error));
     return together ? wait_for_joints(c, error) : SADMM_OK;
 }
 
@@ -168,8 +168,22 @@ static sadmm_status record_limit(struct sadmm_context *c, bool suspected, struct
     return CUDA(enqueue_limit)(c, suspected, error);
 }
 
-/* The end of the step, wrenches included; beside it joined bodies, and the residuals of the last iteration where they
- * are wanted. */
+/* What joints keep, once their bodies have been solved after the iterations; beside that the end of the step, which
+ * takes less. */
+static sadmm_status record_joined_finish(struct sadmm_context *c, struct sadmm_error *error)
+{
+    {
+        side_branch side(c, c->joint_side);
+        CUDA_CALL(c, side.code, "a branch of the step");
+        TRY(CUDA(launch_finish)(c, c->step->joined_parts == 0, error));
+        CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
+    }
+    TRY(CUDA(launch_joined)(c, true, error));
+    TRY(wait_for_joints(c, error));
+    return CUDA(launch_joint_solution)(c, error);
+}
+
+/* The end of the step, wrenches included; beside it the residuals of the last iteration where they are wanted. */
 static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struct sadmm_error *error)
 {
     const bool joints = c->view.joints.count > 0, apart = c->view.joints.apart;
@@ -179,13 +193,8 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
         TRY(CUDA(enqueue_residuals)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
-    if (joints && !apart) TRY(record_joined(c, true, error));
     if (joints && apart) TRY(wait_for_joints(c, error));
-    TRY(CUDA(launch_finish)(c, error));
-    if (joints && !apart) {
-        TRY(wait_for_joints(c, error));
-        TRY(CUDA(launch_joint_solution)(c, error));
-    }
+    TRY(joints && !apart ? record_joined_finish(c, error) : CUDA(launch_finish)(c, true, error));
     TRY(CUDA(launch_driven_finish)(c, error));
     if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;
@@ -234,38 +243,40 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     }
 }
 
-static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *error)
+static sadmm_status enqueue_step(struct sadmm_context *c, bool edited, struct sadmm_error *error)
 {
     struct sadmm_stages stages = sadmm_stages_of(&c->plan, &c->settings, true);
     struct sadmm_stage stage;
     bool residuals = false;
     view_substep(c, 0);
+    if (edited) TRY(CUDA(launch_edits)(c, error));
     while (sadmm_stages_next(&stages, &stage)) TRY(record_stage(c, &stage, &residuals, error));
     return SADMM_OK;
 }
 
 /* ---- graphs ---------------------------------------------------------------------------------------------------- */
 
-sadmm_status CUDA(record_step)(struct sadmm_context *c, int into, struct sadmm_error *error)
+sadmm_status CUDA(record_step)(struct sadmm_context *c, bool edited, int into, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
+    cudaGraphExec_t *ready = &s->graphs[edited].into[into];
     cudaGraph_t graph = nullptr;
     const int next = s->into;
     CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
     s->into = into;
     c->recording = true;
-    sadmm_status status = enqueue_step(c, error);
+    sadmm_status status = enqueue_step(c, edited, error);
     c->recording = false;
     s->into = next;
     cudaError_t code = cudaStreamEndCapture(c->stream, &graph);
     if (status == SADMM_OK && code != cudaSuccess) status = CUDA(fail)(c, code, "cudaStreamEndCapture", error);
     /* Instantiated again: plans change rarely, and then the graph's shape changes with them. */
-    if (s->graphs[into]) (void)cudaGraphExecDestroy(s->graphs[into]);
-    s->graphs[into] = nullptr;
+    if (*ready) (void)cudaGraphExecDestroy(*ready);
+    *ready = nullptr;
     if (status == SADMM_OK) {
-        code = cudaGraphInstantiate(&s->graphs[into], graph, 0);
+        code = cudaGraphInstantiate(ready, graph, 0);
         if (code != cudaSuccess) {
-            s->graphs[into] = nullptr;
+            *ready = nullptr;
             status = CUDA(fail)(c, code, "cudaGraphInstantiate", error);
         }
     }

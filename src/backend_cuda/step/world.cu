@@ -35,6 +35,8 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     step->guess = s->guess;
     step->control = buffer<struct cuda_step_control>(c, BUFFER_WORLD_CONTROL);
     step->reports = step_reports(c);
+    step->edits = buffer<struct cuda_edits>(c, PINNED_EDITS);
+    step->edit_capacity = s->edit_capacity;
     step->measured = c->plan.residuals && !stop_rule_checked(c);
     step->limits = c->plan.momentum;
     step->substep = substep;
@@ -80,10 +82,10 @@ void CUDA(step_destroy)(struct sadmm_context *c)
     if (!s) return;
     for (struct queued_step &q : s->queue) {
         if (q.done) (void)cudaEventDestroy(q.done);
-        if (q.edits) (void)cudaFreeHost(q.edits);
     }
-    for (cudaGraphExec_t graph : s->graphs)
-        if (graph) (void)cudaGraphExecDestroy(graph);
+    for (const struct step_graphs &graphs : s->graphs)
+        for (cudaGraphExec_t graph : graphs.into)
+            if (graph) (void)cudaGraphExecDestroy(graph);
     COLLISION(destroy)(s->collision);
     sadmm_free(s);
     c->step = nullptr;
@@ -121,11 +123,13 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     s->last_settings = *settings;
     s->time = world->time;
-    s->planned = s->recorded = false;
+    s->planned = false;
+    forget_graphs(s);
     s->enqueued = s->seen = s->done = s->repeats = 0;
     s->offending_body = -1;
     s->learned.step = -1;
     s->careful = 0;
+    s->edited = 0;
     s->apart = false;
     s->untouched = 0;
     s->patience = LEAST_PATIENCE;

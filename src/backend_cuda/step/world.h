@@ -18,8 +18,13 @@
 struct queued_step {
     cudaEvent_t done;
     struct sadmm_settings settings;
-    struct sadmm_resident_edit *edits; /* pinned */
-    size_t edit_count, edit_capacity;
+    size_t edit_count;
+};
+
+/* A step's graphs, by the set that is written. */
+struct step_graphs {
+    bool recorded; /* for the world as it is, and as it is planned */
+    cudaGraphExec_t into[2];
 };
 
 /* What a sub-step is planned to be. */
@@ -54,8 +59,7 @@ struct cuda_step {
         patience; /* steps that could have been so since one could not; that it takes for it to be tried */
 
     bool planned;               /* capacities, partition and guess are for the world as it is */
-    bool recorded;              /* and so are the graphs */
-    cudaGraphExec_t graphs[2];  /* by the set that is written */
+    struct step_graphs graphs[2]; /* of steps without edits, and with (queue.cu) */
     struct cuda_step_guess guess;
     int64_t candidate_capacity, point_capacity;
 
@@ -65,6 +69,8 @@ struct cuda_step {
 
     /* The queue: steps [seen, enqueued), at most STEPS_AHEAD. */
     struct queued_step queue[STEPS_AHEAD];
+    int32_t edit_capacity;      /* of each step, in PINNED_EDITS */
+    int64_t edited;             /* steps with edits so far */
     int64_t enqueued, seen;
     int into;                   /* set and state the next step writes */
 
@@ -85,6 +91,9 @@ static inline struct cuda_step_report *step_reports(const struct sadmm_context *
 {
     return buffer<struct cuda_step_report>(c, PINNED_REPORTS);
 }
+
+/* The next step is planned anew: there are no graphs of it. */
+static inline void forget_graphs(struct cuda_step *s) { s->graphs[false].recorded = s->graphs[true].recorded = false; }
 
 /* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
 static inline bool stop_rule_checked(const struct sadmm_context *c)
@@ -113,18 +122,18 @@ bool CUDA(may_be_apart)(const struct sadmm_context *);
 void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_graph_statistics *b);
 /* record.cu: contacts, up to the gate. */
 sadmm_status CUDA(enqueue_find)(struct sadmm_context *, int substep, struct sadmm_error *error);
-/* record.cu: the graph of a step that writes state and set `into`. */
-sadmm_status CUDA(record_step)(struct sadmm_context *, int into, struct sadmm_error *error);
+/* record.cu: the graph of a step that writes state and set `into`; edited: its edits come first. */
+sadmm_status CUDA(record_step)(struct sadmm_context *, bool edited, int into, struct sadmm_error *error);
 /* read.cu: the report of the last step that was done. */
 void CUDA(report_step)(const struct sadmm_context *, struct sadmm_resident_report *out);
 
 /* kernels.cu, finish.cu: launches of the step's own kernels. */
-sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
-                                struct sadmm_error *error);
+sadmm_status CUDA(launch_edits)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_turn)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
+/* first: of the kernels behind the iterations. */
+sadmm_status CUDA(launch_finish)(struct sadmm_context *, bool first, struct sadmm_error *error);
 sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
 
 /* driven.cu: take over a world's driven bodies; where they are; */

@@ -21,6 +21,8 @@
 static __global__ void __launch_bounds__(BODY_THREADS)
     pairs_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), p = t / v.contacts.lanes,
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);
@@ -46,6 +48,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     terms_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_for_stream();
+    let_next_begin();
     const body_thread t = body_of_thread(v.model, v.graph);
     double total[TERMS];
     const double term =
@@ -62,6 +65,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 /* J A^-1 J^T; and what its multiplier counts for in the load of its constraint. A thread a row. */
 static __global__ void respond_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    wait_for_stream();
+    let_next_begin();
     const int32_t slot = thread_index(), k = slot / SADMM_MAX_ROWS, r = slot % SADMM_MAX_ROWS;
     if (k >= live_rows(v.model, v.rows) || r >= v.rows.constraints[k].rows) return;
     const int32_t joined[2] = {v.rows.constraints[k].body_a, v.rows.constraints[k].body_b};
@@ -93,6 +98,7 @@ static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, co
     const int32_t label =
         about.rows > 0 ? v.graph.label[is_dynamic(v.model, about.body_a) ? about.body_a : about.body_b] : 0;
     wait_for_stream();
+    let_next_begin();
     if (about.rows == 0) return; /* a joint may have fewer than there is room for */
     cuda_island *island = &v.islands.info[label];
     if (args.start) island->rows = island->held = 1; /* left alone */
@@ -138,10 +144,8 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *
     const bool scales = c->refreshes >= WEIGHT_FIRST_SCALE, rows = c->view.rows.count > 0;
     const cuda_kernel kernel = scales ? (rows ? terms_kernel<true, true> : terms_kernel<true, false>)
                                       : (rows ? terms_kernel<false, true> : terms_kernel<false, false>);
-    TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
-                                error));
-    return CUDA(launch_early)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), THREADS, &args,
-                                error);
+    TRY(CUDA(launch_of)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args, error));
+    return CUDA(launch)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), &args, error);
 }
 
 sadmm_status CUDA(enqueue_loads)(struct sadmm_context *c, struct sadmm_error *error)

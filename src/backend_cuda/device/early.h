@@ -1,0 +1,55 @@
+/* Programmatic dependent launch: in a step's graph a kernel comes to its multiprocessors while the one before it ends.
+ *
+ * Every kernel of the backend waits (wait_for_stream) before it reads anything that the kernel before it writes. What
+ * that one does not write may be fetched earlier: the kernels before it have ended, since it has waited itself. It
+ * waits in any case, also where it has nothing to do: the kernel after it waits for this one alone. */
+#ifndef SADMM_CUDA_DEVICE_EARLY_H
+#define SADMM_CUDA_DEVICE_EARLY_H
+
+#include <cuda_runtime.h>
+
+#define EARLY_ARCH 900 /* of the first devices that do this */
+
+/* Wait until the kernels enqueued before have ended. */
+static __device__ __forceinline__ void wait_for_stream(void)
+{
+#if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
+    asm volatile("griddepcontrol.wait;" ::: "memory");
+#endif
+}
+
+/* The next kernel may begin, once all blocks of this one have come here, and run up to its own wait. To be called after
+ * this one's wait. */
+static __device__ __forceinline__ void let_next_begin(void)
+{
+#if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
+    asm volatile("griddepcontrol.launch_dependents;");
+#endif
+}
+
+#ifndef SADMM_CUDA_EMULATED
+static inline cudaLaunchAttribute early_attribute(void)
+{
+    cudaLaunchAttribute early = {};
+    early.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+    early.val.programmaticStreamSerializationAllowed = 1;
+    return early;
+}
+
+/* A launch; early: like those. */
+static inline cudaError_t launch_on(cudaStream_t stream, bool early, const void *kernel, dim3 blocks, dim3 threads,
+                                    size_t shared, void **parameters)
+{
+    cudaLaunchAttribute attribute = early_attribute();
+    cudaLaunchConfig_t launch = {};
+    launch.gridDim = blocks;
+    launch.blockDim = threads;
+    launch.dynamicSmemBytes = shared;
+    launch.stream = stream;
+    launch.attrs = &attribute;
+    launch.numAttrs = early;
+    return cudaLaunchKernelExC(&launch, kernel, parameters);
+}
+#endif
+
+#endif
