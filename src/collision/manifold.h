@@ -92,11 +92,13 @@ SADMM_INLINE vec3 pose_axis(const struct pair_pose *pose)
 /* A direction (unit) in the upper 27 bits of a cache word: 9 bits a coordinate, to 0.2 degrees. */
 enum { MANIFOLD_DIRECTION_SHIFT = 5 };
 
-/* A coordinate, in [1, 511]. What is no direction, of bodies so far apart that squares overflow, is 0. */
+/* A coordinate, in [1, 511]. What is no direction, of bodies so far apart that squares overflow, is in [0, 511]: NaN is
+ * 0. */
 SADMM_INLINE uint32_t manifold_coordinate_bits(real x)
 {
-    const real scale = 255, middle = (real)256.5, most = (real)1.001; /* from below: rounds to the nearest */
-    return x >= -most && x <= most ? (uint32_t)(int32_t)(middle + scale * x) : 0;
+    const real scale = 255, middle = (real)256.5, most = (real)511.5; /* from below: rounds to the nearest */
+    const real at = middle + scale * x, high = at > 0 ? at : 0;
+    return (uint32_t)(int32_t)(high < most ? high : most);
 }
 
 SADMM_INLINE uint32_t manifold_direction_bits(vec3 n)

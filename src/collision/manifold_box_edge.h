@@ -50,7 +50,7 @@ SADMM_INLINE real box_depth_along(const real x[3], const real out[3], const real
 }
 
 /* Edge-edge manifold for axis code `axis`; returns false when the edges do not cross (closest points at an end). */
-SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int negative, struct manifold *m)
+SADMM_HOST_CALL bool box_edge_manifold(const struct box_pair *b, int axis, int negative, struct manifold *m)
 {
     int i = (axis - 6) / 3, j = (axis - 6) % 3, e1, e2, k, end;
     vec3 n = box_axis_direction(b, axis, negative), p, q, w, axis1 = v3_axis(i, 1), p1, p2;

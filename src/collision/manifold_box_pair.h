@@ -39,7 +39,7 @@ SADMM_INLINE vec3 box_edge_axis(const struct box_pair *b, int i, int j)
 }
 
 /* Direction 1 to 2 of an axis code (axis | BOX_AXIS_NEGATIVE), unit. */
-SADMM_INLINE vec3 box_axis_direction(const struct box_pair *b, int axis, int negative)
+SADMM_HOST_INLINE vec3 box_axis_direction(const struct box_pair *b, int axis, int negative)
 {
     real s = negative ? (real)-1 : (real)1;
     if (axis < 3) return v3_axis(axis, s);

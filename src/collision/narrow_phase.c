@@ -8,9 +8,10 @@
 
 /* Write the manifold as a pair with its points; there is capacity. `before`: the pair that it goes on from, or NULL.
  * ratio: step_ratio of both sets. */
-static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a, uint32_t b,
-                 uint32_t child, const struct manifold *m, const struct sadmm_contact_set *old, double ratio,
-                 const struct sadmm_contact_pair *before, struct sadmm_contact_set *out)
+SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
+                              uint32_t b, uint32_t child, const struct manifold *m,
+                              const struct sadmm_contact_set *old, double ratio,
+                              const struct sadmm_contact_pair *before, struct sadmm_contact_set *out)
 {
     const struct sadmm_proxy *pa = &c->proxies[a], *pb = &c->proxies[b];
     struct sadmm_contact_pair *pair = &out->pairs[out->pair_count++];
@@ -62,8 +63,9 @@ struct narrow_phase {
 };
 
 /* The pair that a manifold goes on from, NULL: none. They are asked for in the order of sets. */
-static const struct sadmm_contact_pair *find_before(struct narrow_phase *n, uint64_t shapes, uint32_t child,
-                                                    const struct sadmm_proxy *a, const struct sadmm_proxy *b)
+SADMM_ALWAYS_INLINE const struct sadmm_contact_pair *find_before(struct narrow_phase *n, uint64_t shapes,
+                                                                 uint32_t child, const struct sadmm_proxy *a,
+                                                                 const struct sadmm_proxy *b)
 {
     const struct sadmm_contact_pair *pairs = n->old->pairs;
     const size_t count = n->old->pair_count;
@@ -75,13 +77,20 @@ static const struct sadmm_contact_pair *find_before(struct narrow_phase *n, uint
 }
 
 /* Write the manifold of a pair, if it has points; false when out of memory. */
-static bool keep(struct narrow_phase *n, uint32_t a, uint32_t b, uint32_t child, const struct manifold *m,
-                 const struct sadmm_contact_pair *before)
+SADMM_ALWAYS_INLINE bool keep(struct narrow_phase *n, uint32_t a, uint32_t b, uint32_t child,
+                              const struct manifold *m, const struct sadmm_contact_pair *before)
 {
     if (m->count == 0) return true;
     if (!has_capacity(n->out) && !add_capacity(n->out)) return false;
     emit(n->candidates, n->input, a, b, child, m, n->old, n->ratio, before, n->out);
     return true;
+}
+
+/* Of a triangle: the other one is part of find_children alone. */
+__attribute__((noinline)) static bool keep_triangle(struct narrow_phase *n, uint32_t a, uint32_t b, uint32_t triangle,
+                                                    const struct manifold *m, const struct sadmm_contact_pair *before)
+{
+    return keep(n, a, b, triangle, m, before);
 }
 
 /* When a pair with a mesh that moves on first touches any triangle. */
@@ -96,7 +105,8 @@ static double first_touch(const struct narrow_phase *n, const struct mesh *mesh,
     return first;
 }
 
-/* b: a mesh. By itself: find_children is as quick as it is because all of find_manifold is inlined into it, once. */
+/* b: a mesh. By itself: find_children is as quick as it is because all of find_manifold is inlined into it, and what
+ * keeps that. */
 __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uint32_t a, uint32_t b)
 {
     const struct sadmm_collision_input *input = n->input;
@@ -120,7 +130,7 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
         m.cache = 0;
         triangle_manifold(&pa->geometry, &pb->geometry, input->hulls, (uint32_t)triangle, &start.pose,
                           (real)start.limit, before ? contact_memory(before, pa, pb) : 0, &m);
-        if (!keep(n, a, b, (uint32_t)triangle, &m, before)) return false;
+        if (!keep_triangle(n, a, b, (uint32_t)triangle, &m, before)) return false;
     }
     return true;
 }

@@ -126,7 +126,7 @@ SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const 
 
 /* The manifold of two shapes in a step: where they are halfway through it (midway.h), or where a pair that is faster
  * than that first touches (advance.h). What passes by is near, or no contact. start: pair_start_of the two. */
-SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+SADMM_HOST_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
                                 uint32_t child, double margin, double gravity, double dt, const struct pair_start *start,
                                 uint32_t cache, struct manifold *m)
 {

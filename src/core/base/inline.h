@@ -20,6 +20,14 @@
 #else
 #define SADMM_CALLED SADMM_INLINE
 #endif
+/* What a compiler for the host is not left to choose about, as one for a device is: inline, or a function by itself. */
+#ifdef __CUDACC__
+#define SADMM_HOST_INLINE SADMM_INLINE
+#define SADMM_HOST_CALL SADMM_INLINE
+#else
+#define SADMM_HOST_INLINE static inline __attribute__((always_inline))
+#define SADMM_HOST_CALL static __attribute__((noinline, unused))
+#endif
 /* Where a call would cost more than the function. */
 #define SADMM_ALWAYS_INLINE SADMM_INLINE __attribute__((always_inline))
 
