@@ -205,7 +205,7 @@ sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_sett
 enum { MOST_ATTRIBUTES = 2 };
 
 /* Blocks of a partition run side by side in clusters (`cluster` > 1), or all of them (GRID: a cooperative launch). */
-static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct cuda_partition *partition,
+static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct cuda_partition *partition, bool early,
                                     cudaLaunchAttribute attribute[MOST_ATTRIBUTES])
 {
     cudaLaunchConfig_t launch = {};
@@ -225,8 +225,10 @@ static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct 
         next->val.clusterDim.y = next->val.clusterDim.z = 1;
     }
 #ifndef SADMM_CUDA_EMULATED
-    if (begins_early(c) && partition->tier != SADMM_CUDA_TIER_GRID)
+    if (early && partition->tier != SADMM_CUDA_TIER_GRID)
         attribute[launch.numAttrs++] = early_attribute();
+#else
+    (void)early;
 #endif
     return launch;
 }
@@ -235,16 +237,16 @@ cudaError_t CUDA(active_clusters)(const struct sadmm_context *c, cuda_kernel ker
                                   const struct cuda_partition *partition, int *clusters)
 {
     cudaLaunchAttribute attributes[MOST_ATTRIBUTES];
-    const cudaLaunchConfig_t launch = configure(c, partition, attributes);
+    const cudaLaunchConfig_t launch = configure(c, partition, false, attributes);
     return cudaOccupancyMaxActiveClusters(clusters, (const void *)kernel, &launch);
 }
 
-sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel, const char *name,
-                                    const struct cuda_partition *partition, const cuda_args *args,
-                                    struct sadmm_error *error)
+static sadmm_status launch_configured(struct sadmm_context *c, cuda_kernel kernel, const char *name,
+                                      const struct cuda_partition *partition, bool early, const cuda_args *args,
+                                      struct sadmm_error *error)
 {
     cudaLaunchAttribute attributes[MOST_ATTRIBUTES];
-    const cudaLaunchConfig_t launch = configure(c, partition, attributes);
+    const cudaLaunchConfig_t launch = configure(c, partition, early, attributes);
     c->kernel = name;
 #ifdef SADMM_CUDA_EMULATED
     cudaError_t code = cuda_emulation_launch(&launch, kernel, c->view, *args);
@@ -262,13 +264,32 @@ sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const cha
     return CUDA(launch_of)(c, kernel, name, blocks, THREADS, args, error);
 }
 
-sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
-                             const cuda_args *args, struct sadmm_error *error)
+sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel, const char *name,
+                                    const struct cuda_partition *partition, const cuda_args *args,
+                                    struct sadmm_error *error)
+{
+    return launch_configured(c, kernel, name, partition, begins_early(c), args, error);
+}
+
+static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                  int threads, bool early, const cuda_args *args, struct sadmm_error *error)
 {
     struct cuda_partition plain = {};
     if (blocks <= 0) return SADMM_OK;
     plain.parts = (int32_t)blocks;
     plain.cluster = 1;
     plain.threads = threads;
-    return CUDA(launch_partition)(c, kernel, name, &plain, args, error);
+    return launch_configured(c, kernel, name, &plain, early, args, error);
+}
+
+sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                             const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, threads, all_begin_early(c), args, error);
+}
+
+sadmm_status CUDA(launch_early)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                int threads, const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, threads, begins_early(c), args, error);
 }

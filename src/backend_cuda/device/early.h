@@ -1,4 +1,5 @@
-/* Programmatic dependent launch: in a step's graph a kernel comes to its multiprocessors while the one before it ends.
+/* Programmatic dependent launch: in a step's graph a kernel comes to its multiprocessors while the one before it ends
+ * (device/context.h says which).
  *
  * Every kernel of the backend waits (wait_for_stream) before it reads anything that the kernel before it writes. What
  * that one does not write may be fetched earlier: the kernels before it have ended, since it has waited itself. It

@@ -120,7 +120,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
     cuda_args args = {};
     args.paper = !c->fast;
     args.under_iterated = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
-    return CUDA(launch_of)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
+    return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
 sadmm_status CUDA(enqueue_motions)(struct sadmm_context *c, struct sadmm_error *error)

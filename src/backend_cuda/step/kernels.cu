@@ -380,5 +380,5 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *er
     const int64_t joints = moved_last(c), bodies = c->view.step.limits || joints ? c->view.model.bodies : 0;
     args.most_bodies = (int32_t)((bodies + STEP_THREADS - 1) / STEP_THREADS);
     const int64_t blocks = args.most_bodies + (joints + STEP_THREADS - 1) / STEP_THREADS + 1;
-    return CUDA(launch_of)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
+    return CUDA(launch_early)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
 }

@@ -17,7 +17,7 @@ sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, int substep, struct sad
     const bool alone = s->careful > 0; /* each with candidates of its own */
     const struct sadmm_cuda_find find = {step_state(s->into, substep - 1, substeps),
                                          step_state(s->into, substep, substeps), alone ? 0 : substep,
-                                         alone ? 1 : substeps, begins_early(c)};
+                                         alone ? 1 : substeps, all_begin_early(c)};
     TRY(COLLISION(enqueue)(s->collision, c->stream, &find, error));
     return CUDA(launch_admit)(c, error);
 }

@@ -162,7 +162,7 @@ static sadmm_status launch_bodies(struct sadmm_context *c, cuda_kernel kernel, c
                                   struct sadmm_error *error)
 {
     const int64_t blocks = body_blocks(c->view.model.bodies);
-    return CUDA(launch_of)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
+    return CUDA(launch_early)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
 }
 
 /* fast: B, C and, for `factor`, H. first: of the solve; planned: compare with the plan. */

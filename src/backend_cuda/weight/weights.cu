@@ -144,8 +144,10 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *
     const bool scales = c->refreshes >= WEIGHT_FIRST_SCALE, rows = c->view.rows.count > 0;
     const cuda_kernel kernel = scales ? (rows ? terms_kernel<true, true> : terms_kernel<true, false>)
                                       : (rows ? terms_kernel<false, true> : terms_kernel<false, false>);
-    TRY(CUDA(launch_of)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args, error));
-    return CUDA(launch)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), &args, error);
+    TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
+                           error));
+    return CUDA(launch_early)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), THREADS, &args,
+                              error);
 }
 
 sadmm_status CUDA(enqueue_loads)(struct sadmm_context *c, struct sadmm_error *error)
