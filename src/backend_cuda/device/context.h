@@ -91,7 +91,6 @@ sadmm_status CUDA(reserve)(struct sadmm_context *, enum cuda_buffer_name name, s
 /* Are kernels launched early (early.h)? In recorded steps, but for cooperative launches: in small worlds all of them; in
  * others, where they are long, those from the islands on (launch_early, launch_partition). With all of them early
  * pile:100000 and pile:20000 took 1 to 2 % longer, with none 2 and 0.5. */
-enum { MOST_BODIES_ALL_EARLY = 16384 };
 static inline bool begins_early(const struct sadmm_context *c) { return c->early && c->recording; }
 static inline bool all_begin_early(const struct sadmm_context *c)
 {

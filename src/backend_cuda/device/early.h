@@ -7,6 +7,8 @@
 #ifndef SADMM_CUDA_DEVICE_EARLY_H
 #define SADMM_CUDA_DEVICE_EARLY_H
 
+#include <stdint.h>
+
 #include <cuda_runtime.h>
 
 #define EARLY_ARCH 900 /* of the first devices that do this */
@@ -26,6 +28,13 @@ static __device__ __forceinline__ void let_next_begin(void)
 #if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
     asm volatile("griddepcontrol.launch_dependents;");
 #endif
+}
+
+/* In small worlds. In others blocks come in waves, and those of the next kernel would take their room. */
+enum { MOST_BODIES_ALL_EARLY = 16384 };
+static __device__ __forceinline__ void let_next_begin(int32_t bodies)
+{
+    if (bodies <= MOST_BODIES_ALL_EARLY) let_next_begin();
 }
 
 #ifndef SADMM_CUDA_EMULATED

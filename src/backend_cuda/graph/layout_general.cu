@@ -21,7 +21,6 @@ static int64_t few_blocks_for(const struct layout_view *v, int64_t threads)
 static __global__ void clear_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
     wait_for_stream();
-    let_next_begin();
     if (v.live->abort_code) return;
     const int32_t i = thread_index();
     if (i == 0) {
@@ -50,7 +49,6 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
     records_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
     wait_for_stream();
-    let_next_begin();
     if (v.live->abort_code) return;
     const int32_t pairs = v.live->pairs, records = v.pair_capacity + v.rows;
     find_statistics(v, records, [&](int32_t record, cuda_graph_statistics *own) {
@@ -62,7 +60,6 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
     bodies_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
     wait_for_stream();
-    let_next_begin();
     if (v.live->abort_code) return;
     find_statistics(v, v.bodies,
                     [&](int32_t i, cuda_graph_statistics *own) { statistics_of_body<false>(v, i, args.islands, own); });
@@ -73,7 +70,6 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
 static __global__ void slots_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
     wait_for_stream();
-    let_next_begin();
     const int32_t s = thread_index();
     if (s < v.bodies && !v.live->abort_code) v.slot_of[v.body_of[s]] = s;
 }
@@ -81,7 +77,6 @@ static __global__ void slots_kernel(const __grid_constant__ layout_view v, const
 static __global__ void side_slots_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
     wait_for_stream();
-    let_next_begin();
     const int32_t h = thread_index();
     if (h >= 2 * (v.pair_capacity + v.rows) || v.live->abort_code) return;
     const int32_t body = v.side_body[h];
@@ -92,7 +87,6 @@ static __global__ void side_slots_kernel(const __grid_constant__ layout_view v, 
 static __global__ void offsets_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
     wait_for_stream();
-    let_next_begin();
     const int32_t s = thread_index();
     if (s > v.bodies || v.live->abort_code) return;
     int32_t first = 0, last = v.statistics->sides;
@@ -110,7 +104,6 @@ static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
     parts_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
     wait_for_stream();
-    let_next_begin();
     LAYOUT_SHARED(memory);
     if (!v.live->abort_code) make_parts(v, args.partition, ONE_BLOCK_THREADS, (int32_t *)memory);
 }
@@ -118,7 +111,6 @@ static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
 static __global__ void number_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
     wait_for_stream();
-    let_next_begin();
     const int32_t i = thread_index();
     if (i < v.bodies) v.label[i] = i;
 }

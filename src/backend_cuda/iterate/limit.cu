@@ -27,7 +27,6 @@ static __device__ __forceinline__ bool suspect(const body_view &bodies, const bo
     const bool speaks = t.live && t.lane == 0;
     const double free = speaks ? bodies.free_energy[t.body] : 0;
     wait_for_stream(); /* of all that, iterations change velocities alone */
-    let_next_begin();
     const double velocity = t.live && t.lane < 6 ? (double)bodies.state[t.body * ROW + (size_t)t.lane] : 0;
     return suspect_body(under_iterated, speaks, free, velocity, row.b, row.a);
 }
@@ -65,7 +64,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     motions_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_for_stream();
-    let_next_begin();
+    let_next_begin(v.model.bodies);
     if (!args.paper && !*v.islands.loose) return; /* paper does not ask */
     const body_thread t = body_of_thread(v.model, v.graph);
     find_motions(v, t, is_loose(v, t));
@@ -80,7 +79,7 @@ static __global__ void __launch_bounds__(BODY_THREADS, LIMIT_BLOCKS)
     const body_thread t = body_of_thread(v.model, v.graph); /* iterations do not change the layout */
     const int32_t label = t.live ? v.graph.label[t.body] : 0;
     wait_for_stream();
-    let_next_begin();
+    let_next_begin(v.model.bodies);
     const bool loose = v.islands.motions && t.live && !v.islands.info[label].held; /* neither waits for the other */
     const bool suspected = *v.islands.suspects != 0, held = t.live && suspected && !loose;
     if (__ballot_sync((unsigned)ALL_LANES, loose || held) == 0) return;
@@ -93,7 +92,7 @@ static __global__ void __launch_bounds__(BODY_THREADS, LIMIT_BLOCKS)
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     wait_for_stream();
-    let_next_begin();
+    let_next_begin(v.model.bodies);
     const int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     solver_real *state = v.bodies.state + (size_t)i * ROW, velocity[6];
@@ -105,7 +104,7 @@ static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __
 static __global__ void driven_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     wait_for_stream();
-    let_next_begin();
+    let_next_begin(v.model.bodies);
     const int32_t p = thread_index();
     if (p >= live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];

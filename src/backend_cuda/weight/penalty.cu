@@ -139,7 +139,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_for_stream();
-    let_next_begin();
+    let_next_begin(v.model.bodies);
     int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     double ratio = args.factor;

@@ -22,7 +22,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     pairs_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     wait_for_stream();
-    let_next_begin();
+    let_next_begin(v.model.bodies);
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), p = t / v.contacts.lanes,
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);
@@ -48,7 +48,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     terms_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_for_stream();
-    let_next_begin();
+    let_next_begin(v.model.bodies);
     const body_thread t = body_of_thread(v.model, v.graph);
     double total[TERMS];
     const double term =
@@ -66,7 +66,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 static __global__ void respond_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     wait_for_stream();
-    let_next_begin();
+    let_next_begin(v.model.bodies);
     const int32_t slot = thread_index(), k = slot / SADMM_MAX_ROWS, r = slot % SADMM_MAX_ROWS;
     if (k >= live_rows(v.model, v.rows) || r >= v.rows.constraints[k].rows) return;
     const int32_t joined[2] = {v.rows.constraints[k].body_a, v.rows.constraints[k].body_b};
@@ -98,7 +98,7 @@ static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, co
     const int32_t label =
         about.rows > 0 ? v.graph.label[is_dynamic(v.model, about.body_a) ? about.body_a : about.body_b] : 0;
     wait_for_stream();
-    let_next_begin();
+    let_next_begin(v.model.bodies);
     if (about.rows == 0) return; /* a joint may have fewer than there is room for */
     cuda_island *island = &v.islands.info[label];
     if (args.start) island->rows = island->held = 1; /* left alone */
