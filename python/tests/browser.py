@@ -3,6 +3,7 @@ import base64
 import json
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
@@ -27,7 +28,8 @@ class Page:
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self._process = subprocess.Popen(
             [PATH, *FLAGS, f"--window-size={width},{height}", f"--user-data-dir={self._folder.name}", "about:blank"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ, "HOME": self._folder.name})
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ, "HOME": self._folder.name},
+            start_new_session=True)
         self.errors, self._number = [], 0
         try:
             self._socket = connect(self._address(), max_size=None)
@@ -56,13 +58,21 @@ class Page:
             time.sleep(0.05)
         raise TimeoutError("the browser did not start within 30 s")
 
+    def _end(self, how):
+        try:
+            os.killpg(self._process.pid, how)
+        except ProcessLookupError:
+            pass
+
     def close(self):
-        self._process.terminate()
+        """The browser with all of its processes: Debian's command is a script that starts it."""
+        self._end(signal.SIGTERM)
         try:
             self._process.wait(10)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+            pass
+        self._end(signal.SIGKILL)
+        self._process.wait()
         self._folder.cleanup()
 
     def __enter__(self):
