@@ -1,7 +1,7 @@
 /* Programmatic dependent launch: in a step's graph a kernel comes to its multiprocessors while the one before it ends
  * (device/context.h says which).
  *
- * Every kernel of the backend waits (wait_for_stream) before it reads anything that the kernel before it writes. What
+ * Every kernel of the graph waits (wait_for_stream) before it reads anything that the kernel before it writes. What
  * that one does not write may be fetched earlier: the kernels before it have ended, since it has waited itself. It
  * waits in any case, also where it has nothing to do: the kernel after it waits for this one alone. */
 #ifndef SADMM_CUDA_DEVICE_EARLY_H
