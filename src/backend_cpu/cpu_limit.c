@@ -57,7 +57,7 @@ static void add_pair(const struct sadmm_context *c, size_t record, struct limit_
 }
 
 /* Sums over islands in the order of bodies, whatever the threads. */
-static bool any_suspect(struct sadmm_context *c, bool under_iterated)
+static bool any_suspect(struct sadmm_context *c, bool bounces)
 {
     bool any = false;
     for (int32_t i = 0; i < c->bodies; ++i) {
@@ -84,7 +84,7 @@ static bool any_suspect(struct sadmm_context *c, bool under_iterated)
         if (c->label[i] != i || island->rows || island->limit.driven) continue;
         if (limit_is_rounding(&island->limit, (double)SADMM_EPSILON)) continue;
         any = any || limit_suspects(island->limit.now, island->limit.free) ||
-              (under_iterated &&
+              (bounces &&
                limit_bounces(island->limit.now, island->limit.free, island->along, (double)SADMM_EPSILON));
     }
     return any;
@@ -95,9 +95,8 @@ static void add_impulses(struct sadmm_context *c)
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct limit_energies *sum = &c->islands[c->label[i]].limit;
         const double *terms = &c->body_sums[BODY_SUMS * i];
-        sum->momentum_residual += terms[0];
-        sum->drive += terms[1];
-        sum->response += terms[2];
+        sum->drive += terms[0];
+        sum->response += terms[1];
     }
     for (size_t r = 0; r < c->pair_block_count * (size_t)LANES; ++r) {
         if (c->pair_blocks[r / (size_t)LANES].pair[r % (size_t)LANES] < 0) continue;
@@ -114,22 +113,17 @@ static void energies_share(void *context, int thread, int threads)
     for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[BODY_SUMS * i]);
 }
 
-/* A body's terms: of the momentum residual; in loose islands of drive and response. `wrenches` hold J^T lambda. */
-static void impulse_terms(const struct sadmm_context *c, size_t i, double terms[3])
+/* A body's terms: of drive and response. `wrenches` hold J^T lambda. */
+static void impulse_terms(const struct sadmm_context *c, size_t i, double terms[2])
 {
     double b[6], g[6], change[6];
     row8d sum = {0};
-    terms[0] = terms[1] = terms[2] = 0;
-    if (c->loose_of[c->label[i]] < 0) {
-        terms[0] = cpu_residual_energy(c, i) / 2;
-        return;
-    }
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) sum += cpu_wrench(c, c->incident[at]);
     for (int k = 0; k < 6; ++k) g[k] = sum[k];
     cpu_load_b(c, i, b);
     rigid_product(&c->A_inverse[i * PACKED6], g, change);
-    terms[1] = -dense6_dot(change, b);
-    terms[2] = dense6_dot(change, g);
+    terms[0] = -dense6_dot(change, b);
+    terms[1] = dense6_dot(change, g);
 }
 
 static void impulses_share(void *context, int thread, int threads)
@@ -141,12 +135,12 @@ static void impulses_share(void *context, int thread, int threads)
 }
 
 /* By what the island of body i is slowed down. */
-static double factor_of(const struct sadmm_context *c, int32_t i, bool under_iterated)
+static double factor_of(const struct sadmm_context *c, int32_t i, bool bounces)
 {
     const struct cpu_island *island = &c->islands[c->label[i]];
     if (island->rows) return 1; /* the energies are those of contacts alone */
     const double factor = limit_factor(&island->limit, (double)SADMM_EPSILON);
-    if (!under_iterated) return factor;
+    if (!bounces) return factor;
     return min_of(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
 }
 
@@ -169,14 +163,14 @@ static void prepare_paper(struct sadmm_context *c)
 
 static void limit_energies(struct sadmm_context *c, int32_t *limited)
 {
-    const bool under_iterated = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
+    const bool bounces = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
     cpu_parallel(c, energies_share, c);
-    if (!any_suspect(c, under_iterated)) return;
+    if (!any_suspect(c, bounces)) return;
     CPU(sum_wrenches)(c);
     cpu_parallel(c, impulses_share, c);
     add_impulses(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
-        const double factor = factor_of(c, i, under_iterated);
+        const double factor = factor_of(c, i, bounces);
         const int32_t loose = c->loose_of[c->label[i]];
         if (factor == 1) continue;
         *limited += c->label[i] == i;

@@ -18,7 +18,6 @@ static double inverse_form(const struct ref_body *body, const double x[6], const
 
 static void add_up_energies(struct sadmm_context *c)
 {
-    sadmm_ref_momentum_residual(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         memset(&c->bodies[i].limit, 0, sizeof c->bodies[i].limit);
         c->bodies[i].along = 0;
@@ -30,7 +29,6 @@ static void add_up_energies(struct sadmm_context *c)
         dense6_mul(body->A, body->v, momentum);
         sum->now += dense6_dot(momentum, body->v) / 2;
         sum->free += inverse_form(body, body->b, body->b) / 2;
-        sum->momentum_residual += inverse_form(body, body->impulse, body->impulse) / 2;
         c->bodies[body->label].along += dense6_dot(body->v, body->b) / 2;
     }
     sadmm_ref_sum_impulses(c);
@@ -55,13 +53,13 @@ static void add_up_energies(struct sadmm_context *c)
 }
 
 /* By what an island is slowed down. */
-static double factor_of(struct ref_body *island, bool under_iterated)
+static double factor_of(struct ref_body *island, bool bounces)
 {
     const struct momentum_energies rigid = momentum_energies_of(&island->motions);
     if (island->rows) return 1; /* the energies are those of contacts alone */
     if (island->loose) limit_take_rigid(&island->limit, &island->along, &rigid);
     double factor = limit_factor(&island->limit, DBL_EPSILON);
-    if (under_iterated) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
+    if (bounces) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
     return factor;
 }
 
@@ -80,7 +78,7 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
 {
     (void)error;
     const bool fast = c->settings->method == SADMM_METHOD_FAST;
-    const bool under_iterated = limit_under_iterated(c->plan->warm, c->settings->iterations);
+    const bool bounces = fast && limit_under_iterated(c->plan->warm, c->settings->iterations);
     *limited = 0;
     if (!fast) name_islands(c);
     sadmm_ref_find_motions(c);
@@ -88,7 +86,7 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
         if (island->label != i) continue;
-        const double factor = factor_of(island, fast && under_iterated);
+        const double factor = factor_of(island, bounces);
         island->slow_down = fast ? factor : 1;
         *limited += factor < 1;
     }

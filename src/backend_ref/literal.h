@@ -15,6 +15,7 @@
 #include "core/solve/kernels.h"
 #include "core/math/lead.h"
 #include "core/math/limit.h"
+#include "core/math/weight.h"
 
 /* One side of a constraint: the paper's subscript (i,k) or (j,k). */
 struct ref_side {

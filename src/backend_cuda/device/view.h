@@ -393,7 +393,7 @@ struct cuda_args {
     int32_t checks;      /* fast: of the stop rule, in this step so far */
     int32_t begin;      /* fast, BLOCK: weights, C and factors first */
     int32_t limit;      /* fast: of energies; enum cuda_limit */
-    int32_t under_iterated;   /* fast: and those that bounce (math/limit.h) */
+    int32_t bounces;    /* fast: and of islands that bounce (math/limit.h) */
     int32_t paper;      /* the method: energies are compared, nothing is slowed down */
     int32_t relax;      /* fast, STREAM: bits of enum cuda_relax */
     double factor;

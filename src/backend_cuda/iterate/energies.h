@@ -33,11 +33,10 @@ static __device__ __forceinline__ void add_contacts(const contact_view &contacts
     for (int j = 0; j < 3; ++j) sums[j] += sign * force[j];
 }
 
-/* Terms of a body, one a lane: energy of v, of A^-1 b, of r = b + g - A v, g = J^T lambda; work; v . b / 2. `loose`, of
- * an island that is not held: the third is the drive, and there is the response. A pair counts at its first dynamic
- * body. Of bodies that are `on`. Every lane of the warp comes here. */
+/* Terms of a body, one a lane: energy of v, of A^-1 b; drive; work; v . b / 2; response. A pair counts at its first
+ * dynamic body. Of bodies that are `on`. Every lane of the warp comes here. */
 template <bool RIGID>
-static __device__ __forceinline__ double energies_of_body(const cuda_view &v, const body_thread &t, bool loose, bool on)
+static __device__ __forceinline__ double energies_of_body(const cuda_view &v, const body_thread &t, bool on)
 {
     double sums[SIDE_SUMS] = {}, term[TERMS] = {};
     for (int32_t at = t.begin + t.lane; on && at < t.end; at += LANES) {
@@ -56,29 +55,34 @@ static __device__ __forceinline__ double energies_of_body(const cuda_view &v, co
     const double momentum = product(row.velocity, row.a), g = own_number(sums, t.lane);
     term[0] = dot_lanes(row.velocity, momentum) / 2;
     term[1] = t.live ? v.bodies.free_energy[t.body] : 0;
-    const double impulse = loose ? g : row.b + g - momentum, change = product(impulse, row.a_inverse),
-                 form = dot_lanes(impulse, change), along = dot_lanes(change, row.b);
-    term[2] = loose ? sums[DRIVE] - along : form / 2;
-    term[5] = loose ? form : 0;
+    const double change = product(g, row.a_inverse);
+    term[2] = sums[DRIVE] - dot_lanes(change, row.b);
+    term[5] = dot_lanes(g, change);
     term[3] = sums[WORK];
     term[4] = dot_lanes(row.velocity, row.b) / 2;
     return own_number(term, t.lane);
 }
 
+/* From its terms. */
+static __device__ __forceinline__ struct limit_energies energies_of(const double term[TERMS])
+{
+    const struct limit_energies energies = {term[0], term[1], term[3], term[2], term[5], 0, 0};
+    return energies;
+}
+
 /* By what an island is slowed down. */
-static __device__ __forceinline__ double factor_of(const struct limit_energies &energies, double along,
-                                                   bool under_iterated)
+static __device__ __forceinline__ double factor_of(const struct limit_energies &energies, double along, bool bounces)
 {
     const double allowed = limit_factor(&energies, SOLVER_EPSILON);
-    return under_iterated ? fmin(allowed, limit_bounce_factor(&energies, along, SOLVER_EPSILON)) : allowed;
+    return bounces ? fmin(allowed, limit_bounce_factor(&energies, along, SOLVER_EPSILON)) : allowed;
 }
 
 /* What follows from their sums over an island that is held; !slows: it is counted, no more. One thread of it. */
 static __device__ __forceinline__ void limit_island(const island_view &islands, cuda_island *island,
-                                                    const double sum[TERMS], bool under_iterated, bool slows)
+                                                    const double sum[TERMS], bool bounces, bool slows)
 {
-    const struct limit_energies energies = {sum[0], sum[1], sum[2], sum[3], 0, 0, 0, 0, 0};
-    const double factor = factor_of(energies, sum[4], under_iterated);
+    const struct limit_energies energies = energies_of(sum);
+    const double factor = factor_of(energies, sum[4], bounces);
     if (island->rows) return; /* the energies are those of contacts alone; slow_down stays 1 */
     island->slow_down = slows ? factor : 1;
     if (factor != 1) atomicAdd(islands.limited, 1);

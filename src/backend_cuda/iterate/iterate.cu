@@ -23,7 +23,7 @@ static sadmm_status persistent_iterations(struct sadmm_context *c, int count, en
     args.settled = c->settled;
     args.goes_on = goes_on;
     args.limit = limit;
-    args.under_iterated = limit_under_iterated(c->plan.warm, c->settings.iterations);
+    args.bounces = limit_under_iterated(c->plan.warm, c->settings.iterations);
     args.checks = c->checks;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;

@@ -21,34 +21,32 @@
 #include "core/math/relax.h"
 
 template <bool RIGID>
-static __device__ __forceinline__ bool suspect(const body_view &bodies, const body_thread &t, bool under_iterated)
+static __device__ __forceinline__ bool suspect(const body_view &bodies, const body_thread &t, bool bounces)
 {
     const wide_row<RIGID> row = row_of_body<RIGID>(bodies, t);
     const bool speaks = t.live && t.lane == 0;
     const double free = speaks ? bodies.free_energy[t.body] : 0;
     wait_for_stream(); /* of all that, iterations change velocities alone */
     const double velocity = t.live && t.lane < 6 ? (double)bodies.state[t.body * ROW + (size_t)t.lane] : 0;
-    return suspect_body(under_iterated, speaks, free, velocity, row.b, row.a);
+    return suspect_body(bounces, speaks, free, velocity, row.b, row.a);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
     suspect_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const body_thread t = body_of_thread(v.model, v.graph);
-    if (v.bodies.rigid ? suspect<true>(v.bodies, t, args.under_iterated)
-                       : suspect<false>(v.bodies, t, args.under_iterated))
+    if (v.bodies.rigid ? suspect<true>(v.bodies, t, args.bounces) : suspect<false>(v.bodies, t, args.bounces))
         *v.islands.suspects = 1;
 }
 
 /* Worlds have rigid bodies; the others are of problems. By itself: the kernel comes by the other one, too. */
 static __device__ __noinline__ double general_energies(const cuda_view &v, const body_thread &t, bool on)
 {
-    return energies_of_body<false>(v, t, false, on);
+    return energies_of_body<false>(v, t, on);
 }
-static __device__ __forceinline__ double energies_in_lanes(const cuda_view &v, const body_thread &t, bool loose,
-                                                           bool on)
+static __device__ __forceinline__ double energies_in_lanes(const cuda_view &v, const body_thread &t, bool on)
 {
-    return v.bodies.rigid ? energies_of_body<true>(v, t, loose, on) : general_energies(v, t, on);
+    return v.bodies.rigid ? energies_of_body<true>(v, t, on) : general_energies(v, t, on);
 }
 
 /* Islands of bodies that are `on`, which are held. Every lane of the warp comes here. */
@@ -57,7 +55,7 @@ static __device__ __forceinline__ void limit_held(const cuda_view &v, const cuda
 {
     double total[TERMS];
     if (add_up_island<add_terms>(v.graph, v.islands, t, on, term, total) && t.lane == 0)
-        limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.under_iterated, !args.paper);
+        limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.bounces, !args.paper);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
@@ -84,9 +82,9 @@ static __global__ void __launch_bounds__(BODY_THREADS, LIMIT_BLOCKS)
     const bool suspected = *v.islands.suspects != 0, held = t.live && suspected && !loose;
     if (__ballot_sync((unsigned)ALL_LANES, loose || held) == 0) return;
     const bool energies = suspected || !args.paper;
-    const double term = energies ? energies_in_lanes(v, t, loose, loose || held) : 0;
+    const double term = energies ? energies_in_lanes(v, t, loose || held) : 0;
     if (suspected) limit_held(v, args, t, held, term);
-    if (v.islands.motions) restore_islands(v, t, loose, energies, term, args.under_iterated, !args.paper);
+    if (v.islands.motions) restore_islands(v, t, loose, energies, term, args.bounces, !args.paper);
 }
 
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -118,7 +116,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
 {
     cuda_args args = {};
     args.paper = !c->fast;
-    args.under_iterated = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
+    args.bounces = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
     return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 

@@ -155,15 +155,15 @@ static __device__ __forceinline__ void take_motions(const double *known, struct 
  * none), the island's factor (!slows: 1). motions: with the momentum along them. One thread of it. */
 static __device__ __forceinline__ void restore_island(const island_view &islands, cuda_island *island,
                                                       const struct momentum_motions &motions, const double *term,
-                                                      bool under_iterated, bool slows, double *place)
+                                                      bool bounces, bool slows, double *place)
 {
     double factor = 1;
     if (term && !island->rows) {
         const struct momentum_energies rigid = momentum_energies_of(&motions);
-        struct limit_energies energies = {term[0], term[1], 0, term[3], 1, term[2], term[5], 0, 0};
+        struct limit_energies energies = energies_of(term);
         double along = term[4];
         limit_take_rigid(&energies, &along, &rigid);
-        factor = factor_of(energies, along, under_iterated);
+        factor = factor_of(energies, along, bounces);
         if (factor != 1) atomicAdd(islands.limited, 1);
         if (!slows) factor = 1;
     }
@@ -200,7 +200,7 @@ static __device__ __forceinline__ void find_motions(const cuda_view &v, const bo
 /* Restores the momentum of the islands of bodies that are `on`, whole ones, along these motions. `energies`: `term` are
  * the lanes' terms of them. Every lane of the warp comes here. */
 static __device__ __forceinline__ void restore_islands(const cuda_view &v, const body_thread &t, bool on, bool energies,
-                                                       double term, bool under_iterated, bool slows)
+                                                       double term, bool bounces, bool slows)
 {
     if (__ballot_sync((unsigned)ALL_LANES, on) == 0) return;
     if (on && energies && t.lane < TERMS) motion_place(v, t.slot)[MOTION_ENERGIES + t.lane] = term;
@@ -212,7 +212,7 @@ static __device__ __forceinline__ void restore_islands(const cuda_view &v, const
     take_motions(place + MOTION_KNOWN, &motions);
     momentum_measure(&motions, place);
     restore_island(v.islands, &v.islands.info[label], motions, energies ? place + MOTION_ENERGIES : nullptr,
-                   under_iterated, slows, place);
+                   bounces, slows, place);
 }
 
 #endif

@@ -128,7 +128,7 @@ static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v,
         if (suspected) block.flags[FLAG_SUSPECTED] = 1;
         block_barrier<SIZE>();
         if (block.flags[FLAG_SUSPECTED] || block.flags[FLAG_LOOSE])
-            limit_in_block(v, args.under_iterated, block, [] { block_barrier<SIZE>(); });
+            limit_in_block(v, args.bounces, block, [] { block_barrier<SIZE>(); });
     }
 }
 

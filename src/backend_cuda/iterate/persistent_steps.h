@@ -157,7 +157,7 @@ PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
             else if (live && r < 6) a[k] = (double)line_a(m.lines + at * LINE_GENERAL, true, r, r / 3 * 3 + k);
         }
         const double velocity = live && r < 6 ? (double)state(odd)[i * ROW + r] : 0;
-        any = suspect_body(args.under_iterated, speaks, free, velocity, b, a) || any;
+        any = suspect_body(args.bounces, speaks, free, velocity, b, a) || any;
     }
     return any;
 }

@@ -104,16 +104,16 @@ static __device__ __forceinline__ void add_up_momentum(const cuda_view &v, const
 
 /* The motions of an island and what they restore, from its sums, momentum included. One thread of it. */
 static __device__ __noinline__ void find_motion(const island_view &islands, cuda_island *island, double *place,
-                                                const double *term, bool under_iterated, bool slows)
+                                                const double *term, bool bounces, bool slows)
 {
     struct momentum_motions motions;
     momentum_find_motions((struct momentum_sums *)(place + MOTION_KNOWN), &motions);
-    restore_island(islands, island, motions, term, under_iterated, slows, place);
+    restore_island(islands, island, motions, term, bounces, slows, place);
 }
 
 /* The limit of energies, where some body of the part was suspected, and the momentum of islands that are not held. */
 template <class Barrier>
-static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool under_iterated, const block_part &part,
+static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool bounces, const block_part &part,
                                                    Barrier barrier)
 {
     const body_thread own = body_of_slot(v.graph, part.first_body + (int32_t)threadIdx.x / LANES,
@@ -121,7 +121,7 @@ static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool unde
     const bool suspected = part.flags[FLAG_SUSPECTED] != 0;
     store_terms(v.graph, part, own, [&](const body_thread &t) {
         const bool loose = is_loose(v, t), on = suspected || loose;
-        return __ballot_sync((unsigned)ALL_LANES, on) != 0 ? energies_of_body<true>(v, t, loose, on) : 0;
+        return __ballot_sync((unsigned)ALL_LANES, on) != 0 ? energies_of_body<true>(v, t, on) : 0;
     });
     if (part.flags[FLAG_LOOSE]) add_up_momentum(v, part, own, barrier);
     add_up_in_block<add_terms>(part.bodies, part.range, part.terms, barrier);
@@ -129,8 +129,8 @@ static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool unde
         if (!t.live || t.lane > 0 || i != part.range[i].first) return;
         cuda_island *island = &v.islands.info[v.graph.label[t.body]];
         const double *energies = part.terms + i * TERMS;
-        if (!island->held) find_motion(v.islands, island, motion_place(v, t.slot), energies, under_iterated, true);
-        else if (suspected) limit_island(v.islands, island, energies, under_iterated, true);
+        if (!island->held) find_motion(v.islands, island, motion_place(v, t.slot), energies, bounces, true);
+        else if (suspected) limit_island(v.islands, island, energies, bounces, true);
     });
 }
 

@@ -6,16 +6,16 @@
 
 #include "core/math/limit.h"
 
-/* Has a body more energy than its free motion, `free`, or, for `under_iterated` iterations, does it bounce? `velocity`,
- * `b` and `a`: the lane's components and row of A (three numbers of it for rigid bodies). `speaks`: one lane of each
- * body, the others say no. Every lane of the warp comes here. */
+/* Has a body more energy than its free motion, `free`, or, where `bounces` count, does it bounce? `velocity`, `b` and `a`:
+ * the lane's components and row of A (three numbers of it for rigid bodies). `speaks`: one lane of each body, the others
+ * say no. Every lane of the warp comes here. */
 template <int SIZE>
-static __device__ __forceinline__ bool suspect_body(bool under_iterated, bool speaks, double free, double velocity,
+static __device__ __forceinline__ bool suspect_body(bool bounces, bool speaks, double free, double velocity,
                                                     double b, const double (&a)[SIZE])
 {
     const double now = dot_lanes(velocity, product(velocity, a)) / 2,
-                 along = under_iterated ? dot_lanes(velocity, b) / 2 : 0;
-    return speaks && (limit_suspects(now, free) || (under_iterated && limit_bounces(now, free, along, SOLVER_EPSILON)));
+                 along = bounces ? dot_lanes(velocity, b) / 2 : 0;
+    return speaks && (limit_suspects(now, free) || (bounces && limit_bounces(now, free, along, SOLVER_EPSILON)));
 }
 
 /* Where a body is from the one that names its island. */

@@ -2,8 +2,12 @@
  *
  * Contacts take energy out of the free motion v_f = A^-1 b, but for the work W = sum max(0, -e) lambda_n of those that
  * push overlapping bodies apart. An iteration that is cut short need not: then the island is slowed down to what is
- * allowed. W is believed only where the momentum A v - b - J^T lambda is balanced to 3 % (R: its energy, by A^-1). A
- * solution stays as it is.
+ * allowed. Its impulses may be far too large, and W with them, so W counts as far as they can do it: by the share of
+ * lambda that solves the dual problem best,
+ *
+ *     s = min(1, drive / response),    drive = -lambda . (J v_f + e),   response = lambda . J A^-1 J^T lambda
+ *
+ * the energy of A^-1 (b + s J^T lambda) is at most that of v_f and s W. A solution stays as it is.
  *
  * That much energy lets bodies bounce: impulses of a landing, taken over into the next step, need iterations to go down
  * again. In a solution they cannot. From A (v - v_f) = J^T lambda and lambda . x <= -e lambda_n (friction takes
@@ -12,31 +16,21 @@
  *     v . A (v - v_f) <= W
  *
  * so that v ends on or in the sphere that has 0 and v_f at opposite ends, but for W. Few iterations in a step that
- * starts warm are held to that, too. Here W need not be believed: what too large a W allows is limited by the above.
+ * starts warm are held to that, too, with all of W: what too large a W allows is limited by the above.
  *
  * What contacts cannot change is left alone. Of a loose island, which may move in ways no static contact feels
- * (math/momentum.h), energies are those of the rest of v and v_f, and the rest alone is slowed down. In free fall v_f
- * has no rest: bodies that overlap would hang together for good, were W believed in the end alone. It counts as far as
- * the impulses can do it: they may be far too large, and most of them take energy. By the share of lambda that solves
- * the dual problem best,
- *
- *     s = min(1, drive / response),    drive = -lambda . (J v_f + e),   response = lambda . J A^-1 J^T lambda
- *
- * the energy of A^-1 (b + s J^T lambda) is at most that of v_f and s (W - drive / 2). */
+ * (math/momentum.h), energies are those of the rest of v and v_f, and the rest alone is slowed down. */
 #ifndef SADMM_MATH_LIMIT_H
 #define SADMM_MATH_LIMIT_H
 
+#include "max.h"
 #include "momentum.h"
-#include "weight.h"
 
 /* Rounding of energies in single precision, some hundred times over. */
 #define LIMIT_ROUNDING 1e-5
-#define LIMIT_BALANCED 1e-3
 
 struct limit_energies {
-    double now, free, momentum_residual, work; /* of v, of v_f, R, W; J */
-    /* Of islands that are loose: that no pair is known to hold. */
-    int loose;
+    double now, free, work; /* of v, of v_f, W; J */
     double drive, response;
     double rigid; /* of the motions that are left alone, which are not in the others */
     int driven;   /* something that is none of its bodies pushes it, by as much as it takes: it is left alone */
@@ -57,16 +51,14 @@ SADMM_INLINE void limit_take_rigid(struct limit_energies *e, double *along, cons
     e->now -= rigid->now;
     e->free = max_of(e->free - rigid->free, 0.0);
     e->rigid = rigid->free;
-    e->loose = 1;
     *along -= rigid->along;
 }
 
 /* What of W counts. */
 SADMM_INLINE double limit_work(const struct limit_energies *e)
 {
-    if (!e->loose) return e->momentum_residual <= LIMIT_BALANCED * (e->now + e->free) ? e->work : 0;
     const double share = e->drive >= e->response ? 1 : e->drive > 0 ? e->drive / e->response : 0;
-    return max_of(share * (e->work - e->drive / 2), 0.0);
+    return share * e->work;
 }
 
 /* The factor for the island's velocities, 1: none. */
@@ -85,7 +77,8 @@ SADMM_INLINE double limit_factor(const struct limit_energies *e, double epsilon)
 #define LIMIT_LEAST          0.25
 
 /* Is the island checked for bounces? */
-SADMM_INLINE int limit_under_iterated(int warm, int iterations) { return warm && iterations < WEIGHT_UNDER_ITERATED; }
+#define LIMIT_UNDER_ITERATED 60
+SADMM_INLINE int limit_under_iterated(int warm, int iterations) { return warm && iterations < LIMIT_UNDER_ITERATED; }
 
 /* `along`: v . A v_f / 2, J. */
 SADMM_INLINE int limit_bounces(double now, double free, double along, double epsilon)
