@@ -70,7 +70,7 @@ SADMM_INLINE uint32_t contact_memory(const struct sadmm_contact_pair *old, const
 SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_impulse[3], const double normal[3],
                                 double friction, double ratio, double out[3])
 {
-    double turned = 0, along = 0, back = 0, size = 0, slides, scale, t[3], impulse[3];
+    double turned = 0, along = 0, back = 0, size2 = 0, scale = 1, most, t[3], impulse[3];
     bool carries;
     int k;
     for (k = 0; k < 3; ++k) {
@@ -78,7 +78,7 @@ SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_imp
         turned += old_normal[k] * normal[k];
         along += old_normal[k] * impulse[k];
     }
-    /* No branches: which points press, and which of them slide, has no order that a processor could foresee. */
+    /* No branch: which points press has no order that a processor could foresee. */
     carries = !((turned <= 0) | (along <= 0));
     for (k = 0; k < 3; ++k) {
         t[k] = impulse[k] - along * old_normal[k];
@@ -86,11 +86,14 @@ SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_imp
     }
     for (k = 0; k < 3; ++k) {
         t[k] -= back * normal[k];
-        size += t[k] * t[k];
+        size2 += t[k] * t[k];
     }
-    size = sqrt(size);
-    slides = friction * along / size;
-    scale = slides < 1 ? slides : 1;
+    /* Most points stick, and what would be rounded to the disc's edge is left to the quotient: no root for them. */
+    most = friction * along;
+    if (carries && !(most * most > (1 + 16 * DBL_EPSILON) * size2)) {
+        const double slides = most / sqrt(size2);
+        scale = slides < 1 ? slides : 1;
+    }
     for (k = 0; k < 3; ++k) out[k] = carries ? along * normal[k] + scale * t[k] : out[k];
 }
 
