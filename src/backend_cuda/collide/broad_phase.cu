@@ -43,8 +43,7 @@ struct grid_sample {
  * block; a thread takes an axis of the body of its share of the slots and finds the rank by comparing with all. */
 static __global__ void __launch_bounds__(3 * GRID_SAMPLES) grid_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     COLLISION_SHARED(grid_sample, shared);
     const int t = (int)threadIdx.x % GRID_SAMPLES, axis = (int)threadIdx.x / GRID_SAMPLES;
     const int32_t slot = (int32_t)((int64_t)v.body_count * t / GRID_SAMPLES);
@@ -137,8 +136,7 @@ enum place_for { PLACE_ONE, PLACE_FIRST, PLACE_AGAIN };
 template <int FOR>
 static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     const int64_t i = collision_thread(PLACE_THREADS);
     const bool stops = aborted(v), is_there = i < v.leaf_count + v.plane_count;
     const struct collision_step step = step_of(v);
@@ -148,7 +146,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     if (i == 0) v.candidate_count[COUNT_LISTED] = 0;
     if (!is_there) return;
     const struct sadmm_shape &shape = v.shapes[slot];
-    const struct sadmm_collision_body &body = v.bodies[shape.body];
+    const struct sadmm_collision_body body = load_wide(&v.bodies[shape.body]);
     const bool moves = body.system_body >= 0;
     struct sadmm_proxy proxy;
     struct collision_leaf leaf;
@@ -156,10 +154,10 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     const struct proxy_turn turn = proxy_turn_of(&shape, &body, step.dt);
     proxy_place(&shape, &v.geometries[shape.geometry], &body, &turn, step.dt, step.margin, step.gravity, &proxy,
                 &leaf.box);
-    v.proxies[slot] = proxy;
+    store_wide(proxy, &v.proxies[slot]);
     if (FOR == PLACE_AGAIN) {
         if (i >= v.leaf_count) return;
-        v.boxes[slot] = leaf.box;
+        store_wide(leaf.box, &v.boxes[slot]);
         if (sadmm_body_moves(body.system_body) && !is_within(v.reaches[slot], proxy, leaf.box, step.dt, v.substep))
             *v.abort_code = ABORT_REACH;
         return;
@@ -172,7 +170,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     }
 
     if (FOR == PLACE_FIRST) {
-        v.boxes[slot] = leaf.box;
+        store_wide(leaf.box, &v.boxes[slot]);
         leaf.box = make_reach(v, proxy, leaf.box, step.dt, &v.reaches[slot]);
     }
     for (int k = 0; k < 3; ++k) leaf.velocity[k] = proxy.velocity[k];
@@ -213,8 +211,7 @@ static __device__ __forceinline__ int32_t node_after(const collision_view &v, in
 
 static __global__ void __launch_bounds__(TREE_THREADS) build_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     const int64_t thread = collision_thread(TREE_THREADS);
     if (thread >= v.leaf_count) return;
     const int32_t i = (int32_t)thread, first_leaf = v.leaf_count - 1;
@@ -274,8 +271,7 @@ static __device__ __forceinline__ refit_links links_of(const collision_view &v, 
  * the order. A node's right child is the node after its left one. */
 static __global__ void __launch_bounds__(TREE_THREADS) refit_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     const int64_t thread = collision_thread(TREE_THREADS);
     if (thread >= v.leaf_count) return;
     int32_t from = v.leaf_count - 1 + (int32_t)thread, at = v.parents[from];
@@ -308,8 +304,7 @@ static __global__ void __launch_bounds__(TREE_THREADS) refit_kernel(const __grid
 /* What a radix sort of the whole capacity needs. */
 static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     const int64_t i = collision_thread(COLLISION_THREADS);
     if (i < v.candidate_capacity) v.found[i] = ~UINT64_C(0);
 }
@@ -463,8 +458,7 @@ static __device__ void walk(const collision_view &v, int32_t i, struct walk_leav
 
 static __global__ void __launch_bounds__(TREE_THREADS) walk_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     COLLISION_SHARED(walk_leaves, shared);
     const int64_t thread = collision_thread(TREE_THREADS);
     struct batch out;
@@ -536,8 +530,7 @@ static __device__ __forceinline__ void write_hits(const collision_view &v, const
 template <int ROWS, int COLUMNS>
 static __global__ void __launch_bounds__(ROWS) tiles_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     COLLISION_SHARED(tile<COLUMNS>, shared);
     const int32_t t = (int32_t)threadIdx.x, columns = tile_columns(v.leaf_count, COLUMNS);
     const int32_t row = (int32_t)blockIdx.x / columns, column = (int32_t)blockIdx.x % columns - 1;

@@ -58,7 +58,7 @@ static __device__ __forceinline__ emit_in_place emit_source_of(const collision_v
     head.ahead = m.ahead;
     head.cache = m.cache;
     head.count = m.count;
-    return {v.proxies[start.own.a], v.proxies[start.own.b], {point.position, point.separation, m.features[lane]},
+    return {*proxy_at(v, start.own.a), *proxy_at(v, start.own.b), {point.position, point.separation, m.features[lane]},
             v.before.pairs[start.match >= 0 ? start.match : 0], head};
 }
 
@@ -96,8 +96,7 @@ enum { EMIT_BLOCKS = 4 };
 static __global__ void __launch_bounds__(COLLISION_THREADS, EMIT_BLOCKS)
 emit_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
     const int32_t lane = (int32_t)(thread % POINT_LANES), found = usable_candidates(v);
     const step_lengths dt = lengths_of(v);
@@ -129,8 +128,7 @@ struct emit_sums {
 static __global__ void __launch_bounds__(EMIT_CANDIDATES *POINT_LANES)
 emit_few_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     COLLISION_SHARED(emit_sums, shared);
     const int32_t t = (int32_t)threadIdx.x, first = (int32_t)blockIdx.x * EMIT_CANDIDATES;
     const int32_t i = first + t / POINT_LANES, lane = t % POINT_LANES, found = usable_candidates(v);

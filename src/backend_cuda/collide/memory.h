@@ -88,7 +88,6 @@ struct sadmm_cuda_collision {
     bool can_undo;
 
     cudaStream_t stream;        /* where work is pending */
-    bool early;                 /* kernels are launched early (device/early.h) */
     bool pending;
     const char *kernel;         /* launched last: what an asynchronous error is about, or what ran before it */
 
@@ -141,7 +140,7 @@ static inline sadmm_status begin_work(struct sadmm_cuda_collision *c, void *stre
 {
     if (c->pending) TRY(wait(c, error));
     c->stream = (cudaStream_t)stream;
-    c->early = false;
+    c->view.early = false;
     c->pending = true;
     return SADMM_OK;
 }
@@ -203,7 +202,7 @@ static inline sadmm_status launch(struct sadmm_cuda_collision *c, const struct c
 #else
     const dim3 grid(blocks), threads_a_block((unsigned)what.threads);
     void *parameters[] = {&c->view};
-    cudaError_t code = launch_on(c->stream, c->early, (const void *)what.kernel, grid, threads_a_block, 0, parameters);
+    cudaError_t code = launch_on(c->stream, c->view.early, (const void *)what.kernel, grid, threads_a_block, 0, parameters);
 #endif
     CUDA_CALL(c, code, what.name);
     return SADMM_OK;

@@ -36,7 +36,7 @@ static __device__ void expand(const collision_view &v, const struct collision_st
                               struct waiting_nodes *waiting, struct batch *out)
 {
     const struct candidate pair = candidate_of(v, first);
-    const struct sadmm_proxy &a = v.proxies[pair.a], &b = v.proxies[pair.b];
+    const struct sadmm_proxy &a = *proxy_at(v, pair.a), &b = *proxy_at(v, pair.b);
     const struct sadmm_box3 own = box_of_candidates<SUBSTEPS>(v, step, pair.a, a);
     struct sadmm_box3 box;
     struct mesh mesh;
@@ -49,8 +49,7 @@ static __device__ void expand(const collision_view &v, const struct collision_st
 template <bool SUBSTEPS>
 static __global__ void __launch_bounds__(MESH_THREADS) expand_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     COLLISION_SHARED(waiting_nodes, waiting);
     const unsigned long long listed = v.candidate_count[COUNT_MESH_PAIRS];
     const struct collision_step step = step_of(v);

@@ -239,7 +239,7 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
         return true;
     }
     const int64_t likely = guess >= 0 && guess < count ? guess : 0;
-    const struct sadmm_proxy *pa = &v.proxies[own.a], *pb = &v.proxies[own.b];
+    const struct sadmm_proxy *pa = proxy_at(v, own.a), *pb = proxy_at(v, own.b);
     const struct near_keys near = near_keys_of(v.before.keys, find == NARROW_AGAIN ? 0 : count, guess);
     struct sadmm_contact_pair old = load_wide(&v.before.pairs[likely]);
     const struct sadmm_proxy a = *pa, b = *pb;

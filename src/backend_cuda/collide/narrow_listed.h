@@ -16,7 +16,7 @@ template <int FOR, int HOW>
 static __global__ void __launch_bounds__(NARROW_THREADS, NARROW_BLOCKS)
 at_once_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
+    wait_if(v.early);
     const int64_t i = collision_thread(NARROW_THREADS);
     struct gjk_walk walk;
     walk.end = GJK_FAR;
@@ -35,7 +35,7 @@ template <int FOR, int HOW>
 static __global__ void __launch_bounds__(NARROW_THREADS)
 listed_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
+    wait_if(v.early);
     const int64_t width = NARROW_THREADS, most = LISTED_WARPS, all = (v.candidate_capacity + width - 1) / width,
                   warps = all < most ? all : most, count = (int64_t)v.candidate_count[COUNT_LISTED],
                   wanted = (count + warps - 1) / warps, lanes = wanted < width ? wanted : width,

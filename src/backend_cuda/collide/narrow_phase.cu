@@ -6,8 +6,7 @@ template <int FOR>
 static __global__ void __launch_bounds__(NARROW_THREADS, NARROW_BLOCKS)
 narrow_kernel(const __grid_constant__ collision_view v)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(v.early);
     const int64_t i = collision_thread(NARROW_THREADS);
     if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND) narrow_candidate<FOR, NARROW_PLAIN>(v, i, nullptr);
 }

@@ -338,7 +338,7 @@ extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void 
 {
     const bool tree = c->view.leaf_count >= c->tree_from;
     c->stream = (cudaStream_t)stream;
-    c->early = find->early;
+    c->view.early = find->early;
     c->pending = true;
     c->view.substeps = find->substeps;
     c->view.substep = find->substep;

@@ -164,6 +164,7 @@ struct collision_view {
     int32_t group_bits;                            /* of the leaf keys */
     double large;                                  /* radius from which a mover is large, m */
     int32_t body_count;                            /* slots */
+    bool early;                                    /* kernels are launched early (device/early.h) */
     struct collision_grid *grid;                   /* of this step */
     int32_t *abort_code;                           /* not NULL and not 0: do nothing */
     const double *dt, *gravity;                    /* not NULL: of the step, in the place of step's (step_of) */
@@ -199,6 +200,14 @@ struct collision_view {
     struct collision_set before, after;
     int32_t point_capacity;
 };
+
+/* A proxy is whole pieces of 16 bytes (device/wide.h), which a compiler does not see: told so, it asks for two numbers at
+ * a time. */
+static_assert(sizeof(struct sadmm_proxy) % 16 == 0, "whole pieces");
+static __device__ __forceinline__ const struct sadmm_proxy *proxy_at(const collision_view &v, uint32_t slot)
+{
+    return (const struct sadmm_proxy *)__builtin_assume_aligned(v.proxies + slot, 16);
+}
 
 static __device__ __forceinline__ bool aborted(const collision_view &v) { return v.abort_code && *v.abort_code != 0; }
 

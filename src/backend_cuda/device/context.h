@@ -94,7 +94,7 @@ sadmm_status CUDA(reserve)(struct sadmm_context *, enum cuda_buffer_name name, s
 static inline bool begins_early(const struct sadmm_context *c) { return c->early && c->recording; }
 static inline bool all_begin_early(const struct sadmm_context *c)
 {
-    return begins_early(c) && c->view.model.bodies <= MOST_BODIES_ALL_EARLY;
+    return begins_early(c) && all_early(c->view.model.bodies);
 }
 /* Launch blocks of THREADS on the stream; 0 blocks: nothing to do. */
 sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,

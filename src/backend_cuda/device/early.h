@@ -1,7 +1,7 @@
 /* Programmatic dependent launch: in a step's graph a kernel comes to its multiprocessors while the one before it ends
  * (device/context.h says which).
  *
- * Every kernel of the graph waits (wait_for_stream) before it reads anything that the kernel before it writes. What
+ * A kernel that is launched so waits (wait_for_stream) before it reads anything that the kernel before it writes. What
  * that one does not write may be fetched earlier: the kernels before it have ended, since it has waited itself. It
  * waits in any case, also where it has nothing to do: the kernel after it waits for this one alone. */
 #ifndef SADMM_CUDA_DEVICE_EARLY_H
@@ -30,11 +30,27 @@ static __device__ __forceinline__ void let_next_begin(void)
 #endif
 }
 
-/* In small worlds. In others blocks come in waves, and those of the next kernel would take their room. */
+/* In small worlds all kernels are launched early. In others blocks come in waves, and those of the next kernel would take
+ * their room. */
 enum { MOST_BODIES_ALL_EARLY = 16384 };
+static __host__ __device__ __forceinline__ bool all_early(int32_t bodies) { return bodies <= MOST_BODIES_ALL_EARLY; }
 static __device__ __forceinline__ void let_next_begin(int32_t bodies)
 {
-    if (bodies <= MOST_BODIES_ALL_EARLY) let_next_begin();
+    if (all_early(bodies)) let_next_begin();
+}
+
+/* Of kernels that are launched early in small worlds alone: what they begin with. In others they do neither, for what
+ * that takes counts where blocks are many and short: with 100,000 bodies 32 in place of 23 us for the step's start, 33 in
+ * place of 22 for its contacts. */
+static __device__ __forceinline__ void wait_if(bool early)
+{
+    if (early) wait_for_stream();
+}
+static __device__ __forceinline__ void follow_if(bool early)
+{
+    if (!early) return;
+    wait_for_stream();
+    let_next_begin();
 }
 
 #ifndef SADMM_CUDA_EMULATED

@@ -87,8 +87,7 @@ extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool m
 /* (17) as the momentum residual A v - b - J^T lambda. */
 static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    follow_if(all_early(v.model.bodies));
     int32_t i = (int32_t)(blockIdx.x * (unsigned)THREADS + threadIdx.x) / LANES, r = (int32_t)threadIdx.x % LANES;
     double dual = 0;
     if (i < live_bodies(v.model) && r < 6) {

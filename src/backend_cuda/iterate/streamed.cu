@@ -62,7 +62,7 @@ template <bool JOIN, bool RIGID, bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
+    wait_if(all_early(v.model.bodies));
     enum { LINE = RIGID ? LINE_RIGID : LINE_GENERAL };
     const unsigned block = args.backward ? gridDim.x - 1 - blockIdx.x : blockIdx.x;
     const int32_t i = (int32_t)(block * (unsigned)BODY_THREADS + threadIdx.x);
@@ -134,7 +134,7 @@ template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
+    wait_if(all_early(v.model.bodies));
     const int32_t t = thread_index(args);
     double primal = 0;
     if (FAST && all_stopped(v.islands, args.checks)) return;
@@ -152,7 +152,7 @@ template <bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
+    wait_if(all_early(v.model.bodies));
     const int32_t k = thread_index(args);
     double primal = 0;
     if (FAST && all_stopped(v.islands, args.checks)) return;
@@ -167,7 +167,7 @@ static __global__ void __launch_bounds__(THREADS)
 template <int LANES_A_PAIR>
 static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
+    wait_if(all_early(v.model.bodies));
     with_pair<LANES_A_PAIR>(v.model, thread_index(args), [&](int32_t p, int32_t lane, bool live) {
         start_pair<LANES_A_PAIR>(v.contacts, v.iteration, p, lane, live);
     });
@@ -175,7 +175,7 @@ static __global__ void start_kernel(const __grid_constant__ cuda_view v, const _
 
 static __global__ void start_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
+    wait_if(all_early(v.model.bodies));
     const int32_t k = thread_index(args);
     if (k < live_rows(v.model, v.rows)) start_rows(v.rows, v.iteration, k);
 }
@@ -183,7 +183,7 @@ static __global__ void start_rows_kernel(const __grid_constant__ cuda_view v, co
 /* Where records go. */
 static __global__ void place_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
+    wait_if(all_early(v.model.bodies));
     const int32_t at = thread_index(args), bodies = live_bodies(v.model);
     if (bodies == 0 || at >= v.graph.offsets[bodies]) return;
     const int32_t side = v.graph.incident[at], on_b = side & 1, k = side / 2 - v.contacts.pair_capacity;

@@ -25,8 +25,7 @@ static __device__ __forceinline__ void place(const cuda_view &v, int32_t slot, c
 
 static __global__ void driven_start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t k = thread_index();
     if (k >= v.driven.count || v.model.live->abort_code) return;
     const struct sadmm_driven_body body = v.driven.before[k];
@@ -43,8 +42,7 @@ static __global__ void driven_start_kernel(const __grid_constant__ cuda_view v, 
 
 static __global__ void carry_clear_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t i = thread_index();
     if (i == 0) *v.driven.moves = *v.driven.carries = 0;
     if (i >= v.model.bodies) return;
@@ -66,8 +64,7 @@ static __device__ __forceinline__ int32_t label_of(const graph_view &graph, int3
 /* A thread a pair; then one a constraint of joints. */
 static __global__ void carry_find_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t p = thread_index(), r = p - v.contacts.pair_capacity;
     if (r >= 0) {
         if (r >= live_rows(v.model, v.rows) || v.raw.constraints[r].count == 0) return;
@@ -83,8 +80,7 @@ static __global__ void carry_find_kernel(const __grid_constant__ cuda_view v, co
 
 static __global__ void carry_compare_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t p = thread_index();
     if (p >= live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
@@ -97,8 +93,7 @@ static __global__ void carry_compare_kernel(const __grid_constant__ cuda_view v,
 
 static __global__ void carry_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     const int32_t label = v.graph.label[i], pair = v.driven.support[label];

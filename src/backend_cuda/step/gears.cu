@@ -51,8 +51,7 @@ static __device__ __forceinline__ void store_row(const cuda_view &v, const struc
 static __global__ void __launch_bounds__(GEAR_THREADS)
     gear_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t g = (int32_t)(blockIdx.x * (unsigned)GEAR_THREADS + threadIdx.x);
     if (g >= v.joints.gears || v.model.live->abort_code) return;
     const struct sadmm_resident_gear *gear = &v.joints.gear[g];
@@ -81,8 +80,7 @@ static __global__ void __launch_bounds__(GEAR_THREADS)
 static __global__ void __launch_bounds__(GEAR_THREADS)
     gear_solution_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t g = (int32_t)(blockIdx.x * (unsigned)GEAR_THREADS + threadIdx.x);
     if (g >= v.joints.gears || v.model.live->abort_code) return;
     const int32_t constraint = v.joints.first_gear + g;

@@ -254,8 +254,7 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
 /* Which part the bodies of a pair are of: a thread a side. Small parts find their contacts by it. */
 static __global__ void pair_parts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t code = thread_index();
     if (code >= 2 * live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];

@@ -131,8 +131,7 @@ template <bool TABLES>
 static __global__ void __launch_bounds__(ROWS_THREADS)
     joint_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x), j = t / LANES;
     const int lane = t % LANES;
     if (v.model.live->abort_code) return;
@@ -287,8 +286,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     joint_solution_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x), of_pair = t - args.count;
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     if (v.model.live->abort_code) return;
     if (t < v.joints.count) keep_joint(v, t);
     if (of_pair >= 0) look_at_pair(v, of_pair / v.contacts.lanes, of_pair % v.contacts.lanes);
@@ -298,8 +296,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
 static __global__ void __launch_bounds__(ROWS_THREADS)
     joint_move_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x);
     if (v.model.live->abort_code) return;
     if (i < v.model.bodies && moves_apart(v, i))

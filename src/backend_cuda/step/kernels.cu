@@ -99,8 +99,7 @@ static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM
 static __global__ void __launch_bounds__(EDIT_THREADS)
     edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const struct cuda_edits *edits = edits_of_step(v.step.edits, v.step.edit_capacity, v.step.control->sequence);
     const int32_t stride = (int32_t)gridDim.x * EDIT_THREADS, abort_code = v.model.live->abort_code;
     for (int32_t i = (int32_t)(blockIdx.x * (unsigned)EDIT_THREADS + threadIdx.x); i < v.step.edit_capacity; i += stride) {
@@ -150,8 +149,7 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
 /* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
 static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
     const int32_t lane = (int32_t)(t % START_LANES);
     if (v.model.live->abort_code) return;
@@ -170,8 +168,7 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
 /* One thread. What was found is this step's when it fits. */
 static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     if (threadIdx.x > 0 || v.model.live->abort_code) return;
     const struct sadmm_cuda_contact_counts counts = *v.step.counts;
     v.step.control->stamps[STAMP_FOUND] = nanoseconds();
@@ -261,8 +258,7 @@ static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cu
 static __global__ void __launch_bounds__(TURN_THREADS, 4)
     turn_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
-    let_next_begin();
+    follow_if(all_early(v.model.bodies));
     const int64_t t = (int64_t)blockIdx.x * TURN_THREADS + threadIdx.x, i = t / START_LANES,
                   own = (int64_t)blockIdx.x * (TURN_THREADS / START_LANES) + threadIdx.x;
     const int32_t lane = (int32_t)(t % START_LANES);

@@ -4,6 +4,7 @@
 #ifndef SADMM_CUDA_STEP_MOVE_H
 #define SADMM_CUDA_STEP_MOVE_H
 
+#include "backend_cuda/device/wide.h"
 #include "backend_cuda/iterate/slow.h"
 #include "backend_cuda/iterate/solution.h"
 #include "core/model/joint_lead.h"
@@ -27,7 +28,10 @@ struct body_before {
 
 static __device__ __forceinline__ body_before fetch_body(const cuda_step_view &step, int32_t i)
 {
-    const body_before before = {step.before[i], step.steady_before[i]};
+    /* whole pieces of 16 bytes (device/wide.h), of which what is used is asked for */
+    static_assert(sizeof(struct sadmm_rigid) % 16 == 0, "whole pieces");
+    const struct sadmm_rigid *body = (const struct sadmm_rigid *)__builtin_assume_aligned(step.before + i, 16);
+    const body_before before = {*body, step.steady_before[i]};
     return before;
 }
 
@@ -65,7 +69,7 @@ static __device__ __forceinline__ void store_moved(const cuda_view &v, int32_t i
     for (int k = 0; k < 4; ++k) next.orientation[k] = place[3 + k];
     for (int k = 0; k < 6; ++k) next.velocity[k] = velocity[k];
     steady_keep(&steady, &before.body, &next, dt);
-    v.step.after[i] = next;
+    store_wide(next, &v.step.after[i]);
     v.step.steady_after[i] = steady;
 }
 
