@@ -29,11 +29,11 @@ struct both {
     struct sadmm_contact_set host_set, device_set;
 };
 
-/* radix: with the sort and the scan of large scenes, whatever the capacities. */
+/* radix: with the sort and the scan of large scenes, whatever the capacities, and their stores. */
 static inline struct both both_new_tuned(int32_t tree_from, bool radix)
 {
     struct both b = {0};
-    struct sadmm_cuda_collision_tuning tuning = {.tree_from = tree_from, .radix_from = radix};
+    struct sadmm_cuda_collision_tuning tuning = {.tree_from = tree_from, .by_warp_from = radix, .radix_from = radix};
     OK(sadmm_collision_create(&b.host, error));
     OK(COLLISION(create)(0, &b.device, error));
     COLLISION(tune)(b.device, &tuning);

@@ -132,58 +132,65 @@ static __device__ bool is_within(const struct collision_reach &reach, const stru
 /* By which find of a step shapes are placed. */
 enum place_for { PLACE_ONE, PLACE_FIRST, PLACE_AGAIN };
 
-/* The first kernel of a find also resets the counter of the candidates. */
-template <int FOR>
+/* A lane's record, by the lane or, where there are many, by the warp (nullptr: it has none). */
+template <bool MANY, class T>
+static __device__ __forceinline__ void store_placed(const T &from, T *to, struct warp_pieces *shared)
+{
+    if constexpr (MANY) store_of_warp(from, to, shared);
+    else if (to) store_wide(from, to);
+}
+
+/* The first kernel of a find also resets the counter of the candidates. Lanes without a shape come along. */
+template <int FOR, bool MANY>
 static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __grid_constant__ collision_view v)
 {
+    static_assert(PLACE_THREADS == 32, "a block is a warp");
     follow_if(v.early);
+    COLLISION_SHARED(warp_pieces, memory);
+    struct warp_pieces *const shared = MANY ? &memory : nullptr;
     const int64_t i = collision_thread(PLACE_THREADS);
-    const bool stops = aborted(v), is_there = i < v.leaf_count + v.plane_count;
+    const bool stops = aborted(v), is_there = i < v.leaf_count + v.plane_count, is_leaf = i < v.leaf_count;
     const struct collision_step step = step_of(v);
     const uint32_t slot = is_there ? v.present[i] : 0; /* at once, not after what comes next */
     if (stops) return;
     if (i == 0 && FOR != PLACE_AGAIN) v.candidate_count[COUNT_FOUND] = v.candidate_count[COUNT_MESH_PAIRS] = 0;
     if (i == 0) v.candidate_count[COUNT_LISTED] = 0;
-    if (!is_there) return;
-    const struct sadmm_shape &shape = v.shapes[slot];
-    const struct sadmm_collision_body body = load_wide(&v.bodies[shape.body]);
-    const bool moves = body.system_body >= 0;
     struct sadmm_proxy proxy;
     struct collision_leaf leaf;
-
-    const struct proxy_turn turn = proxy_turn_of(&shape, &body, step.dt);
-    proxy_place(&shape, &v.geometries[shape.geometry], &body, &turn, step.dt, step.margin, step.gravity, &proxy,
-                &leaf.box);
-    store_wide(proxy, &v.proxies[slot]);
+    bool moves = false;
+    if (is_there) {
+        const struct sadmm_shape &shape = v.shapes[slot];
+        const struct sadmm_collision_body body = load_wide(&v.bodies[shape.body]);
+        const struct proxy_turn turn = proxy_turn_of(&shape, &body, step.dt);
+        moves = body.system_body >= 0;
+        proxy_place(&shape, &v.geometries[shape.geometry], &body, &turn, step.dt, step.margin, step.gravity, &proxy,
+                    &leaf.box);
+        leaf.filter = {shape.category, shape.mask, shape.body,
+                       geometry_rank(proxy.geometry.type) | (moves ? FILTER_MOVES : 0)};
+        leaf.group_low = body.environment < 0 ? INT32_MIN : body.environment;
+        leaf.group_high = body.environment < 0 ? INT32_MAX : body.environment;
+    }
+    store_placed<MANY>(proxy, is_there ? &v.proxies[slot] : nullptr, shared);
+    if (FOR != PLACE_ONE) store_placed<MANY>(leaf.box, is_leaf ? &v.boxes[slot] : nullptr, shared);
     if (FOR == PLACE_AGAIN) {
-        if (i >= v.leaf_count) return;
-        store_wide(leaf.box, &v.boxes[slot]);
-        if (sadmm_body_moves(body.system_body) && !is_within(v.reaches[slot], proxy, leaf.box, step.dt, v.substep))
+        if (is_leaf && sadmm_body_moves(proxy.system_body) &&
+            !is_within(v.reaches[slot], proxy, leaf.box, step.dt, v.substep))
             *v.abort_code = ABORT_REACH;
         return;
     }
-    const struct collision_filter filter = {shape.category, shape.mask, shape.body,
-                                            geometry_rank(proxy.geometry.type) | (moves ? FILTER_MOVES : 0)};
-    if (i >= v.leaf_count) {
-        v.filters[slot] = filter;
-        return;
-    }
+    if (is_there && !is_leaf) v.filters[slot] = leaf.filter;
 
-    if (FOR == PLACE_FIRST) {
-        store_wide(leaf.box, &v.boxes[slot]);
-        leaf.box = make_reach(v, proxy, leaf.box, step.dt, &v.reaches[slot]);
+    if (is_leaf) {
+        if (FOR == PLACE_FIRST) leaf.box = make_reach(v, proxy, leaf.box, step.dt, &v.reaches[slot]);
+        for (int k = 0; k < 3; ++k) leaf.velocity[k] = proxy.velocity[k];
+        leaf.thin = proxy.thin;
+        leaf.slot = (int32_t)slot;
+        leaf.children = proxy.geometry.children;
     }
-    for (int k = 0; k < 3; ++k) leaf.velocity[k] = proxy.velocity[k];
-    leaf.thin = proxy.thin;
-    leaf.filter = filter;
-    leaf.slot = (int32_t)slot;
-    leaf.children = proxy.geometry.children;
-    leaf.group_low = body.environment < 0 ? INT32_MIN : body.environment;
-    leaf.group_high = body.environment < 0 ? INT32_MAX : body.environment;
-    v.placed[i] = leaf;
-    if (!v.leaf_keys) return;
+    store_placed<MANY>(leaf, is_leaf ? &v.placed[i] : nullptr, shared);
+    if (!v.leaf_keys || !is_leaf) return;
 
-    const uint64_t group = body.environment < 0 ? 0 : (uint64_t)body.environment;
+    const uint64_t group = leaf.group_low < 0 ? 0 : (uint64_t)leaf.group_low;
     const int rest = LEAF_CLASS_SHIFT - v.group_bits;
     uint64_t key = geometry_radius(&proxy.geometry) >= v.large ? LEAF_LARGE : 0;
     if (!moves) key = LEAF_STATIC;
@@ -556,9 +563,15 @@ static __global__ void __launch_bounds__(ROWS) tiles_kernel(const __grid_constan
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
 {
     kernels->grid = {grid_kernel, 3 * GRID_SAMPLES, sizeof(struct grid_sample), "grid of the tree"};
-    kernels->place = {place_kernel<PLACE_ONE>, PLACE_THREADS, 0, "placing of the shapes"};
-    kernels->place_first = {place_kernel<PLACE_FIRST>, PLACE_THREADS, 0, "placing of the shapes"};
-    kernels->place_again = {place_kernel<PLACE_AGAIN>, PLACE_THREADS, 0, "placing of the shapes"};
+    const auto placing = [](void (*kernel)(const collision_view)) -> collision_launch {
+        return {kernel, PLACE_THREADS, sizeof(struct warp_pieces), "placing of the shapes"};
+    };
+    kernels->place[0] = placing(place_kernel<PLACE_ONE, false>);
+    kernels->place_first[0] = placing(place_kernel<PLACE_FIRST, false>);
+    kernels->place_again[0] = placing(place_kernel<PLACE_AGAIN, false>);
+    kernels->place[1] = placing(place_kernel<PLACE_ONE, true>);
+    kernels->place_first[1] = placing(place_kernel<PLACE_FIRST, true>);
+    kernels->place_again[1] = placing(place_kernel<PLACE_AGAIN, true>);
     kernels->build = {build_kernel, TREE_THREADS, 0, "build of the tree"};
     kernels->refit = {refit_kernel, TREE_THREADS, 0, "boxes of the tree"};
     kernels->clear = {clear_kernel, COLLISION_THREADS, 0, "reset of the candidates"};

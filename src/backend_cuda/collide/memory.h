@@ -91,7 +91,7 @@ struct sadmm_cuda_collision {
     bool pending;
     const char *kernel;         /* launched last: what an asynchronous error is about, or what ran before it */
 
-    int32_t tree_from;
+    int32_t tree_from, by_warp_from;
     int64_t radix_from;
     int64_t candidate_capacity, point_capacity;
     int temp_leaves, temp_candidates; /* what TEMP is large enough for */

@@ -41,6 +41,7 @@ enum { SADMM_CUDA_SETS = 3 }; /* the third for what lies between two sub-steps *
 /* For tests and measurements; 0: the default. */
 struct sadmm_cuda_collision_tuning {
     int32_t tree_from;  /* shapes; below, all pairs are tested */
+    int32_t by_warp_from; /* shapes; from so many on what is made of them is stored by the warp */
     int64_t radix_from; /* capacity for candidates; below, they are ranked by counting */
     int64_t
         first_capacity; /* the next find starts with this capacity for candidates and points, whatever is allocated */

@@ -202,6 +202,8 @@ static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_e
     return launch(c, c->kernels.emit, lanes, error);
 }
 
+static int many_placed(const struct sadmm_cuda_collision *c) { return c->view.leaf_count >= c->by_warp_from; }
+
 /* Places, and with them the tree where it pays. */
 static sadmm_status place_shapes(struct sadmm_cuda_collision *c, bool tree, struct sadmm_error *error)
 {
@@ -209,7 +211,7 @@ static sadmm_status place_shapes(struct sadmm_cuda_collision *c, bool tree, stru
     c->view.leaf_keys = tree ? in<uint64_t>(c, LEAF_KEYS) : nullptr;
     c->view.leaf_numbers = in<uint32_t>(c, LEAF_NUMBERS);
     if (tree) TRY(launch(c, c->kernels.grid, 1, error));
-    TRY(launch(c, v->substeps == 1 ? c->kernels.place : c->kernels.place_first,
+    TRY(launch(c, (v->substeps == 1 ? c->kernels.place : c->kernels.place_first)[many_placed(c)],
                std::max(v->leaf_count + v->plane_count, 1), error));
     return tree ? build_tree(c, error) : SADMM_OK;
 }
@@ -344,7 +346,8 @@ extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void 
     c->view.substep = find->substep;
     use_sets(c, find->from, find->into);
     if (find->substep > 0) {
-        TRY(launch(c, c->kernels.place_again, std::max(c->view.leaf_count + c->view.plane_count, 1), error));
+        TRY(launch(c, c->kernels.place_again[many_placed(c)],
+                   std::max(c->view.leaf_count + c->view.plane_count, 1), error));
         return make_contacts(c, error);
     }
     TRY(place_shapes(c, tree, error));

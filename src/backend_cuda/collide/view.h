@@ -296,7 +296,8 @@ struct narrow_kernels {
 
 /* The kernels, each beside what it does. */
 struct collision_kernels {
-    struct collision_launch grid, place, place_first, place_again, build, refit, clear, walk, tiles, small_tiles, rank,
+    struct collision_launch place[2], place_first[2], place_again[2]; /* of few shapes, of many (by_warp_from) */
+    struct collision_launch grid, build, refit, clear, walk, tiles, small_tiles, rank,
         narrow, narrow_first, narrow_again, expand, expand_first, emit, emit_few;
     struct narrow_kernels with_hulls, with_meshes, with_smooth; /* in the place of `narrow` where there are any */
     int expand_warps; /* expand is launched for */
