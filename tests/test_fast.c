@@ -181,7 +181,7 @@ END_TEST
  * third cube. */
 static struct contact_problem *deep_stack(int count)
 {
-    double masses[64];
+    double masses[64] = {0};
     for (int i = 0; i < count; ++i) masses[i] = 1;
     struct contact_problem *problem = contact_problem_stack(masses, count, 0.5);
     for (int i = 0; i < count; ++i)
