@@ -320,6 +320,7 @@ START_TEST(bounces_are_taken_back)
     ck_assert_double_eq(limit_bounce_factor(&bounce, 1, 1e-16), 0.5);
     ck_assert_double_eq(limit_bounce_factor(&bounce, -2, 1e-16), 0.25);
     ck_assert_double_eq(limit_bounce_factor(&pushed, 1, 1e-16), 1);
+    ck_assert(limit_under_iterated(1, 59) && !limit_under_iterated(1, 60) && !limit_under_iterated(0, 59));
 }
 END_TEST
 

@@ -37,7 +37,6 @@
 #include "core/solve/kernels.h"
 #include "core/math/limit.h"
 #include "core/math/packed6.h"
-#include "core/math/weight.h"
 #include "core/model/system_terms.h"
 #include "cpu_lanes.h"
 

@@ -15,7 +15,6 @@
 #include "core/solve/kernels.h"
 #include "core/math/lead.h"
 #include "core/math/limit.h"
-#include "core/math/weight.h"
 
 /* One side of a constraint: the paper's subscript (i,k) or (j,k). */
 struct ref_side {

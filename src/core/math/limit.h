@@ -23,8 +23,8 @@
 #ifndef SADMM_MATH_LIMIT_H
 #define SADMM_MATH_LIMIT_H
 
-#include "max.h"
 #include "momentum.h"
+#include "weight.h"
 
 /* Rounding of energies in single precision, some hundred times over. */
 #define LIMIT_ROUNDING 1e-5
@@ -77,8 +77,7 @@ SADMM_INLINE double limit_factor(const struct limit_energies *e, double epsilon)
 #define LIMIT_LEAST          0.25
 
 /* Is the island checked for bounces? */
-#define LIMIT_UNDER_ITERATED 60
-SADMM_INLINE int limit_under_iterated(int warm, int iterations) { return warm && iterations < LIMIT_UNDER_ITERATED; }
+SADMM_INLINE int limit_under_iterated(int warm, int iterations) { return warm && iterations < WEIGHT_UNDER_ITERATED; }
 
 /* `along`: v . A v_f / 2, J. */
 SADMM_INLINE int limit_bounces(double now, double free, double along, double epsilon)
