@@ -56,6 +56,20 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
     });
 }
 
+static __global__ void flatten_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
+{
+    wait_for_stream();
+    const int32_t i = thread_index();
+    if (i < v.bodies && !v.live->abort_code) flatten_body(v, i);
+}
+
+static __global__ void join_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
+{
+    wait_for_stream();
+    const int32_t record = thread_index();
+    if (record < v.pair_capacity + v.rows && !v.live->abort_code) join_record(v, record);
+}
+
 static __global__ void __launch_bounds__(LAYOUT_THREADS)
     bodies_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
@@ -131,6 +145,10 @@ cudaError_t LAYOUT(statistics)(const struct layout_view *v, bool islands, const 
     LAUNCH(clear_kernel, "statistics (clear)", blocks_for((int64_t)v->bodies + 1), LAYOUT_THREADS, 0);
     LAUNCH(records_kernel, "statistics (records)", few_blocks_for(v, (int64_t)v->pair_capacity + v->rows),
            LAYOUT_THREADS, sizeof(cuda_graph_statistics));
+    if (islands) {
+        LAUNCH(flatten_kernel, "statistics (roots)", blocks_for(v->bodies), LAYOUT_THREADS, 0);
+        LAUNCH(join_kernel, "statistics (islands)", blocks_for((int64_t)v->pair_capacity + v->rows), LAYOUT_THREADS, 0);
+    }
     LAUNCH(bodies_kernel, "statistics (bodies)", few_blocks_for(v, v->bodies), LAYOUT_THREADS,
            sizeof(cuda_graph_statistics));
     return cudaSuccess;

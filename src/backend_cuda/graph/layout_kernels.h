@@ -1,7 +1,10 @@
 /* The layout (device/layout.h) of a step, made on the device from core's own pairs and row constraints: compiled once,
  * for both precisions.
  *
- *   statistics  a thread a record: statistics of the pairs, the body of every side, degrees, islands joined
+ *   statistics  a thread a record: statistics of the pairs, the body of every side, degrees, each body hooked under the
+ *               smallest that it touches
+ *               a thread a body: hooked right under its root
+ *               a thread a record: islands joined, of which few are left to join by then
  *               a thread a body: islands labelled by their smallest body, statistics of the bodies
  *   layout      bodies sorted by label (where islands matter), sides sorted by slot, both stably; where a body's sides
  *               begin; parts

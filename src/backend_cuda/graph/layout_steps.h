@@ -162,7 +162,24 @@ LAYOUT_INLINE void statistics_of_record(const layout_view &v, int32_t record, in
         atomicAdd(&v.degree[body[side]], 1);
         ++own->sides;
     }
-    if (islands && body[0] >= 0 && body[1] >= 0) join_bodies<SHARED>(v.label, body[0], body[1]);
+    if (!islands || body[0] < 0 || body[1] < 0) return;
+    if (SHARED) join_bodies<SHARED>(v.label, body[0], body[1]);
+    else atomicMin(&v.label[larger(body[0], body[1])], body[0] < body[1] ? body[0] : body[1]);
+}
+
+/* Once every body is hooked under the smallest of those that it touches: right under its root, by pointer jumping, since
+ * bodies in a row are as deep as they are many; */
+LAYOUT_INLINE void flatten_body(const layout_view &v, int32_t i)
+{
+    volatile int32_t *own = &v.label[i];
+    for (int32_t up = *own, next; (next = parent_of<false>(v.label, up)) != up; up = next) *own = next;
+}
+
+/* and what is left to join of a record. */
+LAYOUT_INLINE void join_record(const layout_view &v, int32_t record)
+{
+    const int2 body = ((const int2 *)v.side_body)[record];
+    if (body.x < v.bodies && body.y < v.bodies) join_bodies<false>(v.label, body.x, body.y);
 }
 
 /* The running total is largest when it is complete: the statistics do not depend on who comes last. */
