@@ -1,5 +1,6 @@
 /* Kernels A-D: raw bodies, contacts and blocks, as core has them, into this precision's layout. */
 #include "backend_cuda/device/double.h"
+#include "backend_cuda/device/wide.h"
 
 #include "assemble.h"
 #include "side_sums.h"
@@ -24,6 +25,8 @@ static __device__ double form(const double M[PACKED], const solver_real x[6])
     return packed_form(M, wide);
 }
 
+static_assert((int)ROW == 8 && (int)LINE_RIGID_A == 8, "each in a whole row");
+
 /* ENERGIES: A^-1 and the energy of A^-1 b too. */
 template <bool ENERGIES>
 static __global__ void __launch_bounds__(BODY_THREADS)
@@ -41,7 +44,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
     double A[36], b[6], x[6], factor[36];
     const struct sadmm_settings settings = *v.model.settings;
-    sadmm_system_body(&v.raw.system, &settings, i, A, b);
+    if (v.raw.system.rigid)
+        sadmm_system_rigid(&v.raw.system, &settings, wide_at(v.raw.system.rigid, (size_t)i), i, A, b);
+    else sadmm_system_body(&v.raw.system, &settings, i, A, b);
     if (v.joints.count > 0 && v.joints.is_direct[i]) {
         const struct cuda_joined_body body = {A[0],  {A[21], A[28], A[35], A[22], A[23], A[29]},
                                               {b[0], b[1], b[2], b[3], b[4], b[5]}};
@@ -52,17 +57,19 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     } else {
         dense6_solve(factor, b, x);
     }
-    solver_real *state = v.bodies.state + (size_t)i * ROW, *row = v.bodies.b + (size_t)i * ROW,
-                *line = v.bodies.lines + (size_t)i * (size_t)v.bodies.line;
-    for (int k = 0; k < ROW; ++k) {
-        state[k] = k < 6 ? (solver_real)x[k] : (solver_real)0;
-        row[k] = k < 6 ? (solver_real)b[k] : (solver_real)0;
+    solver_real *line = v.bodies.lines + (size_t)i * (size_t)v.bodies.line;
+    eight_numbers<solver_real> state = {}, row = {};
+    for (int k = 0; k < 6; ++k) {
+        state.of[k] = (solver_real)x[k];
+        row.of[k] = (solver_real)b[k];
     }
+    store_row(state, v.bodies.state, (size_t)i);
+    store_row(row, v.bodies.b, (size_t)i);
     if (v.bodies.rigid) {
-        line[0] = (solver_real)A[0];
+        eight_numbers<solver_real> own = {{(solver_real)A[0]}};
         for (int r = 0; r < 3; ++r)
-            for (int k = 0; k <= r; ++k) line[1 + packed_place(r, k)] = (solver_real)A[6 * (r + 3) + k + 3];
-        line[LINE_RIGID_A - 1] = 0;
+            for (int k = 0; k <= r; ++k) own.of[1 + packed_place(r, k)] = (solver_real)A[6 * (r + 3) + k + 3];
+        store_row(own, line, 0);
     } else {
         for (int r = 0; r < 6; ++r)
             for (int k = 0; k <= r; ++k) line[packed_place(r, k)] = (solver_real)A[6 * r + k];
@@ -72,7 +79,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         double inverse[PACKED];
         invert(v.bodies.rigid, A, inverse);
         for (int k = 0; k < PACKED; ++k) v.bodies.A_inverse[PACKED * (size_t)i + (size_t)k] = inverse[k];
-        v.bodies.free_energy[i] = form(inverse, row) / 2;
+        v.bodies.free_energy[i] = form(inverse, row.of) / 2;
     }
 }
 
@@ -150,12 +157,12 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), p = t / v.contacts.lanes,
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);
-    const struct sadmm_contact_pair *pair = &v.raw.pairs[live ? p : 0];
+    const struct sadmm_contact_pair *pair = wide_at(v.raw.pairs, live ? (size_t)p : 0);
     if (v.joints.count > 0 && live && lane == 0 && touches_joined(v.joints, pair)) v.step.control->joints.together = 1;
     if (!FAST && !live) return;
     /* Those that count are fetched here, not where they are needed. */
     const struct sadmm_settings settings = *v.model.settings;
-    const struct sadmm_contact_point *points = v.raw.points + (live ? pair->first : 0);
+    const struct sadmm_contact_point *points = wide_at(v.raw.points, live ? (size_t)pair->first : 0);
     const vec3 normal = live ? v3_load(pair->normal) : v3(0, 0, 0);
     const bool a = live && pair->body_a >= 0, b = live && pair->body_b >= 0;
     /* A pair of more points than the step was planned for aborts it (device/step.h), but later: until then it has as

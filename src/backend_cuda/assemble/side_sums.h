@@ -6,6 +6,7 @@
 #define SADMM_CUDA_ASSEMBLE_SIDE_SUMS_H
 
 #include "backend_cuda/device/body.h"
+#include "backend_cuda/device/wide.h"
 
 #include "core/math/momentum.h"
 
@@ -115,27 +116,38 @@ static __device__ __forceinline__ double side_response(const model_view &model, 
     return packed_dot(bodies.A_inverse + (size_t)body * PACKED, S);
 }
 
-/* share: 1 / count. */
+struct side_numbers {
+    solver_real of[SIDE_NUMBERS];
+};
+
+/* share: 1 / count. The response comes later. */
 static __device__ __forceinline__ void store_side(const weight_view &weights, int32_t p, int32_t side, int32_t count,
                                                   double share, bool first, bool holds, const struct pair_sums *sums)
 {
     const double sign = side ? 1 : -1, *f = sums->force;
-    double *wrench = weights.side_wrench + (size_t)(2 * p + side) * ROW;
-    solver_real *arms = weights.side_arms + (size_t)(2 * p + side) * SIDE_NUMBERS;
+    const size_t at = (size_t)(2 * p + side);
+    const solver_real load = (solver_real)(sums->pushed * share);
+    eight_numbers<double> wrench;
 #pragma unroll
     for (int j = 0; j < 3; ++j) {
-        wrench[j] = sign * f[j];
-        wrench[j + 3] = sign * sums->torque[j];
+        wrench.of[j] = sign * f[j];
+        wrench.of[j + 3] = sign * sums->torque[j];
     }
-    wrench[SIDE_PUSH] = length3(f);
-    wrench[SIDE_HOLDS] = holds;
-    arms[SIDE_LOAD] = (solver_real)(sums->pushed * share);
-    if (!first) return;
-    arms[0] = (solver_real)count;
+    wrench.of[SIDE_PUSH] = length3(f);
+    wrench.of[SIDE_HOLDS] = holds;
+    store_row(wrench, weights.side_wrench, at);
+    if (!first) {
+        weights.side_arms[at * SIDE_NUMBERS + SIDE_LOAD] = load;
+        return;
+    }
+    side_numbers arms = {};
+    arms.of[0] = (solver_real)count;
 #pragma unroll
-    for (int j = 0; j < 3; ++j) arms[1 + j] = (solver_real)sums->r[j];
+    for (int j = 0; j < 3; ++j) arms.of[1 + j] = (solver_real)sums->r[j];
 #pragma unroll
-    for (int j = 0; j < 6; ++j) arms[4 + j] = (solver_real)sums->rr[j];
+    for (int j = 0; j < 6; ++j) arms.of[4 + j] = (solver_real)sums->rr[j];
+    arms.of[SIDE_LOAD] = load;
+    store_wide(arms, (side_numbers *)weights.side_arms + at);
 }
 
 /* Which side's record a lane makes: the first lane side a, the second side b; a single lane both, -1 here. */

@@ -12,24 +12,23 @@
 
 /* ---- place ----------------------------------------------------------------------------------------------------- */
 
-/* Two zero bits after each of the low 21. */
-static __device__ uint64_t spread(uint64_t x)
+/* Two zero bits after each of the low 10. */
+static __device__ uint32_t spread(uint32_t x)
 {
-    x = (x | x << 32) & 0x001f00000000ffffu;
-    x = (x | x << 16) & 0x001f0000ff0000ffu;
-    x = (x | x << 8) & 0x100f00f00f00f00fu;
-    x = (x | x << 4) & 0x10c30c30c30c30c3u;
-    return (x | x << 2) & 0x1249249249249249u;
+    x = (x | x << 16) & 0x030000ffu;
+    x = (x | x << 8) & 0x0300f00fu;
+    x = (x | x << 4) & 0x030c30c3u;
+    return (x | x << 2) & 0x09249249u;
 }
 
-static __device__ uint64_t morton(const struct collision_grid &layout, const double x[3])
+static __device__ uint32_t morton(const struct collision_grid &layout, const double x[3])
 {
     const double most = (double)((1 << MORTON_BITS) - 1);
-    uint64_t code = 0;
+    uint32_t code = 0;
     for (int k = 0; k < 3; ++k) {
         double cell = (x[k] - layout.origin[k]) * layout.scale;
         /* what is far away, and what is no number, goes to the edge */
-        uint64_t at = cell > 0 ? (uint64_t)(cell < most ? cell : most) : 0;
+        uint32_t at = cell > 0 ? (uint32_t)(cell < most ? cell : most) : 0;
         code |= spread(at) << k;
     }
     return code;
@@ -132,9 +131,11 @@ static __device__ bool is_within(const struct collision_reach &reach, const stru
 /* By which find of a step shapes are placed. */
 enum place_for { PLACE_ONE, PLACE_FIRST, PLACE_AGAIN };
 
+struct placed_pieces : warp_pieces<10> {};
+
 /* A lane's record, by the lane or, where there are many, by the warp (nullptr: it has none). */
 template <bool MANY, class T>
-static __device__ __forceinline__ void store_placed(const T &from, T *to, struct warp_pieces *shared)
+static __device__ __forceinline__ void store_placed(const T &from, T *to, placed_pieces *shared)
 {
     if constexpr (MANY) store_of_warp(from, to, shared);
     else if (to) store_wide(from, to);
@@ -146,8 +147,8 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
 {
     static_assert(PLACE_THREADS == 32, "a block is a warp");
     follow_if(v.early);
-    COLLISION_SHARED(warp_pieces, memory);
-    struct warp_pieces *const shared = MANY ? &memory : nullptr;
+    COLLISION_SHARED(placed_pieces, memory);
+    placed_pieces *const shared = MANY ? &memory : nullptr;
     const int64_t i = collision_thread(PLACE_THREADS);
     const bool stops = aborted(v), is_there = i < v.leaf_count + v.plane_count, is_leaf = i < v.leaf_count;
     const struct collision_step step = step_of(v);
@@ -191,10 +192,9 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     if (!v.leaf_keys || !is_leaf) return;
 
     const uint64_t group = leaf.group_low < 0 ? 0 : (uint64_t)leaf.group_low;
-    const int rest = LEAF_CLASS_SHIFT - v.group_bits;
     uint64_t key = geometry_radius(&proxy.geometry) >= v.large ? LEAF_LARGE : 0;
     if (!moves) key = LEAF_STATIC;
-    v.leaf_keys[i] = key << LEAF_CLASS_SHIFT | group << rest | morton(*v.grid, proxy.x) >> (3 * MORTON_BITS - rest);
+    v.leaf_keys[i] = (key << v.group_bits | group) << 3 * MORTON_BITS | morton(*v.grid, proxy.x);
     v.leaf_numbers[i] = (uint32_t)i;
 }
 
@@ -564,7 +564,7 @@ void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
 {
     kernels->grid = {grid_kernel, 3 * GRID_SAMPLES, sizeof(struct grid_sample), "grid of the tree"};
     const auto placing = [](void (*kernel)(const collision_view)) -> collision_launch {
-        return {kernel, PLACE_THREADS, sizeof(struct warp_pieces), "placing of the shapes"};
+        return {kernel, PLACE_THREADS, sizeof(placed_pieces), "placing of the shapes"};
     };
     kernels->place[0] = placing(place_kernel<PLACE_ONE, false>);
     kernels->place_first[0] = placing(place_kernel<PLACE_FIRST, false>);

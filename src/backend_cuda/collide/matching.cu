@@ -53,19 +53,23 @@ static __device__ __forceinline__ emit_in_place emit_source_of(const collision_v
 {
     const struct found_manifold &m = v.manifolds[i];
     const found_point point = load_wide(&m.points[lane]);
+    const found_head found = load_wide(&m.head);
     struct manifold head;
-    head.normal = m.normal;
-    head.ahead = m.ahead;
-    head.cache = m.cache;
-    head.count = m.count;
-    return {*proxy_at(v, start.own.a), *proxy_at(v, start.own.b), {point.position, point.separation, m.features[lane]},
-            v.before.pairs[start.match >= 0 ? start.match : 0], head};
+    head.normal = found.normal;
+    head.ahead = found.ahead;
+    head.cache = found.cache;
+    head.count = found.count;
+    const uint32_t feature = m.features[lane / FOUND_FEATURES].of[lane % FOUND_FEATURES];
+    const struct sadmm_proxy *a = wide_at(v.proxies, start.own.a), *b = wide_at(v.proxies, start.own.b);
+    const struct sadmm_contact_pair *old = wide_at(v.before.pairs, start.match >= 0 ? (size_t)start.match : 0);
+    return {*a, *b, {point.position, point.separation, feature}, *old, head};
 }
 
-/* Point `lane` of a candidate; place: pairs << 32 | points before it. */
+/* Point `lane` of a candidate; place: pairs << 32 | points before it. The caller stores the point. */
 template <class Source>
-static __device__ __forceinline__ void emit_point(const collision_view &v, const step_lengths &dt, int32_t lane,
-                                                  const emit_start &start, const Source &source, uint64_t place)
+static __device__ __forceinline__ struct sadmm_contact_point emit_point(const collision_view &v, const step_lengths &dt,
+                                                                        int32_t lane, const emit_start &start,
+                                                                        const Source &source, uint64_t place)
 {
     const struct candidate own = start.own;
     const int32_t at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
@@ -80,34 +84,53 @@ static __device__ __forceinline__ void emit_point(const collision_view &v, const
     pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
     contact_emit_point(pa, pb, &motion, &source.point, &point);
     if (start.match >= 0)
-        contact_carry(&source.old, v.before.points, lane, normal, friction, step_ratio(dt.now, dt.before), &point);
-    store_wide(point, &v.after.points[first + lane]);
-
-    if (lane > 0) return;
+        contact_carry(&source.old, wide_at(v.before.points, 0), lane, normal, friction,
+                      step_ratio(dt.now, dt.before), &point);
+    if (lane > 0) return point;
     struct sadmm_contact_pair pair;
     contact_emit_pair(own.a, own.b, own.child, pa, pb, &source.head, normal, friction, first, &pair);
     store_wide(pair, &v.after.pairs[at]);
     v.after.keys[at] = ordered_key(own.a, own.b);
+    return point;
+}
+
+static __device__ __forceinline__ struct sadmm_contact_point *point_place(const collision_view &v, int32_t lane,
+                                                                          uint64_t place)
+{
+    return &v.after.points[(int32_t)(uint32_t)place + lane];
 }
 
 /* So many blocks have registers on a multiprocessor at once. */
 enum { EMIT_BLOCKS = 4 };
 
+/* Points of a warp lie side by side. */
+struct emit_pieces {
+    warp_pieces<sizeof(struct sadmm_contact_point) / sizeof(wide_piece)> of[COLLISION_THREADS / 32];
+};
+
 static __global__ void __launch_bounds__(COLLISION_THREADS, EMIT_BLOCKS)
 emit_kernel(const __grid_constant__ collision_view v)
 {
     follow_if(v.early);
+    COLLISION_SHARED(emit_pieces, shared);
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
     const int32_t lane = (int32_t)(thread % POINT_LANES), found = usable_candidates(v);
     const step_lengths dt = lengths_of(v);
     const uint64_t total = v.places[v.candidate_capacity];
     if (aborted(v)) return;
     if (thread == 0) emit_counts(v, total, dt.now);
-    if (i >= found || (int32_t)(uint32_t)total > v.point_capacity) return; /* many do: nothing is asked for before */
-    const uint64_t place = v.places[i];
+    const int64_t first = i - i % (32 / POINT_LANES); /* of the warp: many leave, and nothing is asked for before */
+    if (first >= found || (int32_t)(uint32_t)total > v.point_capacity) return;
+    const bool there = i < found;
+    const uint64_t place = there ? v.places[i] : 0;
     const emit_start start = emit_start_of(v, i);
-    if (lane == 0) v.pair_of[i] = (int32_t)(place >> 32);
-    if (lane < start.count) emit_point(v, dt, lane, start, emit_source_of(v, start, i, lane), place);
+    if (there && lane == 0) v.pair_of[i] = (int32_t)(place >> 32);
+    struct sadmm_contact_point point, *to = nullptr;
+    if (there && lane < start.count) {
+        point = emit_point(v, dt, lane, start, emit_source_of(v, start, i, lane), place);
+        to = point_place(v, lane, place);
+    }
+    store_of_warp(point, to, &shared.of[threadIdx.x / 32]);
 }
 
 /* ---- few candidates: every block adds up all sizes ------------------------------------------------------------- */
@@ -169,11 +192,11 @@ emit_few_kernel(const __grid_constant__ collision_view v)
         before += sum_sizes(i - k < SIZES_A_WORD ? word & ((UINT32_C(1) << 8 * (i - k)) - 1) : word);
     }
     if (lane == 0) v.pair_of[i] = (int32_t)(before >> 32);
-    if (has_point) emit_point(v, dt, lane, start, source, before);
+    if (has_point) store_wide(emit_point(v, dt, lane, start, source, before), point_place(v, lane, before));
 }
 
 void COLLISION(matching_kernels)(struct collision_kernels *kernels)
 {
-    kernels->emit = {emit_kernel, COLLISION_THREADS, 0, "contacts"};
+    kernels->emit = {emit_kernel, COLLISION_THREADS, sizeof(struct emit_pieces), "contacts"};
     kernels->emit_few = {emit_few_kernel, EMIT_CANDIDATES * POINT_LANES, sizeof(struct emit_sums), "contacts"};
 }

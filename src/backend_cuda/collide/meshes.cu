@@ -36,7 +36,7 @@ static __device__ void expand(const collision_view &v, const struct collision_st
                               struct waiting_nodes *waiting, struct batch *out)
 {
     const struct candidate pair = candidate_of(v, first);
-    const struct sadmm_proxy &a = *proxy_at(v, pair.a), &b = *proxy_at(v, pair.b);
+    const struct sadmm_proxy &a = *wide_at(v.proxies, pair.a), &b = *wide_at(v.proxies, pair.b);
     const struct sadmm_box3 own = box_of_candidates<SUBSTEPS>(v, step, pair.a, a);
     struct sadmm_box3 box;
     struct mesh mesh;

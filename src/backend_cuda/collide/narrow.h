@@ -128,14 +128,17 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
     if (m.count == 0) return;
     v.matches[i] = (int32_t)before;
     struct found_manifold *out = &v.manifolds[i];
-    out->normal = m.normal;
-    out->ahead = m.ahead;
-    out->cache = m.cache;
-    out->count = m.count;
-    for (int k = 0; k < m.count; ++k) {
-        const found_point point = {m.points[k].position, m.points[k].separation};
-        store_wide(point, &out->points[k]);
-        out->features[k] = m.points[k].feature;
+    const found_head head = {m.normal, m.ahead, m.cache, m.count};
+    store_wide(head, &out->head);
+    for (int first = 0; first < m.count; first += FOUND_FEATURES) {
+        found_features features = {};
+        for (int k = 0; k < FOUND_FEATURES && first + k < m.count; ++k) {
+            const struct manifold_point &from = m.points[first + k];
+            const found_point point = {from.position, from.separation};
+            store_wide(point, &out->points[first + k]);
+            features.of[k] = from.feature;
+        }
+        store_wide(features, &out->features[first / FOUND_FEATURES]);
     }
 }
 
@@ -239,7 +242,7 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
         return true;
     }
     const int64_t likely = guess >= 0 && guess < count ? guess : 0;
-    const struct sadmm_proxy *pa = proxy_at(v, own.a), *pb = proxy_at(v, own.b);
+    const struct sadmm_proxy *pa = wide_at(v.proxies, own.a), *pb = wide_at(v.proxies, own.b);
     const struct near_keys near = near_keys_of(v.before.keys, find == NARROW_AGAIN ? 0 : count, guess);
     struct sadmm_contact_pair old = load_wide(&v.before.pairs[likely]);
     const struct sadmm_proxy a = *pa, b = *pb;

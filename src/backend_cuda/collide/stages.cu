@@ -126,7 +126,8 @@ static sadmm_status build_tree(struct sadmm_cuda_collision *c, struct sadmm_erro
     v->leaf_keys = keys[0];
     v->leaf_numbers = numbers[0];
     c->kernel = "leaf sort";
-    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, numbers, v->leaf_count, 64, &at, c->stream),
+    const int bits = LEAF_CLASS_BITS + v->group_bits + 3 * MORTON_BITS;
+    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, numbers, v->leaf_count, bits, &at, c->stream),
               c->kernel);
     v->leaf_keys = keys[at];
     v->leaf_numbers = numbers[at];

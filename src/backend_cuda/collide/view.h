@@ -66,7 +66,7 @@ enum {
     RANK_CHUNK = 1024,       /* ... and how many are staged at a time */
     EMIT_CANDIDATES = 32,    /* of a block */
     POINT_LANES = SADMM_MANIFOLD_POINTS,
-    MORTON_BITS = 21         /* an axis */
+    MORTON_BITS = 10         /* an axis: finer cells would part no more bodies, and sorting costs by the bit */
 };
 
 /* What decides whether two shapes may meet at all. */
@@ -102,10 +102,9 @@ struct alignas(8) collision_groups {
     int32_t low, high;
 };
 
-/* Key of a leaf: class, group, then as much of the Morton code as fits. Small movers come first, large ones and
- * static shapes last: a walk looks for later leaves only, so that no single thread finds everything that a large
- * shape touches. */
-enum { LEAF_CLASS_SHIFT = 62, LEAF_LARGE = 1, LEAF_STATIC = 2 };
+/* Key of a leaf: class, group, Morton code. Small movers come first, large ones and static shapes last: a walk looks for
+ * later leaves only, so that no single thread finds everything that a large shape touches. */
+enum { LEAF_CLASS_BITS = 2, LEAF_LARGE = 1, LEAF_STATIC = 2 };
 
 /* Where the Morton grid lies. Only speed depends on it. */
 struct collision_grid {
@@ -130,13 +129,20 @@ struct alignas(16) found_point {
     vec3 position;
     real separation;
 };
-struct alignas(16) found_manifold {
+struct alignas(16) found_head {
     vec3 normal;
     double ahead;
     uint32_t cache;
     int32_t count;
+};
+enum { FOUND_FEATURES = 4 };
+struct alignas(16) found_features {
+    uint32_t of[FOUND_FEATURES];
+};
+struct found_manifold {
+    found_head head;
     found_point points[SADMM_MANIFOLD_POINTS]; /* beyond `count`: not written */
-    uint32_t features[SADMM_MANIFOLD_POINTS];
+    found_features features[SADMM_MANIFOLD_POINTS / FOUND_FEATURES];
 };
 
 struct collision_set {
@@ -200,14 +206,6 @@ struct collision_view {
     struct collision_set before, after;
     int32_t point_capacity;
 };
-
-/* A proxy is whole pieces of 16 bytes (device/wide.h), which a compiler does not see: told so, it asks for two numbers at
- * a time. */
-static_assert(sizeof(struct sadmm_proxy) % 16 == 0, "whole pieces");
-static __device__ __forceinline__ const struct sadmm_proxy *proxy_at(const collision_view &v, uint32_t slot)
-{
-    return (const struct sadmm_proxy *)__builtin_assume_aligned(v.proxies + slot, 16);
-}
 
 static __device__ __forceinline__ bool aborted(const collision_view &v) { return v.abort_code && *v.abort_code != 0; }
 

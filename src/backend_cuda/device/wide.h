@@ -11,7 +11,15 @@ struct alignas(16) wide_piece {
     unsigned long long word[2];
 };
 
-/* Both are of memory whose arrays begin at multiples of a piece, as all device buffers do. */
+/* All below is of memory whose arrays begin at multiples of a piece, as all device buffers do. */
+
+/* Record i, of which a part is wanted: a compiler that is told of pieces asks for two numbers at a time. */
+template <class T> static __device__ __forceinline__ T *wide_at(T *records, size_t i)
+{
+    static_assert(sizeof(T) % sizeof(wide_piece) == 0, "whole pieces");
+    return (T *)__builtin_assume_aligned(records + i, sizeof(wide_piece));
+}
+
 template <class T> static __device__ __forceinline__ T load_wide(const T *from)
 {
     enum { PIECES = sizeof(T) / sizeof(wide_piece) };
@@ -34,15 +42,28 @@ template <class T> static __device__ __forceinline__ void store_wide(const T &fr
     for (int k = 0; k < (int)PIECES; ++k) ((wide_piece *)to)[k] = pieces[k];
 }
 
-/* A record a lane, to its place (nullptr: it has none), through shared memory of the warp: what lies side by side goes
- * out together. Every lane of the warp comes here. */
-enum { WARP_PIECES = 10 }; /* of each lane, at a time */
-struct warp_pieces {
-    void *to[32];
-    wide_piece of[32][WARP_PIECES];
+/* Rows of eight numbers: of a body's velocity, its b, a rigid one's A. */
+template <class Real> struct eight_numbers {
+    Real of[8];
 };
-template <class T>
-static __device__ __forceinline__ void store_of_warp(const T &from, T *to, struct warp_pieces *shared)
+template <class Real> static __device__ __forceinline__ const Real *row_at(const Real *rows, size_t i)
+{
+    return wide_at((const eight_numbers<Real> *)rows, i)->of;
+}
+template <class Real>
+static __device__ __forceinline__ void store_row(const eight_numbers<Real> &row, Real *rows, size_t i)
+{
+    store_wide(row, (eight_numbers<Real> *)rows + i);
+}
+
+/* A record a lane, to its place (nullptr: it has none), through shared memory of the warp: what lies side by side goes
+ * out together, AT_ONCE pieces of each lane at a time. Every lane of the warp comes here. */
+template <int AT_ONCE> struct warp_pieces {
+    void *to[32];
+    wide_piece of[32][AT_ONCE];
+};
+template <class T, int AT_ONCE>
+static __device__ __forceinline__ void store_of_warp(const T &from, T *to, warp_pieces<AT_ONCE> *shared)
 {
     enum { PIECES = sizeof(T) / sizeof(wide_piece) };
     static_assert(sizeof(T) % sizeof(wide_piece) == 0, "whole pieces");
@@ -51,8 +72,8 @@ static __device__ __forceinline__ void store_of_warp(const T &from, T *to, struc
     if (to) memcpy(pieces, &from, sizeof from);
     shared->to[lane] = to;
 #pragma unroll
-    for (int first = 0; first < (int)PIECES; first += WARP_PIECES) {
-        const int count = (int)PIECES - first < WARP_PIECES ? (int)PIECES - first : (int)WARP_PIECES;
+    for (int first = 0; first < (int)PIECES; first += AT_ONCE) {
+        const int count = (int)PIECES - first < AT_ONCE ? (int)PIECES - first : AT_ONCE;
 #pragma unroll
         for (int k = 0; to && k < count; ++k) shared->of[lane][k] = pieces[first + k];
         __syncwarp(0xffffffffu);

@@ -3,6 +3,7 @@
 #define SADMM_CUDA_ITERATE_SLOW_H
 
 #include "backend_cuda/device/lanes.h"
+#include "backend_cuda/device/wide.h"
 
 #include "core/math/limit.h"
 
@@ -35,7 +36,7 @@ static __device__ __forceinline__ solver_real slow_down(const graph_view &graph,
 /* v of body i as a step ends: what iterations have left, slowed down and with its momentum restored. */
 static __device__ __forceinline__ void end_velocity(const cuda_view &v, int32_t i, solver_real velocity[6])
 {
-    const solver_real *state = v.bodies.state + (size_t)i * ROW;
+    const solver_real *state = row_at(v.bodies.state, (size_t)i);
     const int32_t moved = *v.islands.moved; /* on its way with the other */
     const solver_real slow = slow_down(v.graph, v.islands, i);
 #pragma unroll

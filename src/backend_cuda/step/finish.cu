@@ -158,9 +158,9 @@ struct pair_before {
 static __device__ __forceinline__ pair_before fetch_pair(const raw_view &raw, const cuda_step_view &step, int32_t p,
                                                          int32_t lane)
 {
-    const struct sadmm_contact_pair *pair = &raw.pairs[p];
+    const struct sadmm_contact_pair *pair = wide_at(raw.pairs, (size_t)p);
     pair_before before = {pair->first, pair->count, fetch_ends(pair), {}};
-    if (lane < before.count) before.point = fetch_before(&step.points[before.first + lane]);
+    if (lane < before.count) before.point = fetch_before(wide_at(step.points, (size_t)(before.first + lane)));
     return before;
 }
 
@@ -170,15 +170,13 @@ static __device__ __forceinline__ bool store_impulses(const contact_view &contac
 {
     bool finite = true;
     for (int32_t k = lane; k < pair.count; k += contacts.lanes) {
-        struct sadmm_contact_point *point = &step.points[pair.first + k];
+        struct sadmm_contact_point *point = wide_at(step.points, (size_t)(pair.first + k));
         const point_before before = k == lane ? pair.point : fetch_before(point);
         double *start = step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
         v3_store(point_impulse(contacts, p, k), impulse);
         finite = finite && finite_numbers(impulse, 3);
-        for (int j = 0; j < 3; ++j) {
-            start[j] = before.impulse[j];
-            point->impulse[j] = impulse[j];
-        }
+        for (int j = 0; j < 3; ++j) start[j] = before.impulse[j];
+        for (int j = 0; j < 3; ++j) point->impulse[j] = impulse[j];
         *depth = fmax(*depth, -before.gap);
     }
     return finite;

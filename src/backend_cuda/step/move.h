@@ -28,10 +28,7 @@ struct body_before {
 
 static __device__ __forceinline__ body_before fetch_body(const cuda_step_view &step, int32_t i)
 {
-    /* whole pieces of 16 bytes (device/wide.h), of which what is used is asked for */
-    static_assert(sizeof(struct sadmm_rigid) % 16 == 0, "whole pieces");
-    const struct sadmm_rigid *body = (const struct sadmm_rigid *)__builtin_assume_aligned(step.before + i, 16);
-    const body_before before = {*body, step.steady_before[i]};
+    const body_before before = {*wide_at(step.before, (size_t)i), step.steady_before[i]};
     return before;
 }
 
@@ -53,7 +50,7 @@ static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int
     solver_real velocity[6];
     if (v.step.limits) end_velocity(v, i, velocity);
     else
-        for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)i * ROW + (size_t)k];
+        for (int k = 0; k < 6; ++k) velocity[k] = row_at(v.bodies.state, (size_t)i)[k];
     for (int k = 0; k < 6; ++k) wide[k] = (double)velocity[k];
     if (!is_carried(v)) return;
     for (int k = 0; k < 6; ++k) wide[k] += v.raw.system.carried[6 * (size_t)i + (size_t)k];

@@ -3,6 +3,7 @@
 #ifndef SADMM_CUDA_STEP_TOUCH_H
 #define SADMM_CUDA_STEP_TOUCH_H
 
+#include "backend_cuda/device/wide.h"
 #include "backend_cuda/iterate/slow.h"
 #include "backend_cuda/iterate/solution.h"
 
@@ -14,13 +15,13 @@ struct lead_body {
 /* WHOLE: a whole step, where iterations have left `state`; else that is how the step ends. */
 template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body(const cuda_view &v, int32_t body)
 {
-    const struct sadmm_rigid *rigid = &v.raw.system.rigid[body];
+    const struct sadmm_rigid *rigid = wide_at(v.raw.system.rigid, (size_t)body);
     lead_body out;
     solver_real velocity[6];
     const bool carried = WHOLE ? is_carried(v) : v.raw.system.carried != nullptr;
     if (WHOLE) end_velocity(v, body, velocity);
     else
-        for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)body * ROW + (size_t)k];
+        for (int k = 0; k < 6; ++k) velocity[k] = row_at(v.bodies.state, (size_t)body)[k];
     for (int k = 0; k < 6; ++k) {
         out.before[k] = rigid->velocity[k];
         out.velocity[k] = (double)velocity[k];
@@ -39,7 +40,7 @@ struct lead_speeds {
 
 template <bool WHOLE> static __device__ __forceinline__ lead_speeds load_lead_speeds(const cuda_view &v, int32_t body)
 {
-    const struct sadmm_rigid *rigid = &v.raw.system.rigid[body];
+    const struct sadmm_rigid *rigid = wide_at(v.raw.system.rigid, (size_t)body);
     const lead_body own = load_lead_body<WHOLE>(v, body);
     const lead_speeds out = {
         {lead_speed_part(own.before, own.velocity, 0), lead_speed_part(own.before, own.velocity, 1)},
@@ -62,7 +63,7 @@ static __device__ __forceinline__ touching fetch_touching(const cuda_view &v, in
     if (at >= end) return out;
     const int32_t code = v.graph.incident[at];
     if (code / 2 >= v.contacts.pair_capacity) return out; /* rows: problems alone have them */
-    const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];
+    const struct sadmm_contact_pair *pair = wide_at(v.raw.pairs, (size_t)(code / 2));
     out.pair = code / 2, out.side = code & 1;
     out.first = pair->first, out.count = pair->count;
     out.other = out.side ? pair->body_a : pair->body_b;
@@ -90,7 +91,8 @@ static __device__ __forceinline__ void fetch_arms(const raw_view &raw, const tou
 {
 #pragma unroll
     for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
-        const struct sadmm_contact_point *point = &raw.points[t.first + (k + j < t.count ? k + j : t.count - 1)];
+        const struct sadmm_contact_point *point =
+            wide_at(raw.points, (size_t)(t.first + (k + j < t.count ? k + j : t.count - 1)));
         const double *arm = t.side ? point->arm_b : point->arm_a;
 #pragma unroll
         for (int i = 0; i < 3; ++i) out->arm[j][i] = arm[i];
@@ -218,7 +220,7 @@ static __device__ __forceinline__ int add_ways(const cuda_view &v, const pair_en
     for (int s = 0; s < 2; ++s)
         if (ends.body[s] >= 0) sides[s] = load_lead_body<WHOLE>(v, ends.body[s]);
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
-        const struct sadmm_contact_point *point = &v.raw.points[first + k];
+        const struct sadmm_contact_point *point = wide_at(v.raw.points, (size_t)(first + k));
         const double leads[2] = {-lead_along(n, sides[0].lead, point->arm_a),
                                  lead_along(n, sides[1].lead, point->arm_b)},
                      size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)},

@@ -4,6 +4,7 @@
 #include "factor.h"
 #include "weight.h"
 #include "backend_cuda/device/plan_check.h"
+#include "backend_cuda/device/wide.h"
 
 #include "core/math/momentum.h"
 #include "core/math/penalty.h"
@@ -14,7 +15,7 @@ static __device__ void add_pair(const model_view &model, const raw_view &raw, co
                                 int side, arm_sums *sums, double C[PACKED])
 {
     const int32_t count = pair->count;
-    const struct sadmm_contact_point *points = raw.points + pair->first;
+    const struct sadmm_contact_point *points = wide_at(raw.points, (size_t)pair->first);
     for (int32_t first = 0; first < count; first += POINTS_AT_ONCE) {
         double arms[POINTS_AT_ONCE][3] = {};
 #pragma unroll
@@ -56,7 +57,7 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t record = v.graph.incident[at] / 2, side = v.graph.incident[at] & 1;
         if (record < v.contacts.pair_capacity) {
-            const struct sadmm_contact_pair *pair = &v.raw.pairs[record];
+            const struct sadmm_contact_pair *pair = wide_at(v.raw.pairs, (size_t)record);
             add_pair(v.model, v.raw, pair, side, &sums, C);
             if (!holds && v.islands.info && (side ? pair->body_a : pair->body_b) < 0)
                 holds = static_pair_holds(v.raw, pair, side);

@@ -40,22 +40,29 @@ SADMM_INLINE void sadmm_take_carried(double mass, sym3 I, const double c[6], dou
     v3_store(v3_sub(v3_load(b + 3), s3_mul(I, v3_load(c + 3))), b + 3);
 }
 
-/* A (6 x 6 row-major) and b of eq. (1). */
-SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const struct sadmm_settings *settings, int32_t i,
-                                     double A[36], double b[6])
+/* A (6 x 6 row-major) and b of eq. (1), of body i by its state. */
+SADMM_INLINE void sadmm_system_rigid(const struct sadmm_system *system, const struct sadmm_settings *settings,
+                                     const struct sadmm_rigid *state, int32_t i, double A[36], double b[6])
 {
-    if (!system->rigid) {
-        memcpy(A, system->A + 36 * (size_t)i, 36 * sizeof *A);
-        memcpy(b, system->b + 6 * (size_t)i, 6 * sizeof *b);
-        return;
-    }
     double mass;
-    const sym3 I = sadmm_rigid_body(&system->rigid[i], settings, &mass, b);
+    const sym3 I = sadmm_rigid_body(state, settings, &mass, b);
     memset(A, 0, 36 * sizeof *A);
     A[0] = A[7] = A[14] = mass;
     A[21] = I.xx, A[28] = I.yy, A[35] = I.zz;
     A[22] = A[27] = I.xy, A[23] = A[33] = I.xz, A[29] = A[34] = I.yz;
     if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (size_t)i, b);
+}
+
+/* The same of any body. */
+SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const struct sadmm_settings *settings, int32_t i,
+                                     double A[36], double b[6])
+{
+    if (system->rigid) {
+        sadmm_system_rigid(system, settings, &system->rigid[i], i, A, b);
+        return;
+    }
+    memcpy(A, system->A + 36 * (size_t)i, 36 * sizeof *A);
+    memcpy(b, system->b + 6 * (size_t)i, 6 * sizeof *b);
 }
 
 SADMM_INLINE vec3 sadmm_velocity_at(const double v[6], const double arm[3])
