@@ -88,7 +88,7 @@ const struct sadmm_scene_family sadmm_family_mixed_pile = {
         .arguments = "[:N]",
         .description = "N boxes of 30 g to 30 kg falling into a heap (N in [1, 1000000], default 300)",
         .duration = 3.0,
-        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 60},
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 51},
         .substeps = 3,
         .chaotic = true,
     },
