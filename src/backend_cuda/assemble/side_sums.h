@@ -120,7 +120,7 @@ struct side_numbers {
     solver_real of[SIDE_NUMBERS];
 };
 
-/* share: 1 / count. The response comes later. */
+/* share: 1 / count. The response, which needs both sides, is stored by store_sides. */
 static __device__ __forceinline__ void store_side(const weight_view &weights, int32_t p, int32_t side, int32_t count,
                                                   double share, bool first, bool holds, const struct pair_sums *sums)
 {

@@ -131,7 +131,7 @@ static __device__ bool is_within(const struct collision_reach &reach, const stru
 /* By which find of a step shapes are placed. */
 enum place_for { PLACE_ONE, PLACE_FIRST, PLACE_AGAIN };
 
-struct placed_pieces : warp_pieces<10> {};
+struct placed_pieces : warp_pieces<10> {}; /* COLLISION_SHARED takes the name of a struct */
 
 /* A lane's record, by the lane or, where there are many, by the warp (nullptr: it has none). */
 template <bool MANY, class T>

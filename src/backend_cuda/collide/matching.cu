@@ -65,7 +65,8 @@ static __device__ __forceinline__ emit_in_place emit_source_of(const collision_v
     return {*a, *b, {point.position, point.separation, feature}, *old, head};
 }
 
-/* Point `lane` of a candidate; place: pairs << 32 | points before it. The caller stores the point. */
+/* Point `lane` of a candidate, and its pair into the new set by the first lane; place: pairs << 32 | points before it.
+ * Points go out by the warp or by the lane, which the kernel knows. */
 template <class Source>
 static __device__ __forceinline__ struct sadmm_contact_point emit_point(const collision_view &v, const step_lengths &dt,
                                                                         int32_t lane, const emit_start &start,
@@ -119,7 +120,8 @@ emit_kernel(const __grid_constant__ collision_view v)
     const uint64_t total = v.places[v.candidate_capacity];
     if (aborted(v)) return;
     if (thread == 0) emit_counts(v, total, dt.now);
-    const int64_t first = i - i % (32 / POINT_LANES); /* of the warp: many leave, and nothing is asked for before */
+    /* Whole warps leave, since points go out by the warp; many do, so that nothing is asked for before. */
+    const int64_t first = i - i % (32 / POINT_LANES);
     if (first >= found || (int32_t)(uint32_t)total > v.point_capacity) return;
     const bool there = i < found;
     const uint64_t place = there ? v.places[i] : 0;

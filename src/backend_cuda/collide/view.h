@@ -135,7 +135,7 @@ struct alignas(16) found_head {
     uint32_t cache;
     int32_t count;
 };
-enum { FOUND_FEATURES = 4 };
+enum { FOUND_FEATURES = 4 }; /* of a piece */
 struct alignas(16) found_features {
     uint32_t of[FOUND_FEATURES];
 };

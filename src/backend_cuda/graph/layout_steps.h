@@ -163,19 +163,20 @@ LAYOUT_INLINE void statistics_of_record(const layout_view &v, int32_t record, in
         ++own->sides;
     }
     if (!islands || body[0] < 0 || body[1] < 0) return;
+    /* In global memory threads would contend for roots: they only hook here, and join_record does the rest. */
     if (SHARED) join_bodies<SHARED>(v.label, body[0], body[1]);
     else atomicMin(&v.label[larger(body[0], body[1])], body[0] < body[1] ? body[0] : body[1]);
 }
 
-/* Once every body is hooked under the smallest of those that it touches: right under its root, by pointer jumping, since
- * bodies in a row are as deep as they are many; */
+/* Once every body is hooked under the smallest of those that it touches: hook it right under its root. By pointer
+ * jumping, since the trees of bodies in a row are as deep as there are bodies. */
 LAYOUT_INLINE void flatten_body(const layout_view &v, int32_t i)
 {
     volatile int32_t *own = &v.label[i];
     for (int32_t up = *own, next; (next = parent_of<false>(v.label, up)) != up; up = next) *own = next;
 }
 
-/* and what is left to join of a record. */
+/* Join what hooking has left apart: a body has one parent, but touches several. */
 LAYOUT_INLINE void join_record(const layout_view &v, int32_t record)
 {
     const int2 body = ((const int2 *)v.side_body)[record];

@@ -175,6 +175,7 @@ static __device__ __forceinline__ bool store_impulses(const contact_view &contac
         double *start = step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
         v3_store(point_impulse(contacts, p, k), impulse);
         finite = finite && finite_numbers(impulse, 3);
+        /* one record after the other: stores to both in turn would not be joined to wider ones */
         for (int j = 0; j < 3; ++j) start[j] = before.impulse[j];
         for (int j = 0; j < 3; ++j) point->impulse[j] = impulse[j];
         *depth = fmax(*depth, -before.gap);
