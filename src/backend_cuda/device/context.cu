@@ -293,3 +293,9 @@ sadmm_status CUDA(launch_early)(struct sadmm_context *c, cuda_kernel kernel, con
 {
     return launch_blocks(c, kernel, name, blocks, threads, begins_early(c), args, error);
 }
+
+sadmm_status CUDA(launch_late)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                               int threads, const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, threads, false, args, error);
+}

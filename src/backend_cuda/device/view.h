@@ -68,6 +68,8 @@ typedef SADMM_REAL solver_real;
 enum {
     ROW = 8,              /* a wrench or a body's state: 6 used, 32 bytes in f32 */
     STATE_INV_BETA = 6,   /* slot of a state row */
+    RESIDUAL_STAYS = 7,   /* slot of a row of momentum residuals: not 0 where iterations change nothing any more of a
+                             body that nothing touches (iterate/streamed.cu) */
     PACKED = 21,          /* lower triangle, rows first */
     THREADS = 256,        /* a block, everywhere */
     WARP = 32,
@@ -143,7 +145,7 @@ struct body_view {
     solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0. Where there
                            are driven bodies a row a pair follows (assemble/assemble.cu); tier STREAM reads these */
     solver_real *b;     /* bodies x ROW */
-    solver_real *momentum_residual; /* fast: bodies x ROW: b - A v + J^T lambda */
+    solver_real *momentum_residual; /* fast: bodies x ROW: b - A v + J^T lambda, two zeros; RESIDUAL_STAYS */
     solver_real *lines; /* bodies x line: A and H (device/line.h) */
     int32_t line;
     int32_t rigid;       /* how lines are packed */

@@ -31,7 +31,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const double r = v.bodies.rigid ? momentum_residual_of<true>(v.bodies, v.graph, v.contacts, v.rows, t)
                                     : momentum_residual_of<false>(v.bodies, v.graph, v.contacts, v.rows, t);
     if (!KEEP) reduce_max(fabs(r), v.iteration.residual + 1);
-    else if (t.live) v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)r;
+    else if (t.live) v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)(t.lane < 6 ? r : 0);
 }
 
 static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const char *name, struct sadmm_error *error)

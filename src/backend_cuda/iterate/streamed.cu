@@ -40,13 +40,6 @@ static __device__ __forceinline__ void load_numbers_once(real (&to)[4 * COUNT], 
     unpack(to, four);
 }
 
-static __device__ __forceinline__ void store_numbers(solver_real *to, const real (&from)[ROW])
-{
-    const real4 lo = {from[0], from[1], from[2], from[3]}, hi = {from[4], from[5], from[6], from[7]};
-    ((real4 *)to)[0] = lo;
-    ((real4 *)to)[1] = hi;
-}
-
 /* How far a part of the iteration goes. */
 template <bool FAST>
 static __device__ __forceinline__ real relaxed(const model_view &model, const cuda_args &args, enum cuda_relax what)
@@ -54,79 +47,138 @@ static __device__ __forceinline__ real relaxed(const model_view &model, const cu
     return FAST && args.relax & what ? (real)model.settings->relaxation : (real)1;
 }
 
-/* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time.
- * (Eight lanes a body, as in the persistent tiers, where latency counts, spend the time on instructions that load and
- * pass around single numbers.) What is read once leaves the caches to states and records. The sums are those of
- * free_momentum() and step_of(); FAST: of step_fast() and residual_after(), as far as args.relax says. */
+/* Step 1, two threads a body: components 0 to 2 by the one, 3 to 5 by the other. A record has force and torque in halves
+ * of sixteen bytes (f32), and each of the two reads its own: a warp's loads are whole sectors, and twice as many records
+ * are on their way. What both need they read at the same address. (Eight lanes a body, as in the persistent tiers, where
+ * latency counts, spend the time on instructions that load and pass around single numbers.) What is read once leaves the
+ * caches to states and records. The sums are those of free_momentum() and step_of(); FAST: of step_fast() and
+ * residual_after(), as far as args.relax says.
+ *
+ * FAST: a body that nothing touches has the velocity that it falls with after an iteration or two. Once none, relaxed or
+ * not, can change a bit of it, RESIDUAL_STAYS says so, and its other numbers are not read any more. */
+enum { HALVES = 2, HALF = 3 };
+
+/* The half's own of two numbers; the other half's. */
+static __device__ __forceinline__ real own_of(int32_t half, real first, real second) { return half ? second : first; }
+static __device__ __forceinline__ real of_other_half(real own) { return __shfl_xor_sync((unsigned)ALL_LANES, own, 1); }
+
+/* All six numbers, of which the halves have three each. Every lane of the warp comes here. */
+static __device__ __forceinline__ void join_halves(int32_t half, const real (&own)[HALF], real (&all)[HALVES * HALF])
+{
+#pragma unroll
+    for (int q = 0; q < HALF; ++q) {
+        const real other = of_other_half(own[q]);
+        all[q] = own_of(half, own[q], other);
+        all[q + HALF] = own_of(half, other, own[q]);
+    }
+}
+
+/* Numbers 0 to 5 of a row of eight whose last two are as they were. Every lane of the warp comes here. */
+static __device__ __forceinline__ void store_halves(int32_t half, const real (&own)[HALF], const real (&before)[ROW],
+                                                    bool live, solver_real *row)
+{
+    const real fourth = of_other_half(own[0]);
+    const real4 piece = {own_of(half, own[0], own[1]), own_of(half, own[1], own[2]),
+                         own_of(half, own[2], before[6]), own_of(half, fourth, before[7])};
+    if (live) ((real4 *)row)[half] = piece;
+}
+
 template <bool JOIN, bool RIGID, bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_if(all_early(v.model.bodies));
-    enum { LINE = RIGID ? LINE_RIGID : LINE_GENERAL };
+    enum { LINE = RIGID ? LINE_RIGID : LINE_GENERAL, LINE_A = LINE - LINE_H };
     const unsigned block = args.backward ? gridDim.x - 1 - blockIdx.x : blockIdx.x;
-    const int32_t i = (int32_t)(block * (unsigned)BODY_THREADS + threadIdx.x);
-    if (i >= live_bodies(v.model) || (FAST && all_stopped(v.islands, args.checks))) return;
-    const size_t at = args.in_order ? (size_t)i : (size_t)v.graph.body_of[i];
-    if (FAST && island_stopped(v.graph, v.islands, args.checks, (int32_t)at)) return;
+    const int32_t t = (int32_t)(block * (unsigned)BODY_THREADS + threadIdx.x), i = t / HALVES, half = t % HALVES;
+    const bool there = i < live_bodies(v.model);
+    /* Threads without a body come along, for the other lanes' sake. */
+    const size_t at = !there ? 0 : args.in_order ? (size_t)i : (size_t)v.graph.body_of[i];
+    const bool live = there && !(FAST && island_stopped(v.graph, v.islands, args.checks, (int32_t)at));
+    const int32_t begin = live ? v.graph.offsets[i] : 0, end = live ? v.graph.offsets[i + 1] : 0;
     const real ratio = JOIN && args.rescaled ? (real)*v.iteration.ratio : (real)1,
-               relaxation_factor = relaxed<FAST>(v.model, args, RELAX_VELOCITY),
+               relaxation = FAST ? (real)v.model.settings->relaxation : (real)1,
                multipliers = relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS);
-    real line[LINE], b[ROW], state[ROW], g[6], step[6];
-    load_numbers_once<LINE / 4>(line, v.bodies.lines + at * LINE);
-    load_numbers_once<ROW / 4>(b, (FAST ? v.bodies.momentum_residual : v.bodies.b) + at * ROW);
-    load_numbers<ROW / 4>(state, v.bodies.state + at * ROW);
-#pragma unroll
-    for (int r = 0; r < 6; ++r) {
-        g[r] = FAST ? (real)0 : b[r];
-#pragma unroll
-        for (int k = 0; k < 6 && !FAST; ++k) g[r] = fused(-line_a((const real *)line, RIGID, r, k), state[k], g[r]);
+    const solver_real *line = v.bodies.lines + at * LINE;
+    solver_real *const b_row = (FAST ? v.bodies.momentum_residual : v.bodies.b) + at * ROW,
+                *const state_row = v.bodies.state + at * ROW;
+    real A[LINE_A] = {}, H[LINE_H] = {}, b[ROW], state[ROW] = {}, g[HALF], pushed[HALF], all[HALVES * HALF], step[HALF],
+         after[HALF];
+    load_numbers_once<ROW / 4>(b, b_row);
+    const bool apart = begin == end, moves = live && !(FAST && apart && b[RESIDUAL_STAYS] != 0);
+    if (!FAST || moves) {
+        load_numbers_once<LINE_A / 4>(A, line);
+        load_numbers<ROW / 4>(state, state_row);
+        load_numbers_once<LINE_H / 4>(H, line + LINE_A);
     }
-    const int32_t end = v.graph.offsets[i + 1];
+    const auto a_of = [&](int q, int k) {
+        return own_of(half, line_a((const real *)A, RIGID, q, k), line_a((const real *)A, RIGID, q + HALF, k));
+    };
+#pragma unroll
+    for (int q = 0; q < HALF; ++q) {
+        g[q] = FAST ? (real)0 : own_of(half, b[q], b[q + HALF]);
+#pragma unroll
+        for (int k = 0; k < 6 && !FAST; ++k) g[q] = fused(-a_of(q, k), state[k], g[q]);
+    }
+    const real4 *records = (const real4 *)v.iteration.records + half,
+                *changes = (const real4 *)v.iteration.change + half;
+    wait_for_stream();
+    let_next_begin();
+    if (FAST && all_stopped(v.islands, args.checks)) return;
 #pragma unroll 4
-    for (int32_t h = v.graph.offsets[i]; h < end; ++h) {
-        real record[ROW], change[ROW];
-        load_numbers<ROW / 4>(record, v.iteration.records + (size_t)h * ROW);
-        if (JOIN) load_numbers<ROW / 4>(change, v.iteration.change + (size_t)h * ROW);
-#pragma unroll
-        for (int r = 0; r < 6; ++r) {
-            const int slot = record_slot(r);
-            g[r] += JOIN ? record[slot] + ratio * change[slot] : record[slot];
+    for (int32_t h = begin; h < end; ++h) {
+        real4 record = records[HALVES * (size_t)h];
+        if (JOIN) {
+            const real4 change = changes[HALVES * (size_t)h];
+            record.x = record.x + ratio * change.x;
+            record.y = record.y + ratio * change.y;
+            record.z = record.z + ratio * change.z;
         }
+        g[0] += record.x;
+        g[1] += record.y;
+        g[2] += record.z;
     }
-    const real *H = line_h((const real *)line, RIGID);
-    real pushed[6];
 #pragma unroll
-    for (int r = 0; r < 6; ++r) pushed[r] = FAST ? fused((real)2, g[r], b[r]) : g[r];
+    for (int q = 0; q < HALF; ++q) pushed[q] = FAST ? fused((real)2, g[q], own_of(half, b[q], b[q + HALF])) : g[q];
+    join_halves(half, pushed, all);
+    const auto h_of = [&](int q, int k) { return own_of(half, H[packed_place(q, k)], H[packed_place(q + HALF, k)]); };
+    bool stays = apart;
 #pragma unroll
-    for (int r = 0; r < 6; ++r) {
-        step[r] = product_with_row(H[packed_place(r, 0)], H[packed_place(r, 1)], H[packed_place(r, 2)],
-                                   H[packed_place(r, 3)], H[packed_place(r, 4)], H[packed_place(r, 5)], pushed);
-        const real before = state[r];
-        state[r] = FAST ? fused(relaxation_factor, step[r], before) : before + step[r];
-        step[r] = state[r] - before;
+    for (int q = 0; q < HALF; ++q) {
+        const real before = own_of(half, state[q], state[q + HALF]),
+                   whole = product_with_row(h_of(q, 0), h_of(q, 1), h_of(q, 2), h_of(q, 3), h_of(q, 4), h_of(q, 5),
+                                            all);
+        after[q] = FAST ? fused(args.relax & RELAX_VELOCITY ? relaxation : (real)1, whole, before) : before + whole;
+        step[q] = after[q] - before;
+        stays = stays && fused(real_max(1, relaxation), whole, before) == before;
     }
-    store_numbers(v.bodies.state + at * ROW, state);
-    if (FAST) {
+    store_halves(half, after, state, moves, state_row);
+    if (!FAST) return;
+    const bool other_stays = __shfl_xor_sync((unsigned)ALL_LANES, (int)stays, 1) != 0;
+    b[RESIDUAL_STAYS] = stays && other_stays ? 1 : 0;
+    join_halves(half, step, all);
 #pragma unroll
-        for (int r = 0; r < 6; ++r) {
-            b[r] = fused(multipliers, g[r], b[r]);
+    for (int q = 0; q < HALF; ++q) {
+        after[q] = fused(multipliers, g[q], own_of(half, b[q], b[q + HALF]));
 #pragma unroll
-            for (int k = 0; k < 6; ++k) b[r] = fused(-line_a((const real *)line, RIGID, r, k), step[k], b[r]);
-        }
-        store_numbers(v.bodies.momentum_residual + at * ROW, b);
+        for (int k = 0; k < 6; ++k) after[q] = fused(-a_of(q, k), all[k], after[q]);
     }
+    store_halves(half, after, b, moves, b_row);
 }
 
 /* ---- kernels over constraints: blocks of threads for pairs, then blocks for row blocks --------------------------- */
 
-/* The pair of thread t: work(pair, lane, live), in whole warps; lanes beyond the last pair come with that one, not
- * live. */
-template <int LANES_A_PAIR, class Work>
-static __device__ __forceinline__ void with_pair(const model_view &model, int32_t t, Work work)
+/* The pair of thread t, in whole warps: lanes beyond the last pair come with that one, not live. */
+struct pair_thread {
+    int32_t p, lane;
+    bool there, live;
+};
+template <int LANES_A_PAIR>
+static __device__ __forceinline__ pair_thread pair_of(const model_view &model, int32_t t)
 {
     const int32_t pairs = live_pairs(model), p = t / LANES_A_PAIR;
-    if (t / WARP * (WARP / LANES_A_PAIR) < pairs) work(p < pairs ? p : pairs - 1, t % LANES_A_PAIR, p < pairs);
+    const pair_thread out = {p < pairs ? p : pairs - 1, t % LANES_A_PAIR, t / WARP * (WARP / LANES_A_PAIR) < pairs,
+                             p < pairs};
+    return out;
 }
 
 /* FAST: as far as args.relax says. */
@@ -134,16 +186,19 @@ template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_if(all_early(v.model.bodies));
-    const int32_t t = thread_index(args);
-    double primal = 0;
-    if (FAST && all_stopped(v.islands, args.checks)) return;
+    const pair_thread t = pair_of<LANES_A_PAIR>(v.model, thread_index(args));
     const real relaxation_factor = relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS);
-    with_pair<LANES_A_PAIR>(v.model, t, [&](int32_t p, int32_t lane, bool live) {
-        const bool on = live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, v.contacts.bodies[p]));
-        primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, p, lane, on,
-                                                                relaxation_factor);
-    });
+    swept_pair<COUNT> pair;
+    double primal = 0;
+    if (t.there) pair = fetch_pair<LANES_A_PAIR, COUNT, FAST>(v.contacts, t.p, t.lane);
+    wait_for_stream();
+    let_next_begin();
+    if (FAST && all_stopped(v.islands, args.checks)) return;
+    if (t.there) {
+        const bool on = t.live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, pair.joined));
+        primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, pair, t.lane,
+                                                                on, relaxation_factor);
+    }
     if (MEASURE) reduce_max(primal, v.iteration.residual);
 }
 
@@ -168,9 +223,8 @@ template <int LANES_A_PAIR>
 static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_if(all_early(v.model.bodies));
-    with_pair<LANES_A_PAIR>(v.model, thread_index(args), [&](int32_t p, int32_t lane, bool live) {
-        start_pair<LANES_A_PAIR>(v.contacts, v.iteration, p, lane, live);
-    });
+    const pair_thread t = pair_of<LANES_A_PAIR>(v.model, thread_index(args));
+    if (t.there) start_pair<LANES_A_PAIR>(v.contacts, v.iteration, t.p, t.lane, t.live);
 }
 
 static __global__ void start_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -193,8 +247,19 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
+/* A sweep. It fetches what no sweep writes, or the one before the last, and only then waits for the last one: while that
+ * one's last blocks run, the next one's are loading. So the first of a batch, which other kernels precede, begins late;
+ * `follows`: it is not the first. */
+static sadmm_status launch_sweep(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                 int threads, bool follows, const cuda_args *args, struct sadmm_error *error)
+{
+    return follows ? CUDA(launch_early)(c, kernel, name, blocks, threads, args, error)
+                   : CUDA(launch_late)(c, kernel, name, blocks, threads, args, error);
+}
+
 /* relax: of enum cuda_relax. */
-static sadmm_status launch_bodies(struct sadmm_context *c, bool join, int relax, struct sadmm_error *error)
+static sadmm_status launch_bodies(struct sadmm_context *c, bool join, int relax, bool follows,
+                                  struct sadmm_error *error)
 {
     cuda_args args = {};
     args.rescaled = c->rescaled;
@@ -206,8 +271,8 @@ static sadmm_status launch_bodies(struct sadmm_context *c, bool join, int relax,
         c->fast ? (c->view.bodies.rigid ? bodies_kernel<false, true, true> : bodies_kernel<false, false, true>)
         : c->view.bodies.rigid ? (join ? bodies_kernel<true, true, false> : bodies_kernel<false, true, false>)
                                : (join ? bodies_kernel<true, false, false> : bodies_kernel<false, false, false>);
-    const int64_t blocks = ((int64_t)c->view.model.bodies + BODY_THREADS - 1) / BODY_THREADS;
-    return CUDA(launch_of)(c, kernel, "update_velocity", blocks, BODY_THREADS, &args, error);
+    const int64_t blocks = (HALVES * (int64_t)c->view.model.bodies + BODY_THREADS - 1) / BODY_THREADS;
+    return launch_sweep(c, kernel, "update_velocity", blocks, BODY_THREADS, follows, &args, error);
 }
 
 static int64_t pair_blocks(const cuda_view *v)
@@ -223,7 +288,8 @@ template <int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool meas
                            : constraints_kernel<LANES_A_PAIR, COUNT, false, false>);
 }
 
-static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, int relax, struct sadmm_error *error)
+static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, int relax, bool follows,
+                                       struct sadmm_error *error)
 {
     cuda_args args = {};
     args.relax = relax;
@@ -233,7 +299,7 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, in
     cuda_kernel kernel = c->view.contacts.lanes == 1      ? sweep_kernel<1, 1>(measure, c->fast)
                          : c->statistics.point_slots <= 4 ? sweep_kernel<4, 1>(measure, c->fast)
                                                           : sweep_kernel<4, 2>(measure, c->fast);
-    TRY(CUDA(launch)(c, kernel, "update_constraints", pair_blocks(&c->view), &args, error));
+    TRY(launch_sweep(c, kernel, "update_constraints", pair_blocks(&c->view), THREADS, follows, &args, error));
     kernel = measure ? (c->fast ? rows_kernel<true, true> : rows_kernel<true, false>)
                      : (c->fast ? rows_kernel<false, true> : rows_kernel<false, false>);
     return CUDA(launch)(c, kernel, "update_constraints (rows)", blocks_for(c->view.rows.count), &args, error);
@@ -274,7 +340,7 @@ extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sa
     TRY(refuse_fast(c, error));
     CUDA_ENTER(c);
     TRY(prepare_stepwise(c, error));
-    TRY(launch_bodies(c, c->measured, 0, error));
+    TRY(launch_bodies(c, c->measured, 0, false, error));
     c->measured = false;
     c->rescaled = false;
     return SADMM_OK;
@@ -286,7 +352,7 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
     CUDA_ENTER(c);
     TRY(prepare_stepwise(c, error));
     TRY(CUDA(clear_primal)(c, measure, error));
-    TRY(launch_constraints(c, measure, 0, error));
+    TRY(launch_constraints(c, measure, 0, false, error));
     c->measured = measure;
     return SADMM_OK;
 }
@@ -294,25 +360,31 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
 /* ---- fused: STREAM -------------------------------------------------------------------------------------------- */
 
 /* fast: Steps 2-4 first, and relaxed as iteration i of `count` is. */
-static sadmm_status fast_iteration(struct sadmm_context *c, int i, int count, bool measure, struct sadmm_error *error)
+static sadmm_status fast_iteration(struct sadmm_context *c, int i, int count, bool measure, bool follows,
+                                   struct sadmm_error *error)
 {
     const int multipliers = relax_constraints(i, count) ? RELAX_MULTIPLIERS : 0;
-    TRY(launch_constraints(c, measure, multipliers, error));
-    TRY(launch_bodies(c, false, multipliers | (relax_velocity(i, count, c->settled) ? RELAX_VELOCITY : 0), error));
+    TRY(launch_constraints(c, measure, multipliers, follows, error));
+    TRY(launch_bodies(c, false, multipliers | (relax_velocity(i, count, c->settled) ? RELAX_VELOCITY : 0), true,
+                      error));
     c->settled = true;
     return SADMM_OK;
 }
 
-/* Iterations of which nothing is special: fast, relaxed ones. */
-static sadmm_status plain_iterations(struct sadmm_context *c, int count, struct sadmm_error *error)
+/* The paper's: Step 1 first. */
+static sadmm_status paper_iteration(struct sadmm_context *c, bool join, bool measure, bool follows,
+                                    struct sadmm_error *error)
 {
-    for (int i = 0; i < count; ++i) {
-        if (c->fast) {
-            TRY(fast_iteration(c, i, count + 1, false, error));
-            continue;
-        }
-        TRY(launch_bodies(c, false, 0, error));
-        TRY(launch_constraints(c, false, 0, error));
+    TRY(launch_bodies(c, join, 0, follows, error));
+    return launch_constraints(c, measure, 0, true, error);
+}
+
+/* Iterations of which nothing is special: fast, relaxed ones. */
+static sadmm_status plain_iterations(struct sadmm_context *c, int count, bool follows, struct sadmm_error *error)
+{
+    for (int i = 0; i < count; ++i, follows = true) {
+        if (c->fast) TRY(fast_iteration(c, i, count + 1, false, follows, error));
+        else TRY(paper_iteration(c, false, false, follows, error));
     }
     return SADMM_OK;
 }
@@ -322,7 +394,7 @@ static sadmm_status make_graph(struct sadmm_context *c, struct sadmm_error *erro
 {
     cudaGraph_t graph = nullptr;
     CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
-    sadmm_status status = plain_iterations(c, GRAPH_ITERATIONS, error);
+    sadmm_status status = plain_iterations(c, GRAPH_ITERATIONS, false, error);
     cudaError_t code = cudaStreamEndCapture(c->stream, &graph);
     if (status != SADMM_OK || code != cudaSuccess) {
         if (graph) cudaGraphDestroy(graph);
@@ -349,25 +421,24 @@ static sadmm_status make_graph(struct sadmm_context *c, struct sadmm_error *erro
 sadmm_status CUDA(stream_iterations)(struct sadmm_context *c, int count, bool measure, bool goes_on,
                                      struct sadmm_error *error)
 {
+    bool follows = false;
     TRY(prepare_stepwise(c, error));
     if (c->measured) {
-        TRY(launch_bodies(c, true, 0, error));
-        TRY(launch_constraints(c, measure && count == 1, 0, error));
+        TRY(paper_iteration(c, true, measure && count == 1, false, error));
+        follows = true;
         --count;
     }
     if (c->fast && !c->settled && (count > 1 || goes_on)) {
-        TRY(fast_iteration(c, 0, 2, false, error));
+        TRY(fast_iteration(c, 0, 2, false, false, error));
+        follows = true;
         --count;
     }
     int plain = (measure || (c->fast && !goes_on)) && count > 0 ? count - 1 : count;
     if (plain >= GRAPH_ITERATIONS && !c->recording && !c->graph_valid) TRY(make_graph(c, error));
     for (; plain >= GRAPH_ITERATIONS && !c->recording; plain -= GRAPH_ITERATIONS, count -= GRAPH_ITERATIONS)
         CUDA_CALL(c, cudaGraphLaunch(c->graph, c->stream), "cudaGraphLaunch");
-    TRY(plain_iterations(c, plain, error));
-    if (count > plain && c->fast) return fast_iteration(c, 0, 1, measure, error);
-    if (count > plain) {
-        TRY(launch_bodies(c, false, 0, error));
-        TRY(launch_constraints(c, true, 0, error));
-    }
-    return SADMM_OK;
+    TRY(plain_iterations(c, plain, follows, error));
+    follows = follows || plain > 0;
+    if (count > plain && c->fast) return fast_iteration(c, 0, 1, measure, follows, error);
+    return count > plain ? paper_iteration(c, false, true, follows, error) : SADMM_OK;
 }

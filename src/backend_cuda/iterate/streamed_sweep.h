@@ -54,37 +54,57 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
     if (live && side >= 0) out[2 * (size_t)side + (odd ? 1 : 0)] = pack(on_b ? sum : v3_neg(sum), 0);
 }
 
-/* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is there or
- * not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp
- * comes here. FAST: lambda goes `relaxation_factor` times as far; records are those of Step 1 in any case. Returns the
- * lane's share of the primal residual. */
-template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
-static __device__ __forceinline__ double sweep_pair(const model_view &model, const body_view &bodies,
-                                                    const contact_view &contacts, const iteration_view &iteration,
-                                                    int32_t p, int32_t lane, bool live, real relaxation_factor)
-{
-    enum { SPLIT = MEASURE && !FAST };
-    const real4 about = load_once(contacts.normal + p), between = load_once(contacts.difference + p);
-    const pair_bodies joined = load_once(contacts.bodies + p);
-    const real weight = FAST ? contacts.inv_s[p] : (real)0;
+/* A lane's share of a pair, but for its bodies' states: points lane and, where COUNT is 2, lane + 4. The first is loaded
+ * whether it is there or not, so that nothing but the states waits for another load. */
+template <int COUNT> struct swept_pair {
+    real4 about, between;
+    pair_bodies joined;
+    real weight; /* FAST */
     size_t slot[COUNT];
     real4 point[COUNT];
     vec3 old[COUNT];
-    slot[0] = point_slot<LANES_A_PAIR>(contacts, p, lane);
-    point[0] = load_once(contacts.arm + slot[0]);
-    old[0] = load_lambda(contacts, slot[0]);
-    const int32_t count = (int32_t)between.w;
+};
+
+template <int LANES_A_PAIR, int COUNT, bool FAST>
+static __device__ __forceinline__ swept_pair<COUNT> fetch_pair(const contact_view &contacts, int32_t p, int32_t lane)
+{
+    swept_pair<COUNT> pair;
+    pair.about = load_once(contacts.normal + p);
+    pair.between = load_once(contacts.difference + p);
+    pair.joined = load_once(contacts.bodies + p);
+    pair.weight = FAST ? contacts.inv_s[p] : (real)0;
+    pair.slot[0] = point_slot<LANES_A_PAIR>(contacts, p, lane);
+    pair.point[0] = load_once(contacts.arm + pair.slot[0]);
+    pair.old[0] = load_lambda(contacts, pair.slot[0]);
+    const int32_t count = (int32_t)pair.between.w;
 #pragma unroll
     for (int32_t j = 1; j < COUNT; ++j) {
         if (lane + LANES_A_PAIR * j >= count) continue;
-        slot[j] = point_slot<LANES_A_PAIR>(contacts, p, lane + LANES_A_PAIR * j);
-        point[j] = load_once(contacts.arm + slot[j]);
-        old[j] = load_lambda(contacts, slot[j]);
+        pair.slot[j] = point_slot<LANES_A_PAIR>(contacts, p, lane + LANES_A_PAIR * j);
+        pair.point[j] = load_once(contacts.arm + pair.slot[j]);
+        pair.old[j] = load_lambda(contacts, pair.slot[j]);
     }
+    return pair;
+}
+
+/* `live`: else nothing is stored. Every lane of the warp comes here. FAST: lambda goes `relaxation_factor` times as far;
+ * records are those of Step 1 in any case. Returns the lane's share of the primal residual. */
+template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
+static __device__ __forceinline__ double sweep_pair(const model_view &model, const body_view &bodies,
+                                                    const contact_view &contacts, const iteration_view &iteration,
+                                                    const swept_pair<COUNT> &pair, int32_t lane, bool live,
+                                                    real relaxation_factor)
+{
+    enum { SPLIT = MEASURE && !FAST };
+    const real4 &about = pair.about, &between = pair.between;
+    const pair_bodies &joined = pair.joined;
+    const real4(&point)[COUNT] = pair.point;
+    const vec3(&old)[COUNT] = pair.old;
+    const int32_t count = (int32_t)between.w;
     const body_row a = load_row(bodies.state, joined.body_a), b = load_row(bodies.state, joined.body_b);
 
     const vec3 normal = xyz(about), difference = xyz(between);
-    const real inv_s = FAST ? weight : penalty_inverse_s(a.inv_beta, b.inv_beta);
+    const real inv_s = FAST ? pair.weight : penalty_inverse_s(a.inv_beta, b.inv_beta);
     real largest = 0;
     pair_sum next = {}, change = {};
 #pragma unroll
@@ -95,7 +115,7 @@ static __device__ __forceinline__ double sweep_pair(const model_view &model, con
         const point_change to = update<FAST>(normal, about.w, x, point[j].w, inv_s, old[j]);
         const vec3 lambda = to.lambda, delta = to.delta;
         if (live)
-            store_lambda(contacts, slot[j],
+            store_lambda(contacts, pair.slot[j],
                          FAST ? relaxed(old[j], to, relaxation_factor == 1, relaxation_factor) : lambda);
         add_point(&next, j,
                   FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta), arm_a, arm_b);

@@ -116,7 +116,7 @@ static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const
     term[2] = dot_lanes(row.velocity, momentum);
     term[3] = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_PUSH, LANES);
     const double r = row.b + g - momentum;
-    if (t.live) v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)r;
+    if (t.live) v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)(t.lane < 6 ? r : 0);
     if (!SCALES) {
         /* a body that nothing touches moves as it should */
         const double holds = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_HOLDS, LANES);
