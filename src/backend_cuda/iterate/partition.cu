@@ -14,7 +14,7 @@
  *   CLUSTER  else, whenever a cluster can hold an island: its size such that a block holds some tens of sides, or as
  *            large as leaves one for every island
  *   GRID     an island that no cluster can hold, or a few that do not fit side by side
- *   STREAM   what the device cannot hold at once
+ *   STREAM   what the device cannot hold at once, and (fast) bodies of which most are in the air, tens of thousands
  */
 #include "iterate.h"
 
@@ -28,6 +28,9 @@ enum {
 /* Nanoseconds of an iteration: floors of the tiers, of a cluster for each of its blocks, and of each side that a
  * multiprocessor holds. For an H200 and f32; how they compare is all that matters. */
 enum { BLOCK_TIME = 350, CLUSTER_TIME = 580, MEMBER_TIME = 8, GRID_TIME = 1900, SIDE_TIME = 3 };
+/* Likewise, fast: of a body that nothing touches, and of STREAM's two kernels, which leave out FREE_A_TIME of them in one
+ * (iterate/streamed.cu). */
+enum { FREE_TIME = 8, STREAM_TIME = 2750, FREE_A_TIME = 50 };
 
 /* A partition, why there is none (else NULL), and its nanoseconds an iteration. */
 struct choice {
@@ -121,6 +124,29 @@ static int64_t most_parts(const struct sadmm_context *c)
     return c->view.model.bodies + (int64_t)c->multiprocessors * MOST_BLOCKS;
 }
 
+/* Do blocks of so many parts take what is in them, `blocks` of them on a multiprocessor? */
+static bool parts_fit(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics, int64_t parts,
+                      int64_t blocks, int64_t most)
+{
+    const struct bound bound = island_bound(c, statistics, parts);
+    return bound.sides <= most_sides_of(c, most) && blocks * threads_for(c, bound, most) <= most;
+}
+
+/* Parts in rounds of blocks that run one after another: as few rounds as there can be, and of those the smallest blocks,
+ * which have more registers and do more of a step (persistent_does_prologue). */
+static int64_t parts_in_rounds(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
+                               int64_t most, int64_t *side_by_side)
+{
+    for (int64_t rounds = 1; rounds * c->multiprocessors <= most_parts(c); ++rounds)
+        for (int64_t blocks = MOST_BLOCKS; blocks > 0; blocks /= 2) {
+            const int64_t parts = rounds * blocks * c->multiprocessors;
+            if (parts > most_parts(c) || !parts_fit(c, statistics, parts, blocks, most)) continue;
+            *side_by_side = blocks;
+            return parts;
+        }
+    return INT64_MAX;
+}
+
 /* Islands in thread blocks. */
 static struct choice choose_block(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics)
 {
@@ -130,14 +156,15 @@ static struct choice choose_block(const struct sadmm_context *c, const struct cu
                   most_sides = most_sides_of(c, most);
     if (statistics->island_sides > most_sides) return no_choice(too_large);
     /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the memory
-     * a block has, blocks that run one after another. */
+     * a block has, rounds of blocks that run one after another. */
     int64_t parts = c->multiprocessors, side_by_side = 1;
     while (side_by_side < MOST_BLOCKS && 2 * parts <= statistics->islands &&
            2 * side_by_side * threads_for(c, island_bound(c, statistics, 2 * parts), most) <= most) {
         parts *= 2;
         side_by_side *= 2;
     }
-    while (island_bound(c, statistics, parts).sides > most_sides) parts += parts / 4 + 1;
+    if (island_bound(c, statistics, parts).sides > most_sides)
+        parts = parts_in_rounds(c, statistics, most, &side_by_side);
     if (parts > most_parts(c)) return no_choice(too_many);
     if (statistics->islands <= 1) parts = 1;
     struct bound bound = island_bound(c, statistics, parts);
@@ -252,6 +279,13 @@ static struct choice choose_stream(void)
     return choice;
 }
 
+/* Would STREAM gain more by leaving out what nothing touches than its kernels take? */
+static bool most_are_free(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics)
+{
+    const int64_t free = larger((int64_t)c->view.model.bodies - statistics->sides, 0);
+    return c->fast && FREE_TIME * up(free, c->multiprocessors) > STREAM_TIME + free / FREE_A_TIME;
+}
+
 /* What is likely the fastest; a tier whose floor is above what another takes is left out. */
 static struct choice choose_any(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
                                 cudaError_t *code)
@@ -267,7 +301,7 @@ static struct choice choose_any(const struct sadmm_context *c, const struct cuda
         if (*code != cudaSuccess) return grid;
         if (grid.time < best.time) best = grid;
     }
-    return best.why ? choose_stream() : best;
+    return best.why || most_are_free(c, statistics) ? choose_stream() : best;
 }
 
 sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
