@@ -177,6 +177,7 @@ static struct choice choose_block(const struct sadmm_context *c, const struct cu
     if (!take_capacity(c, &choice.partition, bound, c->shared_limit / side_by_side) &&
         !take_capacity(c, &choice.partition, bound, c->shared_limit))
         return no_choice(too_large);
+    side_by_side = smaller(side_by_side, larger((int64_t)(c->shared_limit / choice.partition.shared), 1));
     const int64_t rounds = up(smaller(parts, larger(statistics->islands, 1)), c->multiprocessors * side_by_side);
     const int64_t sides = side_by_side * larger(statistics->island_sides, up(statistics->sides, parts));
     choice.time = rounds * (BLOCK_TIME + SIDE_TIME * sides);

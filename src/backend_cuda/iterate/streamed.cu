@@ -24,13 +24,6 @@ template <int COUNT> static __device__ __forceinline__ void unpack(real (&to)[4 
     for (int i = 0; i < COUNT; ++i)
         to[4 * i] = four[i].x, to[4 * i + 1] = four[i].y, to[4 * i + 2] = four[i].z, to[4 * i + 3] = four[i].w;
 }
-template <int COUNT> static __device__ __forceinline__ void load_numbers(real (&to)[4 * COUNT], const solver_real *from)
-{
-    real4 four[COUNT];
-#pragma unroll
-    for (int i = 0; i < COUNT; ++i) four[i] = ((const real4 *)from)[i];
-    unpack(to, four);
-}
 template <int COUNT>
 static __device__ __forceinline__ void load_numbers_once(real (&to)[4 * COUNT], const solver_real *from)
 {
@@ -73,6 +66,19 @@ static __device__ __forceinline__ void join_halves(int32_t half, const real (&ow
     }
 }
 
+/* A row of eight by both, half of it each (`there`: else it is 0). Every lane of the warp comes here. */
+static __device__ __forceinline__ void fetch_halves(int32_t half, bool there, const solver_real *row, real (&to)[ROW])
+{
+    const real4 none = {}, own = there ? load_early((const real4 *)row + half) : none,
+                other = {of_other_half(own.x), of_other_half(own.y), of_other_half(own.z), of_other_half(own.w)};
+    const real four[2][4] = {{own.x, own.y, own.z, own.w}, {other.x, other.y, other.z, other.w}};
+#pragma unroll
+    for (int k = 0; k < 4; ++k) {
+        to[k] = own_of(half, four[0][k], four[1][k]);
+        to[k + 4] = own_of(half, four[1][k], four[0][k]);
+    }
+}
+
 /* Numbers 0 to 5 of a row of eight whose last two are as they were. Every lane of the warp comes here. */
 static __device__ __forceinline__ void store_halves(int32_t half, const real (&own)[HALF], const real (&before)[ROW],
                                                     bool live, solver_real *row)
@@ -101,15 +107,15 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const solver_real *line = v.bodies.lines + at * LINE;
     solver_real *const b_row = (FAST ? v.bodies.momentum_residual : v.bodies.b) + at * ROW,
                 *const state_row = v.bodies.state + at * ROW;
-    real A[LINE_A] = {}, H[LINE_H] = {}, b[ROW], state[ROW] = {}, g[HALF], pushed[HALF], all[HALVES * HALF], step[HALF],
+    real A[LINE_A] = {}, H[LINE_H] = {}, b[ROW], state[ROW], g[HALF], pushed[HALF], all[HALVES * HALF], step[HALF],
          after[HALF];
-    load_numbers_once<ROW / 4>(b, b_row);
+    fetch_halves(half, true, b_row, b);
     const bool apart = begin == end, moves = live && !(FAST && apart && b[RESIDUAL_STAYS] != 0);
     if (!FAST || moves) {
         load_numbers_once<LINE_A / 4>(A, line);
-        load_numbers<ROW / 4>(state, state_row);
         load_numbers_once<LINE_H / 4>(H, line + LINE_A);
     }
+    fetch_halves(half, !FAST || moves, state_row, state);
     const auto a_of = [&](int q, int k) {
         return own_of(half, line_a((const real *)A, RIGID, q, k), line_a((const real *)A, RIGID, q + HALF, k));
     };
@@ -253,8 +259,9 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
 static sadmm_status launch_sweep(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
                                  int threads, bool follows, const cuda_args *args, struct sadmm_error *error)
 {
-    return follows ? CUDA(launch_early)(c, kernel, name, blocks, threads, args, error)
-                   : CUDA(launch_late)(c, kernel, name, blocks, threads, args, error);
+    const bool alternate = c->view.contacts.pair_capacity > 0; /* else Step 1 would follow on itself */
+    return follows && alternate ? CUDA(launch_early)(c, kernel, name, blocks, threads, args, error)
+                                : CUDA(launch_late)(c, kernel, name, blocks, threads, args, error);
 }
 
 /* relax: of enum cuda_relax. */

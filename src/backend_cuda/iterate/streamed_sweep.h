@@ -65,6 +65,13 @@ template <int COUNT> struct swept_pair {
     vec3 old[COUNT];
 };
 
+/* load_lambda, before the wait: load_early. */
+static __device__ __forceinline__ vec3 fetch_lambda(const contact_view &contacts, size_t slot)
+{
+    const solver_real *lambda = contacts.lambda + slot;
+    return v3(__ldcg(lambda), __ldcg(lambda + contacts.lambda_stride), __ldcg(lambda + 2 * contacts.lambda_stride));
+}
+
 template <int LANES_A_PAIR, int COUNT, bool FAST>
 static __device__ __forceinline__ swept_pair<COUNT> fetch_pair(const contact_view &contacts, int32_t p, int32_t lane)
 {
@@ -75,14 +82,14 @@ static __device__ __forceinline__ swept_pair<COUNT> fetch_pair(const contact_vie
     pair.weight = FAST ? contacts.inv_s[p] : (real)0;
     pair.slot[0] = point_slot<LANES_A_PAIR>(contacts, p, lane);
     pair.point[0] = load_once(contacts.arm + pair.slot[0]);
-    pair.old[0] = load_lambda(contacts, pair.slot[0]);
+    pair.old[0] = fetch_lambda(contacts, pair.slot[0]);
     const int32_t count = (int32_t)pair.between.w;
 #pragma unroll
     for (int32_t j = 1; j < COUNT; ++j) {
         if (lane + LANES_A_PAIR * j >= count) continue;
         pair.slot[j] = point_slot<LANES_A_PAIR>(contacts, p, lane + LANES_A_PAIR * j);
         pair.point[j] = load_once(contacts.arm + pair.slot[j]);
-        pair.old[j] = load_lambda(contacts, pair.slot[j]);
+        pair.old[j] = fetch_lambda(contacts, pair.slot[j]);
     }
     return pair;
 }

@@ -33,6 +33,19 @@ template <class T> CUDA_INLINE T load_once(const T *from)
     return value;
 }
 
+/* The same past the first-level cache, which may still have what a kernel before the last one has overwritten: for what
+ * is fetched before the wait of an early launch. */
+template <class T> CUDA_INLINE T load_early(const T *from)
+{
+    enum { PARTS = sizeof(T) / sizeof(int4) };
+    int4 parts[PARTS];
+#pragma unroll
+    for (int i = 0; i < PARTS; ++i) parts[i] = __ldcg((const int4 *)from + i);
+    T value;
+    memcpy(&value, parts, sizeof value);
+    return value;
+}
+
 /* v of a body. */
 struct body_motion {
     vec3 linear, angular;
