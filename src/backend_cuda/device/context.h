@@ -90,8 +90,8 @@ void CUDA(release_buffers)(struct sadmm_context *);
 sadmm_status CUDA(reserve)(struct sadmm_context *, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error);
 /* Are kernels launched early (early.h)? In recorded steps, but for cooperative launches: in small worlds all of them but
  * first sweeps of tier STREAM; in others, where they are long, those from the islands on (launch_early,
- * launch_partition). With all of them early pile:100000 and pile:20000 took 1 to 2 % longer, with none 2 and 0.5; but the sweeps of tier STREAM, which fetch most of
- * what they need before they wait, take 2 to 4 us less each (iterate/streamed.cu). */
+ * launch_partition). With all of them early, when sweeps fetched nothing before they waited, pile:100000 and pile:20000
+ * took 1 to 2 % longer, with none 2 and 0.5. */
 static inline bool begins_early(const struct sadmm_context *c) { return c->early && c->recording; }
 static inline bool all_begin_early(const struct sadmm_context *c)
 {

@@ -30,8 +30,8 @@ static __device__ __forceinline__ void let_next_begin(void)
 #endif
 }
 
-/* In small worlds all kernels are launched early, but for first sweeps of tier STREAM (launch_late). In others blocks come in waves, and those of the next kernel would take
- * their room. */
+/* In small worlds all kernels are launched early, but for first sweeps of tier STREAM (launch_late). In others blocks
+ * come in waves, and those of the next kernel would take their room. */
 enum { MOST_BODIES_ALL_EARLY = 16384 };
 static __host__ __device__ __forceinline__ bool all_early(int32_t bodies) { return bodies <= MOST_BODIES_ALL_EARLY; }
 static __device__ __forceinline__ void let_next_begin(int32_t bodies)

@@ -42,7 +42,7 @@ static __device__ __forceinline__ real relaxed(const model_view &model, const cu
 
 /* Step 1, two threads a body: components 0 to 2 by the one, 3 to 5 by the other. A record has force and torque in halves
  * of sixteen bytes (f32), and each of the two reads its own: a warp's loads are whole sectors, and twice as many records
- * are on their way. What both need they read at the same address. (Eight lanes a body, as in the persistent tiers, where
+ * are on their way. A's and H's numbers both read at the same address, rows by halves that they pass on. (Eight lanes a body, as in the persistent tiers, where
  * latency counts, spend the time on instructions that load and pass around single numbers.) What is read once leaves the
  * caches to states and records. The sums are those of free_momentum() and step_of(); FAST: of step_fast() and
  * residual_after(), as far as args.relax says.

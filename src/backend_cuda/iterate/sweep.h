@@ -21,29 +21,29 @@ CUDA_INLINE real4 pack(vec3 a, real w)
     return out;
 }
 
-/* A value of 16 or 32 bytes that this launch reads once: it leaves the caches before those that stay useful. */
-template <class T> CUDA_INLINE T load_once(const T *from)
+/* A value of 16 or 32 bytes, each sixteen by `load`. */
+template <class T, class Load> CUDA_INLINE T load_parts(const T *from, Load load)
 {
     enum { PARTS = sizeof(T) / sizeof(int4) };
     int4 parts[PARTS];
 #pragma unroll
-    for (int i = 0; i < PARTS; ++i) parts[i] = __ldcs((const int4 *)from + i);
+    for (int i = 0; i < PARTS; ++i) parts[i] = load((const int4 *)from + i);
     T value;
     memcpy(&value, parts, sizeof value);
     return value;
 }
 
-/* The same past the first-level cache, which may still have what a kernel before the last one has overwritten: for what
- * is fetched before the wait of an early launch. */
+/* What this launch reads once: it leaves the caches before those that stay useful. */
+template <class T> CUDA_INLINE T load_once(const T *from)
+{
+    return load_parts(from, [](const int4 *part) { return __ldcs(part); });
+}
+
+/* What is fetched before the wait of an early launch, and kernels before the last one have written: past the first-level
+ * cache, which is not promised to know. */
 template <class T> CUDA_INLINE T load_early(const T *from)
 {
-    enum { PARTS = sizeof(T) / sizeof(int4) };
-    int4 parts[PARTS];
-#pragma unroll
-    for (int i = 0; i < PARTS; ++i) parts[i] = __ldcg((const int4 *)from + i);
-    T value;
-    memcpy(&value, parts, sizeof value);
-    return value;
+    return load_parts(from, [](const int4 *part) { return __ldcg(part); });
 }
 
 /* v of a body. */
