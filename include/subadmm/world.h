@@ -95,7 +95,7 @@ typedef struct sadmm_body_def {
     double angular_velocity[3];  /* rad/s, |w| <= 1e6; 0 for static bodies */
     int32_t environment;         /* bodies of different environments never meet; >= 0, or -1 (not dynamic): meets all;
                                     default 0 (static: -1 is the usual choice) */
-    const char *name;            /* copied, at most 63 bytes; NULL = "" */
+    const char *name;            /* UTF-8; copied, as many whole characters as fit into 63 bytes; NULL = "" */
     /* Of dynamic bodies, ignored for others: */
     double gravity_scale;        /* the body's gravity over settings.gravity, in [-1e6, 1e6]; default 1 */
     double linear_damping;       /* 1/s, in [0, 1e6]; default 0. c: a force -c mass velocity, so that free motion decays

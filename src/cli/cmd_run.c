@@ -1,6 +1,7 @@
 /* subadmm run: step a scene and say what it cost, how exact it was and where it ended. */
 #include <limits.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -8,6 +9,7 @@
 
 #include "cli.h"
 #include "core/base/memory.h"
+#include "core/base/utf8.h"
 #include "fclib/fclib.h"
 #include "interrupt.h"
 #include "open_scene.h"
@@ -174,6 +176,16 @@ static void show_progress(struct progress *p, const struct run_record *record, l
 /* ---- the run ----------------------------------------------------------------------------------------------------- */
 
 /* Errors are the run's: record->failure. */
+__attribute__((format(printf, 2, 3))) static int fail(struct run_record *record, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(record->failure, sizeof record->failure, format, arguments);
+    va_end(arguments);
+    sadmm_utf8_mend(record->failure); /* names are cut, and JSON has whole characters only */
+    return CLI_FAILED;
+}
+
 static int dump_problem(struct run_dump *dump, const char *spec, sadmm_world *world, struct run_record *record)
 {
     char title[160];
@@ -186,13 +198,9 @@ static int dump_problem(struct run_dump *dump, const char *spec, sadmm_world *wo
         sadmm_fail(&error, status, "%s", sadmm_world_message(world));
     else status = sadmm_fclib_save(problem, output_path(dump->output), title, &error);
     sadmm_problem_destroy(problem);
-    if (status != SADMM_OK) {
-        snprintf(record->failure, sizeof record->failure, "--dump-problem %.80s: %.200s", dump->path, error.message);
-        return CLI_FAILED;
-    }
+    if (status != SADMM_OK) return fail(record, "--dump-problem %.80s: %.200s", dump->path, error.message);
     int code = output_close(dump->output);
-    if (code != CLI_DONE)
-        snprintf(record->failure, sizeof record->failure, "--dump-problem %.200s could not be written", dump->path);
+    if (code != CLI_DONE) fail(record, "--dump-problem %.200s could not be written", dump->path);
     return code;
 }
 
@@ -220,8 +228,7 @@ static int trace_step(struct run_record *record, sadmm_world *world, double time
     FILE *stream = output_stream(trace);
     if (!run_trace_step(stream, record, world, time)) return CLI_FAILED;
     if (!ferror(stream)) return CLI_DONE;
-    snprintf(record->failure, sizeof record->failure, "step %zu: the trace could not be written", record->steps);
-    return CLI_FAILED;
+    return fail(record, "step %zu: the trace could not be written", record->steps);
 }
 
 /* After a step, or before the first. */
@@ -229,8 +236,7 @@ static int observe(const struct sadmm_scene *scene, sadmm_world *world, struct r
 {
     struct sadmm_error error = {0};
     if (sadmm_scene_observe(scene, world, (int64_t)record->steps, &record->result, &error) == SADMM_OK) return CLI_DONE;
-    snprintf(record->failure, sizeof record->failure, "%s", error.message);
-    return CLI_FAILED;
+    return fail(record, "%s", error.message);
 }
 
 static int step_all(struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world,
@@ -244,11 +250,9 @@ static int step_all(struct run_options *o, const char *spec, const struct sadmm_
     for (long step = 0; code == CLI_DONE && step < o->steps && !interrupted(); ++step) {
         struct sadmm_error error = {0};
         if (sadmm_scene_before_step(scene, world, step, &error) != SADMM_OK) {
-            snprintf(record->failure, sizeof record->failure, "%s", error.message);
-            code = CLI_FAILED;
+            code = fail(record, "%s", error.message);
         } else if ((step + 1 == o->steps && !prepare_last_step(world)) || sadmm_world_step(world) != SADMM_OK) {
-            snprintf(record->failure, sizeof record->failure, "step %ld: %.280s", step + 1, sadmm_world_message(world));
-            code = CLI_FAILED;
+            code = fail(record, "step %ld: %.280s", step + 1, sadmm_world_message(world));
         } else if (!run_record_step(record, world)) {
             code = CLI_FAILED;
         } else {

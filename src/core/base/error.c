@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "utf8.h"
+
 static _Thread_local char last_message[SADMM_MESSAGE_SIZE];
 
 sadmm_status sadmm_fail(struct sadmm_error *error, sadmm_status status, const char *format, ...)
@@ -12,6 +14,7 @@ sadmm_status sadmm_fail(struct sadmm_error *error, sadmm_status status, const ch
     va_start(arguments, format);
     vsnprintf(last_message, sizeof last_message, format, arguments);
     va_end(arguments);
+    sadmm_utf8_mend(last_message); /* of names that were cut, or are none */
     if (error) {
         error->status = status;
         memcpy(error->message, last_message, sizeof last_message);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "core/base/utf8.h"
 #include "core/math/rigid.h"
 #include "core/model/steady.h"
 #include "world_internal.h"
@@ -121,12 +122,14 @@ static size_t free_slot(sadmm_world *world)
     return sadmm_slot_free(&world->body_marks, world, alive);
 }
 
-/* A copy of `given`, cut to what fits. */
+/* A copy of `given`, cut to the characters that fit. */
 static sadmm_status copy_name(const char *given, char **name, struct sadmm_error *error)
 {
-    size_t length = 0;
+    const size_t length = given ? sadmm_utf8_fit(given, SADMM_NAME_SIZE - 1) : 0;
     *name = NULL;
-    while (given && length < SADMM_NAME_SIZE - 1 && given[length]) ++length;
+    if (given && given[length] && sadmm_utf8_character(given + length) == 0)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->name: must be UTF-8, its byte %zu (0x%02x) is not",
+                          length, (unsigned char)given[length]);
     if (length == 0) return SADMM_OK;
     *name = (char *)sadmm_alloc(length + 1, 1);
     if (!*name) return sadmm_fail_memory(error, "a body's name");

@@ -5,6 +5,7 @@
 #include "collision/hull.h"
 #include "collision/mesh.h"
 #include "core/base/memory.h"
+#include "core/base/utf8.h"
 #include "save.h"
 
 /* A member that is added has to be listed below. */
@@ -88,6 +89,8 @@ static void archive_name(struct sadmm_archive *archive, char **name)
     sadmm_archive_count(archive, &length, 1, SADMM_NAME_SIZE - 1);
     if (archive->reading && (length == 0 || !sadmm_archive_room(archive, name, &none, length + 1, 1))) return;
     if (length > 0) sadmm_archive_bytes(archive, *name, length);
+    if (archive->reading && length > 0 && archive->status == SADMM_OK)
+        sadmm_archive_expect(archive, sadmm_utf8_fit(*name, length) == length, "the name of a body");
 }
 
 static bool body_fits(const sadmm_world *world, const struct sadmm_world_body *body, struct sadmm_error *error)
