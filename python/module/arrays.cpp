@@ -18,52 +18,99 @@ static constexpr std::pair<const char *, sadmm_array> array_names[] = {
     {"coupling_felt", SADMM_ARRAY_COUPLING_FELT},
 };
 
-using matrix = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
-using given = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using given_const = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using out_rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using in_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
-static int32_t count_rows(world &w, sadmm_array array, int32_t first, std::optional<int32_t> count)
+// What an error says of an array that does not fit.
+static std::string described(nb::handle given)
 {
-    return count ? *count : ask(w, [&](sadmm_world *h) { return sadmm_world_array_rows(h, array); }) - first;
+    const auto text = [&](const char *name) {
+        return std::string(nb::str(nb::getattr(given, name, nb::str("?"))).c_str());
+    };
+    if (!nb::hasattr(given, "dtype") || !nb::hasattr(given, "shape")) return nb::type_name(given.type()).c_str();
+    std::string out = text("dtype") + " of shape " + text("shape");
+    if (nb::hasattr(given, "strides")) out += " and strides " + text("strides");
+    if (nb::hasattr(given, "flags") && !nb::cast<bool>(nb::bool_(nb::getattr(given.attr("flags"), "writeable", nb::bool_(true)))))
+        out += ", not to be written to";
+    return out;
 }
 
-static nb::object get(world &w, const std::string &name, int32_t first, std::optional<int32_t> rows, std::optional<given> out)
+// Where `out` has its numbers: itself, no copy of another type or layout, which would be filled in its place.
+static out_rows numbers_of(nb::handle out, size_t rows, size_t columns)
 {
-    const sadmm_array array = named("array", name, array_names);
-    const int32_t count = count_rows(w, array, first, rows), columns = sadmm_array_columns(array);
-    const size_t shape[2] = {(size_t)(count > 0 ? count : 0), (size_t)columns};
-    if (out && (out->shape(0) != shape[0] || out->shape(1) != shape[1]))
-        throw nb::value_error(("out: must have shape (" + std::to_string(shape[0]) + ", " + std::to_string(shape[1]) + ")").c_str());
-    double *to = out ? out->data() : new double[shape[0] * shape[1] + 1];
-    nb::object made;
-    if (out) made = nb::cast(*out);
-    else {
-        nb::capsule owner(to, [](void *p) noexcept { delete[] (double *)p; });
-        made = nb::cast(matrix(to, 2, shape, owner));
+    out_rows to;
+    if (!nb::try_cast(out, to, false) || to.shape(0) != rows || to.shape(1) != columns)
+        throw nb::value_error(("out: must have shape (" + std::to_string(rows) + ", " + std::to_string(columns) +
+                               "), be of float64, in C order without gaps, and writable; is " + described(out)).c_str());
+    return to;
+}
+
+// Rows that the array has; first and count must be among them. Under the world's lock.
+struct range {
+    int32_t rows, first, count;
+    bool to_the_end; // whatever `count` was
+    bool fits(sadmm_world *h, sadmm_array array)
+    {
+        rows = sadmm_world_array_rows(h, array);
+        if (to_the_end) count = first > rows ? 0 : rows - first;
+        return first <= rows && count <= rows - first;
     }
-    call(w, [&](sadmm_world *h) { return sadmm_world_get_array(h, array, first, count, to); });
-    return made;
-}
+    [[noreturn]] void refuse() const
+    {
+        const std::string said = to_the_end ? "" : ", count = " + std::to_string(count);
+        raise_status(SADMM_ERROR_INVALID_ARGUMENT, "first = " + std::to_string(first) + said +
+                                                       ": must be rows of the array, which has " + std::to_string(rows));
+    }
+};
 
-static void set(world &w, const std::string &name, given_const values, int32_t first)
+static nb::object get(world &w, const std::string &name, whole first, std::optional<whole> count, nb::object out)
 {
     const sadmm_array array = named("array", name, array_names);
-    if (values.shape(1) != (size_t)sadmm_array_columns(array))
-        throw nb::value_error(("values: must have " + std::to_string(sadmm_array_columns(array)) + " columns").c_str());
-    if (values.shape(0) > INT32_MAX) throw nb::value_error("values: too many rows");
-    call(w, [&](sadmm_world *h) { return sadmm_world_set_array(h, array, first, (int32_t)values.shape(0), values.data()); });
+    const size_t columns = (size_t)sadmm_array_columns(array);
+    range r{0, (int32_t)first.in("first", 0, INT32_MAX), count ? (int32_t)count->in("count", 0, INT32_MAX) : 0, !count};
+    const auto fill = [&](sadmm_world *h, double *to) { return sadmm_world_get_array(h, array, r.first, r.count, to); };
+    if (!out.is_none()) {
+        if (!ask(w, [&](sadmm_world *h) { return r.fits(h, array); })) r.refuse();
+        const out_rows to = numbers_of(out, (size_t)r.count, columns);
+        call(w, [&](sadmm_world *h) { return fill(h, to.data()); });
+        return out;
+    }
+    // How many rows there are, and what they are, in one: another thread may add some in between.
+    std::vector<double> values;
+    bool fits = false;
+    call(w, [&](sadmm_world *h) {
+        fits = r.fits(h, array);
+        if (!fits) return SADMM_OK;
+        values.resize((size_t)r.count * columns);
+        return fill(h, values.data());
+    });
+    if (!fits) r.refuse();
+    return numpy_of(std::move(values), {(size_t)r.count, columns});
 }
 
-// The world is kept as long as the array is; how long its numbers are there is said below.
-static nb::object device_array(nb::handle_t<world> self, const std::string &name)
+static void set(world &w, const std::string &name, nb::object given, whole first)
 {
-    world &w = nb::cast<world &>(self);
+    const sadmm_array array = named("array", name, array_names);
+    const int32_t columns = sadmm_array_columns(array), begin = (int32_t)first.in("first", 0, INT32_MAX);
+    in_rows values;
+    if (!nb::try_cast(given, values, false) || values.shape(1) != (size_t)columns)
+        values = nb::cast<in_rows>(nb::module_::import_("subadmm.given").attr("numbers")("values", given, columns));
+    if (values.shape(0) > INT32_MAX) throw nb::value_error("values: too many rows");
+    call(w, [&](sadmm_world *h) { return sadmm_world_set_array(h, array, begin, (int32_t)values.shape(0), values.data()); });
+}
+
+// The C world is kept as long as the array is, its Python object is not: an attribute of it may hold the array. How long
+// the numbers are there is said below.
+static nb::object device_array(world &w, const std::string &name)
+{
     const sadmm_array array = named("array", name, array_names);
     sadmm_device_array a;
     call(w, [&](sadmm_world *h) { return sadmm_world_device_array(h, array, &a); });
     const size_t shape[2] = {(size_t)a.rows, (size_t)a.columns};
     const int64_t strides[2] = {a.stride, 1};
-    return nb::cast(nb::ndarray<double>((void *)a.values, 2, shape, self, strides, nb::dtype<double>(),
+    nb::capsule owner(new std::shared_ptr<sadmm_world>(w.kept),
+                      [](void *p) noexcept { delete (std::shared_ptr<sadmm_world> *)p; });
+    return nb::cast(nb::ndarray<double>((void *)a.values, 2, shape, owner, strides, nb::dtype<double>(),
                                         nb::device::cuda::value, a.device));
 }
 
@@ -117,7 +164,8 @@ void bind_arrays(nb::module_ &m, nb::class_<world> &w)
     m.attr("_contact_members") = contact_members();
     m.attr("_contact_size") = sizeof(sadmm_contact);
     w.def("get", &get, "array"_a, "first"_a = 0, "count"_a = nb::none(), "out"_a = nb::none(),
-          "Rows [first, first + count) of an array as float64, or into `out`. Rows are bodies (World.bodies), joints or couplings.\n\n"
+          "Rows [first, first + count) of an array as float64, or into `out`, an array of float64 with as many rows and columns,\n"
+          "in C order without gaps, which is returned then. Rows are bodies (World.bodies), joints or couplings.\n\n"
           "body_state (13 columns: position m, orientation w x y z, linear velocity m/s, angular velocity rad/s), body_wrench (6: N, N m),\n"
           "body_contact_wrench (6), body_inertia (4: kg, kg m^2), joint_position, joint_speed, joint_drive_force, joint_wrench,\n"
           "joint_target_position, joint_target_speed (6 each: coordinates), coupling_target (13, as body_state), coupling_felt (6).");

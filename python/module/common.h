@@ -25,6 +25,59 @@ using vec3 = std::array<double, 3>;
 using quat = std::array<double, 4>;
 using vec6 = std::array<double, 6>;
 
+// ---- arguments -------------------------------------------------------------------------------------------------------
+
+// An argument as it was given. It is read where its name is known, so that an error can say which one it was, and
+// nothing is made to fit: no float becomes an index, no other shape the one that is meant.
+struct whole {
+    nb::object given;
+    int64_t in(const char *name, int64_t low, int64_t high) const;
+    // Of an int whose range the library knows.
+    int as_int(const char *name) const;
+    uint32_t as_bits(const char *name) const { return (uint32_t)in(name, 0, UINT32_MAX); }
+};
+template <size_t N> struct numbers {
+    nb::object given;
+    std::array<double, N> as(const char *name) const;
+};
+
+// TypeError or InvalidArgument: "name = given: must be ...".
+[[noreturn]] void refuse_type(const char *name, nb::handle given, const std::string &must_be);
+[[noreturn]] void refuse_value(const char *name, nb::handle given, const std::string &must_be);
+void read_numbers(const char *name, nb::handle given, size_t count, double *out);
+// Of a text that C code reads up to its first 0: that it has none.
+const std::string &without_null(const char *name, const std::string &text);
+// Set attributes of `object` by their names.
+void set_members(nb::handle object, nb::handle values);
+
+template <size_t N> std::array<double, N> numbers<N>::as(const char *name) const
+{
+    std::array<double, N> out;
+    read_numbers(name, given, N, out.data());
+    return out;
+}
+
+namespace nanobind::detail {
+template <> struct type_caster<whole> {
+    NB_TYPE_CASTER(whole, const_name("int"))
+    bool from_python(handle src, uint32_t, cleanup_list *) noexcept
+    {
+        value.given = borrow(src);
+        return true;
+    }
+};
+template <size_t N> struct type_caster<numbers<N>> {
+    NB_TYPE_CASTER(numbers<N>, const_name("collections.abc.Sequence[float]"))
+    bool from_python(handle src, uint32_t, cleanup_list *) noexcept
+    {
+        value.given = borrow(src);
+        return true;
+    }
+};
+} // namespace nanobind::detail
+
+// ---- errors ----------------------------------------------------------------------------------------------------------
+
 // Raise the exception of a status.
 [[noreturn]] void raise_status(sadmm_status status, const std::string &message);
 // `status` of a call without a world: its message is this thread's last one.
@@ -48,11 +101,16 @@ struct shape_def {
 
 // One more use of the hull or mesh that a definition points to.
 void hold_parts(shape_def &shape);
+// Copies of the Shapes that an argument is a sequence of.
+std::vector<shape_def> read_shapes(const char *name, nb::handle given);
 
 // A world, and the script of the scene that it was built from, where there is one. Calls are made without the
 // interpreter's lock and one at a time: it is let go first, then the world's own is taken, and the other way round, so
 // that no thread waits for one while it has the other.
+//
+// Everything but `scripted` and `spec` is read and written under the lock: another thread may be making a step.
 struct world {
+    std::shared_ptr<sadmm_world> kept; // by arrays on a device as well, which hold no Python object
     sadmm_world *handle = nullptr;
     std::mutex mutex;
     bool scripted = false; // is there a script?
@@ -62,9 +120,15 @@ struct world {
     sadmm_scene_result result{};
     int64_t steps = 0; // of the scene
     sadmm_world_def def = sadmm_world_def_default(); // as it was created, with the precision that it has now
+    // From now on `made` is its own.
+    void take(sadmm_world *made)
+    {
+        kept.reset(made, sadmm_world_destroy);
+        handle = made;
+    }
     ~world()
     {
-        sadmm_world_destroy(handle);
+        kept.reset();
         sadmm_scene_close(&scene);
     }
 };
@@ -91,12 +155,45 @@ template <class F> auto ask(world &w, F f)
     return f(w.handle);
 }
 
-// Objects of a world: its Python object, which they keep alive, and an id.
+// Objects of a world: its Python object, which they keep alive, and an id. The garbage collector is told of that
+// reference, since the world's object may be of a class of the user's, whose attributes hold objects of the world.
 template <class Id> struct object_of {
     nb::object owner;
     world *w;
     Id id;
+    world &in() const
+    {
+        if (!w) throw std::runtime_error("the world of this object was deleted"); // by the garbage collector
+        return *w;
+    }
 };
+template <class Id> int traverse(PyObject *self, visitproc visit, void *arg) noexcept
+{
+    Py_VISIT(Py_TYPE(self));
+    if (nb::inst_ready(self)) Py_VISIT(nb::inst_ptr<object_of<Id>>(self)->owner.ptr());
+    return 0;
+}
+template <class Id> int clear(PyObject *self) noexcept
+{
+    if (!nb::inst_ready(self)) return 0;
+    auto *object = nb::inst_ptr<object_of<Id>>(self);
+    object->w = nullptr;
+    nb::object dropped = std::move(object->owner); // whatever that leads to finds this one cleared
+    return 0;
+}
+template <class Id> nb::type_slots collected()
+{
+    static PyType_Slot slots[] = {
+        {Py_tp_traverse, (void *)&traverse<Id>}, {Py_tp_clear, (void *)&clear<Id>}, {0, nullptr}};
+    return nb::type_slots(slots);
+}
+
+// The id of an object that has to be of this world.
+template <class Id> Id id_in(const world &w, const object_of<Id> &object, const char *name)
+{
+    if (object.w != &w) refuse_value(name, nb::cast(object), "must be of this world, and is of another one");
+    return object.id;
+}
 using body = object_of<sadmm_body_id>;
 using shape = object_of<sadmm_shape_id>;
 using joint = object_of<sadmm_joint_id>;
@@ -123,16 +220,20 @@ template <size_t N> void put(const std::array<double, N> &from, double *to)
     for (size_t k = 0; k < N; ++k) to[k] = from[k];
 }
 
-// Objects of a world by their index in [0, count). at: the library's call that gives an id.
-template <class T, class At> std::vector<T> all_of(nb::handle self, int32_t count, At at)
+// All objects of a kind. count, at: the library's calls that give their number, and the id of the k-th.
+template <class T, class Count, class At> std::vector<T> all_of(nb::handle self, Count count, At at)
 {
     world &w = nb::cast<world &>(self);
+    std::vector<decltype(T::id)> ids;
+    call(w, [&](sadmm_world *h) {
+        sadmm_status status = SADMM_OK;
+        ids.resize((size_t)count(h));
+        for (size_t k = 0; k < ids.size() && status == SADMM_OK; ++k) status = at(h, (int32_t)k, &ids[k]);
+        return status;
+    });
     std::vector<T> out;
-    for (int32_t k = 0; k < count; ++k) {
-        T one{nb::borrow(self), &w, {}};
-        call(w, [&](sadmm_world *h) { return at(h, k, &one.id); });
-        out.push_back(one);
-    }
+    out.reserve(ids.size());
+    for (const auto &id : ids) out.push_back(T{nb::borrow(self), &w, id});
     return out;
 }
 

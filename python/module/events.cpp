@@ -39,6 +39,13 @@ static nb::list members()
     return out;
 }
 
+template <class Id> static Id read_id(const nb::object &given)
+{
+    if (!PySequence_Check(given.ptr()) || nb::len(given) != 2)
+        refuse_type("id", given, "must be (slot, generation)");
+    return {whole{given[0]}.as_bits("id[0]"), whole{given[1]}.as_bits("id[1]")};
+}
+
 void bind_events(nb::module_ &m, nb::class_<world> &w)
 {
     static_assert(sizeof(sadmm_event_type) == 4, "members() says so");
@@ -49,8 +56,9 @@ void bind_events(nb::module_ &m, nb::class_<world> &w)
     }
     m.attr("_event_members") = members();
     m.attr("_event_size") = sizeof(sadmm_event);
-    w.def("record_events", [](world &w, int32_t capacity) {
-        call(w, [&](sadmm_world *h) { return sadmm_world_record_events(h, capacity); });
+    w.def("record_events", [](world &w, whole capacity) {
+        const int most = capacity.as_int("capacity");
+        call(w, [&](sadmm_world *h) { return sadmm_world_record_events(h, most); });
     }, "capacity"_a = 65536, "Record from the next step on which contacts begin and end, and what sensors see; up to `capacity` events "
                              "are kept until they are taken, and the oldest dropped. 0: no more.");
     w.def_prop_ro("event_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_event_count(h); }); },
@@ -58,29 +66,29 @@ void bind_events(nb::module_ &m, nb::class_<world> &w)
     w.def("_take_events", &take);
     w.def("sensor_overlaps", [](nb::handle_t<world> self, const shape &sensor) {
         world &w = nb::cast<world &>(self);
-        if (sensor.w != &w) throw nb::value_error("sensor: must be a shape of this world");
+        const sadmm_shape_id id = id_in(w, sensor, "sensor");
         std::vector<sadmm_shape_id> ids;
         call(w, [&](sadmm_world *h) {
             int32_t count = 0;
-            sadmm_status status = sadmm_world_sensor_overlaps(h, sensor.id, 0, nullptr, &count);
+            sadmm_status status = sadmm_world_sensor_overlaps(h, id, 0, nullptr, &count);
             ids.resize((size_t)count);
-            if (status == SADMM_OK && count > 0) status = sadmm_world_sensor_overlaps(h, sensor.id, count, ids.data(), &count);
+            if (status == SADMM_OK && count > 0) status = sadmm_world_sensor_overlaps(h, id, count, ids.data(), &count);
             return status;
         });
         std::vector<shape> out;
         for (const sadmm_shape_id &id : ids) out.push_back(shape{nb::borrow(self), &w, id});
         return out;
     }, "sensor"_a, "Shapes that overlap a sensor now.");
-    w.def("find_shape", [](nb::handle_t<world> self, std::array<uint32_t, 2> id) {
+    w.def("find_shape", [](nb::handle_t<world> self, nb::object id) {
         world &w = nb::cast<world &>(self);
-        shape out{nb::borrow(self), &w, {id[0], id[1]}};
+        shape out{nb::borrow(self), &w, read_id<sadmm_shape_id>(id)};
         sadmm_shape_def def;
         call(w, [&](sadmm_world *h) { return sadmm_world_shape_def(h, out.id, &def, nullptr); });
         return out;
     }, "id"_a, "The shape that an array names by (slot, generation), as events and contacts do. StaleId: it is there no more.");
-    w.def("find_body", [](nb::handle_t<world> self, std::array<uint32_t, 2> id) {
+    w.def("find_body", [](nb::handle_t<world> self, nb::object id) {
         world &w = nb::cast<world &>(self);
-        body out{nb::borrow(self), &w, {id[0], id[1]}};
+        body out{nb::borrow(self), &w, read_id<sadmm_body_id>(id)};
         int32_t index;
         call(w, [&](sadmm_world *h) { return sadmm_world_body_index(h, out.id, &index); });
         return out;

@@ -19,7 +19,7 @@ static void bind_coordinate(nb::module_ &m)
         .def("__init__", [](nb::pointer_and_handle<C> self, nb::kwargs values) {
             new (self.p) C(sadmm_joint_def_default().coordinates[0]);
             nb::inst_mark_ready(self.h);
-            for (auto [name, value] : values) nb::setattr(self.h, nb::cast<nb::str>(name), value);
+            set_members(self.h, values);
         })
         .def_rw("limited", &C::limited)
         .def_rw("lower", &C::lower)
@@ -40,31 +40,31 @@ static void bind_coordinate(nb::module_ &m)
 }
 
 static joint add_joint(nb::handle_t<world> self, const std::string &kind, const std::optional<body> &a,
-                       const std::optional<body> &b, std::optional<vec3> position, std::optional<quat> orientation,
-                       vec3 position_a, quat orientation_a, vec3 position_b, quat orientation_b, uint32_t locks, double length,
+                       const std::optional<body> &b, std::optional<numbers<3>> position, std::optional<numbers<4>> orientation,
+                       numbers<3> position_a, numbers<4> orientation_a, numbers<3> position_b, numbers<4> orientation_b,
+                       whole locks, double length,
                        bool collide, bool enabled, double break_force, double break_torque, const nb::dict &coordinates)
 {
     world &w = nb::cast<world &>(self);
     joint out{nb::borrow(self), &w, {}};
     sadmm_joint_def def = sadmm_joint_def_default();
     def.kind = named("kind", kind, kind_names);
-    if (a) def.body_a = a->id;
-    if (b) def.body_b = b->id;
-    if ((a && a->w != &w) || (b && b->w != &w)) throw nb::value_error("a, b: must be bodies of this world");
-    put(position_a, def.position_a), put(orientation_a, def.orientation_a);
-    put(position_b, def.position_b), put(orientation_b, def.orientation_b);
-    def.locks = locks, def.length = length, def.collide = collide, def.enabled = enabled;
+    if (a) def.body_a = id_in(w, *a, "a");
+    if (b) def.body_b = id_in(w, *b, "b");
+    put(position_a.as("position_a"), def.position_a), put(orientation_a.as("orientation_a"), def.orientation_a);
+    put(position_b.as("position_b"), def.position_b), put(orientation_b.as("orientation_b"), def.orientation_b);
+    const vec3 place = position ? position->as("position") : vec3{};
+    const quat turn = orientation ? orientation->as("orientation") : quat{1, 0, 0, 0};
+    def.locks = locks.as_bits("locks"), def.length = length, def.collide = collide, def.enabled = enabled;
     def.break_force = break_force, def.break_torque = break_torque;
     for (auto [k, value] : coordinates) {
-        const int index = nb::cast<int>(k);
-        if (index < 0 || index > 5) throw nb::value_error("coordinates: keys must be in [0, 6)");
-        def.coordinates[index] = nb::cast<C>(value);
+        const int64_t index = whole{nb::borrow(k)}.in("key of coordinates", 0, 5);
+        const std::string which = "coordinates[" + std::to_string(index) + "]";
+        if (!nb::try_cast(value, def.coordinates[index], false)) refuse_type(which.c_str(), value, "must be a subadmm.Coordinate");
     }
     call(w, [&](sadmm_world *h) {
         sadmm_status status = SADMM_OK;
-        const quat still{1, 0, 0, 0};
-        if (position || orientation)
-            status = sadmm_world_place_joint(h, &def, (position ? *position : vec3{}).data(), (orientation ? *orientation : still).data());
+        if (position || orientation) status = sadmm_world_place_joint(h, &def, place.data(), turn.data());
         return status == SADMM_OK ? sadmm_world_add_joint(h, &def, &out.id) : status;
     });
     return out;
@@ -73,14 +73,14 @@ static joint add_joint(nb::handle_t<world> self, const std::string &kind, const 
 static sadmm_joint_def def_of(const joint &j)
 {
     sadmm_joint_def def;
-    call(*j.w, [&](sadmm_world *h) { return sadmm_world_joint_def(h, j.id, &def); });
+    call(j.in(), [&](sadmm_world *h) { return sadmm_world_joint_def(h, j.id, &def); });
     return def;
 }
 
 static sadmm_joint_state state_of(const joint &j)
 {
     sadmm_joint_state state;
-    call(*j.w, [&](sadmm_world *h) { return sadmm_world_joint_state(h, j.id, &state); });
+    call(j.in(), [&](sadmm_world *h) { return sadmm_world_joint_state(h, j.id, &state); });
     return state;
 }
 
@@ -89,21 +89,17 @@ static nb::object body_of(const joint &j, sadmm_body_id id)
     return id.slot == 0 ? nb::none() : nb::cast(body{j.owner, j.w, id});
 }
 
-static int index_of(int index)
-{
-    if (index < 0 || index > 5) throw nb::index_error("index: must be in [0, 6)");
-    return index;
-}
+static int index_of(const whole &index) { return (int)index.in("index", 0, 5); }
 
 static void bind_joint(nb::module_ &m)
 {
-    nb::class_<joint> c(m, "Joint", "A joint of a world. Coordinates 0 to 2 are translations along the axes of a's frame, 3 to 5 rotations.");
+    nb::class_<joint> c(m, "Joint", collected<sadmm_joint_id>(), "A joint of a world. Coordinates 0 to 2 are translations along the axes of a's frame, 3 to 5 rotations.");
     c.def("__eq__", [](const joint &a, const joint &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_joint_id>)
         .def_prop_ro("world", [](const joint &j) { return j.owner; })
         .def_prop_ro("index", [](const joint &j) {
             int32_t index;
-            call(*j.w, [&](sadmm_world *h) { return sadmm_world_joint_index(h, j.id, &index); });
+            call(j.in(), [&](sadmm_world *h) { return sadmm_world_joint_index(h, j.id, &index); });
             return index;
         }, "Row of the world's arrays.")
         .def_prop_ro("kind", [](const joint &j) { return name_of(def_of(j).kind, kind_names); })
@@ -113,22 +109,30 @@ static void bind_joint(nb::module_ &m)
         .def_prop_ro("frame_a", [](const joint &j) { const auto d = def_of(j); return std::make_pair(array_of<3>(d.position_a), array_of<4>(d.orientation_a)); }, "(position, orientation) in a's body frame.")
         .def_prop_ro("frame_b", [](const joint &j) { const auto d = def_of(j); return std::make_pair(array_of<3>(d.position_b), array_of<4>(d.orientation_b)); })
         .def_prop_rw("enabled", [](const joint &j) { return def_of(j).enabled; },
-                     [](const joint &j, bool on) { call(*j.w, [&](sadmm_world *h) { return sadmm_world_set_joint_enabled(h, j.id, on); }); })
-        .def("coordinate", [](const joint &j, int index) { return def_of(j).coordinates[index_of(index)]; }, "index"_a, "What acts along it, as it is now.")
-        .def("set_coordinate", [](const joint &j, int index, const C &value) {
-            call(*j.w, [&](sadmm_world *h) { return sadmm_world_set_joint_coordinate(h, j.id, index, &value); });
+                     [](const joint &j, bool on) { call(j.in(), [&](sadmm_world *h) { return sadmm_world_set_joint_enabled(h, j.id, on); }); })
+        .def("coordinate", [](const joint &j, whole index) { return def_of(j).coordinates[index_of(index)]; }, "index"_a, "What acts along it, as it is now.")
+        .def("set_coordinate", [](const joint &j, whole index, const C &given) {
+            const int k = index_of(index);
+            const C value = given; // another thread may change it
+            call(j.in(), [&](sadmm_world *h) { return sadmm_world_set_joint_coordinate(h, j.id, k, &value); });
         }, "index"_a, "coordinate"_a, "From the next step on.")
-        .def("set_target", [](const joint &j, int index, std::optional<double> x, std::optional<double> v) {
-            C value = def_of(j).coordinates[index_of(index)];
-            if (x) value.target_position = *x;
-            if (v) value.target_speed = *v;
-            call(*j.w, [&](sadmm_world *h) { return sadmm_world_set_joint_coordinate(h, j.id, index, &value); });
+        .def("set_target", [](const joint &j, whole index, std::optional<double> x, std::optional<double> v) {
+            const int k = index_of(index);
+            call(j.in(), [&](sadmm_world *h) { // nobody else sets it in between
+                sadmm_joint_def def;
+                const sadmm_status status = sadmm_world_joint_def(h, j.id, &def);
+                if (status != SADMM_OK) return status;
+                if (x) def.coordinates[k].target_position = *x;
+                if (v) def.coordinates[k].target_speed = *v;
+                return sadmm_world_set_joint_coordinate(h, j.id, k, &def.coordinates[k]);
+            });
         }, "index"_a, "position"_a = nb::none(), "speed"_a = nb::none(), "Of the coordinate's drive.")
-        .def("set_spring_table", [](const joint &j, int index, const std::vector<double> &x, const std::vector<double> &f) {
+        .def("set_spring_table", [](const joint &j, whole index, const std::vector<double> &x, const std::vector<double> &f) {
+            const int k = index_of(index);
             if (x.size() != f.size()) throw nb::value_error("forces: must be as many as positions");
-            call(*j.w, [&](sadmm_world *h) { return sadmm_world_set_joint_spring_table(h, j.id, index, x.data(), f.data(), (int32_t)x.size()); });
+            call(j.in(), [&](sadmm_world *h) { return sadmm_world_set_joint_spring_table(h, j.id, k, x.data(), f.data(), (int32_t)x.size()); });
         }, "index"_a, "positions"_a, "forces"_a, "A spring with a characteristic of its own; empty lists: none.")
-        .def("remove", [](const joint &j) { call(*j.w, [&](sadmm_world *h) { return sadmm_world_remove_joint(h, j.id); }); });
+        .def("remove", [](const joint &j) { call(j.in(), [&](sadmm_world *h) { return sadmm_world_remove_joint(h, j.id); }); });
 #define OF_STATE(name, doc) .def_prop_ro(#name, [](const joint &j) { return array_of<6>(state_of(j).name); }, doc)
     c OF_STATE(position, "Coordinates, m and rad; of locked ones what they are off by.")
         OF_STATE(speed, "m/s and rad/s.")
@@ -145,32 +149,33 @@ static void bind_joint(nb::module_ &m)
 #undef OF_STATE
 }
 
-static gear add_gear(nb::handle_t<world> self, const joint &a, int32_t coordinate_a, const joint &b, int32_t coordinate_b,
+static gear add_gear(nb::handle_t<world> self, const joint &a, whole coordinate_a, const joint &b, whole coordinate_b,
                      double ratio, std::optional<double> offset, bool enabled)
 {
     world &w = nb::cast<world &>(self);
     gear out{nb::borrow(self), &w, {}};
     sadmm_gear_def def = sadmm_gear_def_default();
-    def.joint_1 = a.id, def.coordinate_1 = coordinate_a;
-    def.joint_2 = b.id, def.coordinate_2 = coordinate_b;
+    def.joint_1 = id_in(w, a, "joint_1"), def.coordinate_1 = coordinate_a.as_int("coordinate_1");
+    def.joint_2 = id_in(w, b, "joint_2"), def.coordinate_2 = coordinate_b.as_int("coordinate_2");
     def.ratio = ratio, def.enabled = enabled;
     if (offset) def.offset = *offset;
     call(w, [&](sadmm_world *h) { return sadmm_world_add_gear(h, &def, &out.id); });
     return out;
 }
 
-static coupling add_coupling(nb::handle_t<world> self, const body &b, vec3 position, quat orientation,
-                             std::optional<vec3> target_position, std::optional<quat> target_orientation, double linear_stiffness,
+static coupling add_coupling(nb::handle_t<world> self, const body &b, numbers<3> position, numbers<4> orientation,
+                             std::optional<numbers<3>> target_position, std::optional<numbers<4>> target_orientation,
+                             double linear_stiffness,
                              double linear_damping, double angular_stiffness, double angular_damping, double max_force,
                              double max_torque, bool enabled)
 {
     world &w = nb::cast<world &>(self);
     coupling out{nb::borrow(self), &w, {}};
     sadmm_coupling_def def = sadmm_coupling_def_default();
-    def.body = b.id;
-    put(position, def.position), put(orientation, def.orientation);
-    if (target_position) put(*target_position, def.target_position);
-    if (target_orientation) put(*target_orientation, def.target_orientation);
+    def.body = id_in(w, b, "body");
+    put(position.as("position"), def.position), put(orientation.as("orientation"), def.orientation);
+    if (target_position) put(target_position->as("target_position"), def.target_position);
+    if (target_orientation) put(target_orientation->as("target_orientation"), def.target_orientation);
     def.linear_stiffness = linear_stiffness, def.linear_damping = linear_damping;
     def.angular_stiffness = angular_stiffness, def.angular_damping = angular_damping;
     def.max_force = max_force, def.max_torque = max_torque, def.enabled = enabled;
@@ -181,26 +186,26 @@ static coupling add_coupling(nb::handle_t<world> self, const body &b, vec3 posit
 static sadmm_coupling_state state_of(const coupling &c)
 {
     sadmm_coupling_state state;
-    call(*c.w, [&](sadmm_world *h) { return sadmm_world_coupling_state(h, c.id, &state); });
+    call(c.in(), [&](sadmm_world *h) { return sadmm_world_coupling_state(h, c.id, &state); });
     return state;
 }
 
 static sadmm_coupling_def def_of(const coupling &c)
 {
     sadmm_coupling_def def;
-    call(*c.w, [&](sadmm_world *h) { return sadmm_world_coupling_def(h, c.id, &def); });
+    call(c.in(), [&](sadmm_world *h) { return sadmm_world_coupling_def(h, c.id, &def); });
     return def;
 }
 
 static void bind_coupling(nb::module_ &m)
 {
-    nb::class_<coupling>(m, "Coupling", "A spring and damper that ties a body to a target pose.")
+    nb::class_<coupling>(m, "Coupling", collected<sadmm_coupling_id>(), "A spring and damper that ties a body to a target pose.")
         .def("__eq__", [](const coupling &a, const coupling &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_coupling_id>)
         .def_prop_ro("world", [](const coupling &c) { return c.owner; })
         .def_prop_ro("index", [](const coupling &c) {
             int32_t index;
-            call(*c.w, [&](sadmm_world *h) { return sadmm_world_coupling_index(h, c.id, &index); });
+            call(c.in(), [&](sadmm_world *h) { return sadmm_world_coupling_index(h, c.id, &index); });
             return index;
         }, "Row of the world's arrays.")
         .def_prop_ro("body", [](const coupling &c) { return body{c.owner, c.w, def_of(c).body}; })
@@ -209,30 +214,33 @@ static void bind_coupling(nb::module_ &m)
         .def_prop_ro("max_force", [](const coupling &c) { return def_of(c).max_force; }, "N, along each axis of the target.")
         .def_prop_ro("max_torque", [](const coupling &c) { return def_of(c).max_torque; }, "N m.")
         .def_prop_ro("enabled", [](const coupling &c) { return def_of(c).enabled; })
-        .def("set_target", [](const coupling &c, vec3 x, quat q, std::optional<vec6> v) {
-            call(*c.w, [&](sadmm_world *h) { return sadmm_world_set_coupling_target(h, c.id, x.data(), q.data(), v ? v->data() : nullptr); });
+        .def("set_target", [](const coupling &c, numbers<3> position, numbers<4> orientation, std::optional<numbers<6>> velocity) {
+            const vec3 x = position.as("position");
+            const quat q = orientation.as("orientation");
+            const std::optional<vec6> v = velocity ? std::optional(velocity->as("velocity")) : std::nullopt;
+            call(c.in(), [&](sadmm_world *h) { return sadmm_world_set_coupling_target(h, c.id, x.data(), q.data(), v ? v->data() : nullptr); });
         }, "position"_a, "orientation"_a = quat{1, 0, 0, 0}, "velocity"_a = nb::none(), "The target at the present time, world frame; velocity: linear, angular.")
         .def("set_gains", [](const coupling &c, double k, double d, double ka, double da) {
-            call(*c.w, [&](sadmm_world *h) { return sadmm_world_set_coupling_gains(h, c.id, k, d, ka, da); });
+            call(c.in(), [&](sadmm_world *h) { return sadmm_world_set_coupling_gains(h, c.id, k, d, ka, da); });
         }, "linear_stiffness"_a, "linear_damping"_a, "angular_stiffness"_a, "angular_damping"_a)
         .def("set_limits", [](const coupling &c, double f, double t) {
-            call(*c.w, [&](sadmm_world *h) { return sadmm_world_set_coupling_limits(h, c.id, f, t); });
+            call(c.in(), [&](sadmm_world *h) { return sadmm_world_set_coupling_limits(h, c.id, f, t); });
         }, "max_force"_a, "max_torque"_a)
-        .def("set_enabled", [](const coupling &c, bool on) { call(*c.w, [&](sadmm_world *h) { return sadmm_world_set_coupling_enabled(h, c.id, on); }); }, "enabled"_a)
+        .def("set_enabled", [](const coupling &c, bool on) { call(c.in(), [&](sadmm_world *h) { return sadmm_world_set_coupling_enabled(h, c.id, on); }); }, "enabled"_a)
         .def_prop_ro("felt_force", [](const coupling &c) { return array_of<3>(state_of(c).felt_force); }, "What the user feels, N.")
         .def_prop_ro("felt_torque", [](const coupling &c) { return array_of<3>(state_of(c).felt_torque); }, "About the target's origin, N m.")
         .def_prop_ro("position_error", [](const coupling &c) { return array_of<3>(state_of(c).position_error); }, "m.")
         .def_prop_ro("rotation_error", [](const coupling &c) { return array_of<3>(state_of(c).rotation_error); }, "Rotation vector, rad.")
-        .def("remove", [](const coupling &c) { call(*c.w, [&](sadmm_world *h) { return sadmm_world_remove_coupling(h, c.id); }); });
-    nb::class_<gear>(m, "Gear", "A ratio between two coordinates of joints.")
+        .def("remove", [](const coupling &c) { call(c.in(), [&](sadmm_world *h) { return sadmm_world_remove_coupling(h, c.id); }); });
+    nb::class_<gear>(m, "Gear", collected<sadmm_gear_id>(), "A ratio between two coordinates of joints.")
         .def_prop_ro("world", [](const gear &g) { return g.owner; })
-        .def("set_enabled", [](const gear &g, bool on) { call(*g.w, [&](sadmm_world *h) { return sadmm_world_set_gear_enabled(h, g.id, on); }); }, "enabled"_a)
+        .def("set_enabled", [](const gear &g, bool on) { call(g.in(), [&](sadmm_world *h) { return sadmm_world_set_gear_enabled(h, g.id, on); }); }, "enabled"_a)
         .def_prop_ro("error", [](const gear &g) {
             sadmm_gear_state state;
-            call(*g.w, [&](sadmm_world *h) { return sadmm_world_gear_state(h, g.id, &state); });
+            call(g.in(), [&](sadmm_world *h) { return sadmm_world_gear_state(h, g.id, &state); });
             return state.error;
         })
-        .def("remove", [](const gear &g) { call(*g.w, [&](sadmm_world *h) { return sadmm_world_remove_gear(h, g.id); }); });
+        .def("remove", [](const gear &g) { call(g.in(), [&](sadmm_world *h) { return sadmm_world_remove_gear(h, g.id); }); });
 }
 
 void bind_joints(nb::module_ &m, nb::class_<world> &w)
@@ -256,9 +264,9 @@ void bind_joints(nb::module_ &m, nb::class_<world> &w)
           "angular_stiffness"_a = 0.0, "angular_damping"_a = 0.0, "max_force"_a = infinite, "max_torque"_a = infinite, "enabled"_a = true,
           "A virtual coupling of a frame on the body to a target pose in the world. N/m, N s/m, N m/rad, N m s/rad.");
     w.def_prop_ro("joints", [](nb::handle_t<world> self) {
-        return all_of<joint>(self, sadmm_world_joint_count(nb::cast<world &>(self).handle), &sadmm_world_joint_at);
+        return all_of<joint>(self, &sadmm_world_joint_count, &sadmm_world_joint_at);
     }, "All joints, in the order of the arrays' rows.");
     w.def_prop_ro("couplings", [](nb::handle_t<world> self) {
-        return all_of<coupling>(self, sadmm_world_coupling_count(nb::cast<world &>(self).handle), &sadmm_world_coupling_at);
+        return all_of<coupling>(self, &sadmm_world_coupling_count, &sadmm_world_coupling_at);
     }, "All couplings.");
 }

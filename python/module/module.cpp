@@ -1,4 +1,6 @@
 // The module subadmm._core: exceptions, versions, backends. Each other file binds one subject.
+#include <cstring>
+
 #include "common.h"
 
 static nb::object exceptions[SADMM_STATUS_COUNT];
@@ -7,7 +9,10 @@ void raise_status(sadmm_status status, const std::string &message)
 {
     const bool known = (unsigned)status < SADMM_STATUS_COUNT && exceptions[status].is_valid();
     const nb::object &type = exceptions[known ? status : SADMM_ERROR_INVALID_ARGUMENT];
-    nb::object error = type(message.empty() ? sadmm_status_name(status) : message.c_str());
+    const char *text = message.empty() ? sadmm_status_name(status) : message.c_str();
+    nb::object said = nb::steal(PyUnicode_DecodeUTF8(text, (Py_ssize_t)strlen(text), "replace")); // of files: any bytes
+    if (!said.is_valid()) throw nb::python_error();
+    nb::object error = type(said);
     nb::setattr(error, "status", nb::str(sadmm_status_name(status)));
     PyErr_SetObject(type.ptr(), error.ptr());
     throw nb::python_error();
@@ -44,6 +49,7 @@ NB_MODULE(_core, m)
     for (nb::object &type : exceptions)
         if (type.is_valid()) type.inc_ref();
 
+    m.def("_set_members", &set_members, "object"_a, "values"_a);
     m.def("version", &sadmm_version, "The library's version.");
     m.def("build_commit", &sadmm_build_commit, "The commit that the library was built from.");
     m.def("build_compiler", &sadmm_build_compiler, "The compiler that it was built by.");

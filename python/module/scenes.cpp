@@ -25,26 +25,30 @@ static void check_error(sadmm_status status, const sadmm_error &error)
 // Of `spec`, or (a text) of a scene file's text. As `subadmm run` does it.
 static std::unique_ptr<world> build(const std::string &spec, bool is_text, const std::string &backend,
                                     const std::optional<std::string> &precision, const std::optional<std::string> &method,
-                                    int device, nb::handle settings)
+                                    whole device, nb::handle settings)
 {
     auto made = std::make_unique<world>();
     sadmm_error error{};
+    if (!is_text) without_null("scene", spec);
     check_error(is_text ? sadmm_scene_open_text(spec.data(), spec.size(), nullptr, &made->scene, &error)
                         : sadmm_scene_open(spec.c_str(), &made->scene, &error), error);
     sadmm_world_def &def = made->scene.def;
     def.backend = named("backend", backend, backend_names);
-    def.device = device;
+    def.device = device.as_int("device");
     if (precision) def.precision = named("precision", *precision, precision_names);
     if (method) sadmm_scene_set_method(&made->scene, named("method", *method, method_names));
     if (!settings.is_none()) {
+        if (!nb::isinstance<nb::dict>(settings)) refuse_type("settings", settings, "must be a dict of changes, as {'dt': 0.002}");
         nb::object changed = nb::cast(def.settings);
-        for (auto [name, value] : nb::cast<nb::dict>(settings)) nb::setattr(changed, nb::cast<nb::str>(name), value);
+        set_members(changed, settings);
         def.settings = nb::cast<sadmm_settings>(changed);
     }
     sadmm_status status;
     {
         nb::gil_scoped_release release;
-        status = sadmm_scene_build(&made->scene, &made->handle, &error);
+        sadmm_world *built = nullptr;
+        status = sadmm_scene_build(&made->scene, &built, &error);
+        made->take(built);
         if (status == SADMM_OK) status = sadmm_scene_observe(&made->scene, made->handle, 0, &made->result, &error);
     }
     check_error(status, error);
@@ -58,6 +62,8 @@ static std::unique_ptr<world> build(const std::string &spec, bool is_text, const
 static std::string to_json(world &w, const std::optional<std::string> &name, const std::optional<std::string> &description,
                            std::optional<double> duration)
 {
+    if (name) without_null("name", *name);
+    if (description) without_null("description", *description);
     char *text = nullptr;
     size_t size = 0;
     sadmm_error error{};
@@ -95,8 +101,9 @@ static std::string to_json(world &w, const std::optional<std::string> &name, con
 static nb::object result(world &w)
 {
     nb::list tasks;
-    for (int k = 0; k < w.result.task_count; ++k) {
-        const sadmm_scene_task &task = w.result.tasks[k];
+    const auto now = ask(w, [&](sadmm_world *) { return w.result; });
+    for (int k = 0; k < now.task_count; ++k) {
+        const sadmm_scene_task &task = now.tasks[k];
         nb::dict d, figures;
         for (int f = 0; f < task.figure_count; ++f) figures[task.figures[f].name] = task.figures[f].value;
         d["name"] = task.name, d["finished"] = task.finished, d["passed"] = task.passed, d["figures"] = figures;
@@ -112,15 +119,15 @@ void bind_scenes(nb::module_ &m, nb::class_<world> &w)
     m.def("_scene", &build, "spec"_a, "is_text"_a, nb::kw_only(), "backend"_a = "auto", "precision"_a = nb::none(), "method"_a = nb::none(),
           "device"_a = 0, "settings"_a = nb::none());
     w.def("_to_json", &to_json, "name"_a.none(), "description"_a.none(), "duration"_a.none());
-    w.def_prop_ro("has_script", [](world &w) { return w.scripted && sadmm_scene_has_script(&w.scene); },
+    w.def_prop_ro("has_script", [](world &w) { return w.scripted && ask(w, [&](sadmm_world *) { return sadmm_scene_has_script(&w.scene); }); },
                   "Of a scene: does it have scripted inputs, which come with steps and are in no scene file?");
     w.def_prop_ro("duration", [](world &w) -> nb::object {
-        return w.scripted ? nb::cast(w.scene.duration) : nb::none();
+        return w.scripted ? nb::cast(ask(w, [&](sadmm_world *) { return w.scene.duration; })) : nb::none();
     }, "Of a scene: how long it is meant to be run for, s; None of other worlds.");
-    w.def_prop_rw("script", [](world &w) { return w.scripted && w.script_on; },
+    w.def_prop_rw("script", [](world &w) { return w.scripted && ask(w, [&](sadmm_world *) { return w.script_on; }); },
                   [](world &w, bool on) {
                       if (on && !w.scripted) throw nb::value_error("script: the world has none; only a scene's world can have one");
-                      w.script_on = on;
+                      ask(w, [&](sadmm_world *) { return w.script_on = on; });
                   },
                   "Does a scene's script act: the motions that come with its steps, and what it measures? Switched off, joints' and\n"
                   "couplings' targets are the caller's; on again, it goes on at the time that has come by then.");

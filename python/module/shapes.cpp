@@ -6,6 +6,20 @@ static constexpr std::pair<const char *, sadmm_shape_type> type_names[] = {
     {"box", SADMM_SHAPE_BOX}, {"hull", SADMM_SHAPE_HULL}, {"mesh", SADMM_SHAPE_MESH},
     {"cylinder", SADMM_SHAPE_CYLINDER}, {"cone", SADMM_SHAPE_CONE}, {"ellipsoid", SADMM_SHAPE_ELLIPSOID}};
 
+// Numbers that a shape made by its size has.
+static size_t size_count(sadmm_shape_type type)
+{
+    switch (type) {
+    case SADMM_SHAPE_SPHERE: return 1;
+    case SADMM_SHAPE_CAPSULE:
+    case SADMM_SHAPE_CYLINDER:
+    case SADMM_SHAPE_CONE: return 2;
+    case SADMM_SHAPE_BOX:
+    case SADMM_SHAPE_ELLIPSOID: return 3;
+    default: return 0;
+    }
+}
+
 using points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using triangles = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using grid = nb::ndarray<const double, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
@@ -65,17 +79,31 @@ static shape_def make_mesh(points vertices, triangles corners)
     return out;
 }
 
-static shape_def make_heightfield(grid heights, std::array<double, 2> spacing)
+static shape_def make_heightfield(grid heights, numbers<2> given)
 {
+    const std::array<double, 2> spacing = given.as("spacing");
     shape_def out;
     sadmm_heightfield_def def = sadmm_heightfield_def_default();
     def.heights = heights.data();
+    if (heights.shape(0) > INT32_MAX || heights.shape(1) > INT32_MAX) throw nb::value_error("heights: too many");
     def.rows = (int32_t)heights.shape(0), def.columns = (int32_t)heights.shape(1);
     def.spacing[0] = spacing[0], def.spacing[1] = spacing[1];
     out.def.type = SADMM_SHAPE_MESH;
     out.mesh = std::make_shared<mesh_holder>();
     check(sadmm_heightfield_create(&def, &out.mesh->mesh));
     out.def.mesh = out.mesh->mesh;
+    return out;
+}
+
+std::vector<shape_def> read_shapes(const char *name, nb::handle given)
+{
+    std::vector<shape_def> out;
+    if (!PySequence_Check(given.ptr()) || nb::isinstance<nb::str>(given)) refuse_type(name, given, "must be a sequence of subadmm.Shape");
+    for (nb::handle one : given) {
+        const std::string which = std::string(name) + "[" + std::to_string(out.size()) + "]";
+        if (!nb::isinstance<shape_def>(one)) refuse_type(which.c_str(), one, "must be a subadmm.Shape");
+        out.push_back(nb::cast<shape_def>(one));
+    }
     return out;
 }
 
@@ -122,19 +150,20 @@ void bind_shapes(nb::module_ &m)
             self->def.type = named("type", type, type_names);
             if (self->def.type == SADMM_SHAPE_HULL || self->def.type == SADMM_SHAPE_MESH)
                 throw nb::value_error("a hull is made by subadmm.hull, a mesh by subadmm.mesh or subadmm.heightfield");
-            if (size.size() > 3) throw nb::value_error("size: must have at most three numbers");
+            const size_t count = size_count(self->def.type);
+            if (size.size() != count) throw nb::value_error(("size: must have " + std::to_string(count) + " numbers").c_str());
             for (size_t k = 0; k < size.size(); ++k) self->def.size[k] = size[k];
         }, "type"_a, "size"_a = std::vector<double>())
         .def_prop_ro("type", [](const S &s) { return name_of(s.def.type, type_names); })
-        .def_prop_rw("size", [](const S &s) { return array_of<3>(s.def.size); }, [](S &s, vec3 x) { put(x, s.def.size); }, "m, as sadmm_shape_def.size.")
+        .def_prop_rw("size", [](const S &s) { return array_of<3>(s.def.size); }, [](S &s, numbers<3> x) { put(x.as("size"), s.def.size); }, "m, as sadmm_shape_def.size.")
         .def_prop_rw("position", [](const S &s) { return array_of<3>(s.def.position); },
-                     [](S &s, vec3 x) { put(x, s.def.position); }, "In the body's frame, m.")
+                     [](S &s, numbers<3> x) { put(x.as("position"), s.def.position); }, "In the body's frame, m.")
         .def_prop_rw("orientation", [](const S &s) { return array_of<4>(s.def.orientation); },
-                     [](S &s, quat q) { put(q, s.def.orientation); }, "To the body's frame, w x y z.")
+                     [](S &s, numbers<4> q) { put(q.as("orientation"), s.def.orientation); }, "To the body's frame, w x y z.")
         .def_prop_rw("friction", [](const S &s) { return s.def.friction; }, [](S &s, double x) { s.def.friction = x; }, "mu, in [0, 1e6].")
         .def_prop_rw("restitution", [](const S &s) { return s.def.restitution; }, [](S &s, double x) { s.def.restitution = x; }, "In [0, 1].")
-        .def_prop_rw("category", [](const S &s) { return s.def.category; }, [](S &s, uint32_t x) { s.def.category = x; }, "Bits of what it is.")
-        .def_prop_rw("mask", [](const S &s) { return s.def.mask; }, [](S &s, uint32_t x) { s.def.mask = x; }, "Categories that it meets.")
+        .def_prop_rw("category", [](const S &s) { return s.def.category; }, [](S &s, whole x) { s.def.category = x.as_bits("category"); }, "Bits of what it is.")
+        .def_prop_rw("mask", [](const S &s) { return s.def.mask; }, [](S &s, whole x) { s.def.mask = x.as_bits("mask"); }, "Categories that it meets.")
         .def_prop_rw("sensor", [](const S &s) { return s.def.sensor; }, [](S &s, bool x) { s.def.sensor = x; },
                      "Touches nothing and tells what overlaps it: World.record_events, World.sensor_overlaps.")
         .def("copy", [](const S &s) { return S(s); }, "Another definition of the same shape; hulls and meshes are shared.")
@@ -142,9 +171,9 @@ void bind_shapes(nb::module_ &m)
         .def_prop_ro("rounding", [](const S &s) { return sadmm_hull_rounding(s.def.hull); },
                      "Radius of the ball around every point of a hull, m; what geometry() gives is the polyhedron inside. 0 of other types.");
 
-    m.def("_hull", &make_hull, "points"_a, "merge"_a, "rounding"_a);
-    m.def("_mesh", &make_mesh, "vertices"_a, "triangles"_a);
-    m.def("_heightfield", &make_heightfield, "heights"_a, "spacing"_a);
+    m.def("_hull", &make_hull, "points"_a.noconvert(), "merge"_a, "rounding"_a);
+    m.def("_mesh", &make_mesh, "vertices"_a.noconvert(), "triangles"_a.noconvert());
+    m.def("_heightfield", &make_heightfield, "heights"_a.noconvert(), "spacing"_a);
 
     using M = sadmm_mass;
     nb::class_<M>(m, "Mass", "Mass, centre of mass and principal axes of solids.")
@@ -152,18 +181,23 @@ void bind_shapes(nb::module_ &m)
         .def_prop_ro("centre", [](const M &a) { return array_of<3>(a.centre); }, "m, in the frame of the layout.")
         .def_prop_ro("inertia", [](const M &a) { return array_of<3>(a.inertia); }, "Principal moments, kg m^2.")
         .def_prop_ro("orientation", [](const M &a) { return array_of<4>(a.orientation); }, "Principal axes to the frame of the layout.")
-        .def("pose_in_body", [](const M &a, vec3 x, quat q) {
+        .def("pose_in_body", [](const M &a, numbers<3> position, numbers<4> orientation) {
+            vec3 x = position.as("position");
+            quat q = orientation.as("orientation");
             check(sadmm_mass_pose_in_body(&a, x.data(), q.data()));
             return std::make_pair(x, q);
         }, "position"_a, "orientation"_a, "A pose in the frame of the layout, in that of the body.")
-        .def("pose_of_body", [](const M &a, vec3 x, quat q) {
+        .def("pose_of_body", [](const M &a, numbers<3> position, numbers<4> orientation) {
+            vec3 x = position.as("position");
+            quat q = orientation.as("orientation");
             check(sadmm_mass_pose_of_body(&a, x.data(), q.data()));
             return std::make_pair(x, q);
         }, "position"_a, "orientation"_a, "The body's pose in the world, where the frame of the layout has this one.");
-    m.def("mass_of", [](const std::vector<const S *> &shapes, double density) {
+    m.def("mass_of", [](nb::object given, double density) {
+        const std::vector<S> shapes = read_shapes("shapes", given);
         std::vector<M> parts(shapes.size());
         M sum;
-        for (size_t k = 0; k < shapes.size(); ++k) check(sadmm_shape_mass(&shapes[k]->def, density, &parts[k]));
+        for (size_t k = 0; k < shapes.size(); ++k) check(sadmm_shape_mass(&shapes[k].def, density, &parts[k]));
         check(sadmm_mass_sum(parts.data(), parts.size(), &sum));
         return sum;
     }, "shapes"_a, "density"_a, "Mass of solid shapes of one density (kg/m^3) as one body; where they overlap both count.");

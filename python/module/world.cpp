@@ -3,22 +3,27 @@
 
 #include "common.h"
 
-static void init_world(world *self, const std::string &backend, const std::string &precision, int device,
-                       double contact_margin, std::optional<sadmm_settings> settings)
+static sadmm_settings read_settings(nb::handle given)
+{
+    sadmm_settings settings;
+    if (!nb::try_cast(given, settings, false)) refuse_type("settings", given, "must be a subadmm.Settings");
+    return settings;
+}
+
+static void init_world(world *self, const std::string &backend, const std::string &precision, whole device,
+                       double contact_margin, nb::object settings)
 {
     sadmm_world_def def = sadmm_world_def_default();
     def.backend = named("backend", backend, backend_names);
     def.precision = named("precision", precision, precision_names);
-    def.device = device;
+    def.device = device.as_int("device");
     def.contact_margin = contact_margin;
-    if (settings) def.settings = *settings;
+    if (!settings.is_none()) def.settings = read_settings(settings);
+    sadmm_world *made = nullptr;
+    check(sadmm_world_create(&def, &made));
     new (self) world();
+    self->take(made);
     self->def = def;
-    const sadmm_status status = sadmm_world_create(&def, &self->handle);
-    if (status != SADMM_OK) {
-        self->~world();
-        raise_status(status, sadmm_last_message());
-    }
 }
 
 // One step, with the scene's script before it. Under the world's lock, without the interpreter's.
@@ -44,9 +49,9 @@ static sadmm_status step_once(world &w, bool wait, std::string &message)
 }
 
 // Many, with a look at whether the user has interrupted them now and then.
-static void step(world &w, int64_t n, bool wait)
+static void step(world &w, const whole &steps, bool wait)
 {
-    if (n < 0) throw nb::value_error("n: must be 0 or more");
+    const int64_t n = steps.in("n", 0, INT64_MAX);
     for (int64_t k = 0; k < n;) {
         sadmm_status status = SADMM_OK;
         std::string message;
@@ -66,41 +71,78 @@ static void step(world &w, int64_t n, bool wait)
 
 // ---- bodies ----------------------------------------------------------------------------------------------------------
 
-static body add_body(nb::handle_t<world> self, const std::string &type, double mass, vec3 inertia, vec3 position,
-                     quat orientation, vec3 linear_velocity, vec3 angular_velocity, int32_t environment,
-                     const std::string &name, double gravity_scale, double linear_damping, double angular_damping)
+// The shapes of a new body; of several, `which` is one that is refused.
+static sadmm_status add_shapes(sadmm_world *h, sadmm_body_id body, const std::vector<shape_def> &shapes, std::string &which)
+{
+    for (size_t k = 0; k < shapes.size(); ++k) {
+        const sadmm_status status = sadmm_world_add_shape(h, body, &shapes[k].def, nullptr);
+        if (status == SADMM_OK) continue;
+        if (shapes.size() > 1) which = "shapes[" + std::to_string(k) + "]: ";
+        return status;
+    }
+    return SADMM_OK;
+}
+
+// All of it or nothing, and nobody sees a part of it: under one lock.
+static body add_body(nb::handle_t<world> self, const std::string &type, double mass, numbers<3> inertia, numbers<3> position,
+                     numbers<4> orientation, numbers<3> linear_velocity, numbers<3> angular_velocity, whole environment,
+                     const std::string &name, double gravity_scale, double linear_damping, double angular_damping,
+                     nb::object shapes)
 {
     world &w = nb::cast<world &>(self);
     sadmm_body_def def = sadmm_body_def_default();
     body out{nb::borrow(self), &w, {}};
     def.type = named("type", type, body_type_names);
     def.mass = mass;
-    put(inertia, def.inertia), put(position, def.position), put(orientation, def.orientation);
-    put(linear_velocity, def.linear_velocity), put(angular_velocity, def.angular_velocity);
-    def.environment = environment;
-    def.name = name.c_str();
+    put(inertia.as("inertia"), def.inertia), put(position.as("position"), def.position);
+    put(orientation.as("orientation"), def.orientation);
+    put(linear_velocity.as("linear_velocity"), def.linear_velocity);
+    put(angular_velocity.as("angular_velocity"), def.angular_velocity);
+    def.environment = environment.as_int("environment");
+    def.name = without_null("name", name).c_str();
     def.gravity_scale = gravity_scale, def.linear_damping = linear_damping, def.angular_damping = angular_damping;
-    call(w, [&](sadmm_world *h) { return sadmm_world_add_body(h, &def, &out.id); });
+    const std::vector<shape_def> parts = read_shapes("shapes", shapes);
+    std::string message;
+    sadmm_status status;
+    {
+        nb::gil_scoped_release release;
+        std::lock_guard<std::mutex> lock(w.mutex);
+        status = sadmm_world_add_body(w.handle, &def, &out.id);
+        const bool added = status == SADMM_OK;
+        if (added) status = add_shapes(w.handle, out.id, parts, message);
+        if (status != SADMM_OK) message += sadmm_world_message(w.handle);
+        if (added && status != SADMM_OK) sadmm_world_remove_body(w.handle, out.id);
+    }
+    if (status != SADMM_OK) raise_status(status, message);
     return out;
 }
 
 static sadmm_body_state state_of(const body &b)
 {
     sadmm_body_state state;
-    call(*b.w, [&](sadmm_world *h) { return sadmm_world_body_state(h, b.id, &state); });
+    call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_state(h, b.id, &state); });
     return state;
 }
 
-static void set_state(const body &b, const sadmm_body_state &state)
-{
-    call(*b.w, [&](sadmm_world *h) { return sadmm_world_set_body_state(h, b.id, &state); });
-}
-
+// Without its name, which is the world's own.
 static sadmm_body_def def_of(const body &b)
 {
     sadmm_body_def def;
-    call(*b.w, [&](sadmm_world *h) { return sadmm_world_body_def(h, b.id, &def); });
+    call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_def(h, b.id, &def); });
+    def.name = nullptr;
     return def;
+}
+
+static std::string name_of(const body &b)
+{
+    std::string name;
+    call(b.in(), [&](sadmm_world *h) {
+        sadmm_body_def def;
+        const sadmm_status status = sadmm_world_body_def(h, b.id, &def);
+        if (status == SADMM_OK) name = def.name;
+        return status;
+    });
+    return name;
 }
 
 template <size_t N> using member = double (sadmm_body_state::*)[N];
@@ -108,91 +150,104 @@ template <size_t N> using member = double (sadmm_body_state::*)[N];
 template <size_t N> static void bind_member(nb::class_<body> &c, const char *name, member<N> at, const char *doc)
 {
     c.def_prop_rw(name, [at](const body &b) { return array_of<N>(state_of(b).*at); },
-                  [at](const body &b, std::array<double, N> x) {
-                      sadmm_body_state state = state_of(b);
-                      put(x, state.*at);
-                      set_state(b, state);
+                  [at, name](const body &b, const numbers<N> &given) {
+                      const std::array<double, N> x = given.as(name);
+                      call(b.in(), [&](sadmm_world *h) { // no step in between
+                          sadmm_body_state state;
+                          const sadmm_status status = sadmm_world_body_state(h, b.id, &state);
+                          if (status != SADMM_OK) return status;
+                          put(x, state.*at);
+                          return sadmm_world_set_body_state(h, b.id, &state);
+                      });
                   }, doc);
 }
 
-static shape add_shape(const body &b, const shape_def &def)
+static shape add_shape(const body &b, const shape_def &given)
 {
     shape out{b.owner, b.w, {}};
-    call(*b.w, [&](sadmm_world *h) { return sadmm_world_add_shape(h, b.id, &def.def, &out.id); });
+    const sadmm_shape_def def = given.def; // another thread may change it
+    call(b.in(), [&](sadmm_world *h) { return sadmm_world_add_shape(h, b.id, &def, &out.id); });
     return out;
 }
 
 static void bind_body(nb::module_ &m)
 {
-    nb::class_<body> c(m, "Body", "A body of a world. Body(...) is made by World.add_body, World.add_solid, World.bodies.");
+    nb::class_<body> c(m, "Body", collected<sadmm_body_id>(), "A body of a world. Body(...) is made by World.add_body, World.add_solid, World.bodies.");
     c.def("__eq__", [](const body &a, const body &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_body_id>)
         .def("__repr__", [](const body &b) { return "<subadmm.Body " + std::to_string(b.id.slot) + "." + std::to_string(b.id.generation) + ">"; })
         .def_prop_ro("world", [](const body &b) { return b.owner; })
         .def_prop_ro("index", [](const body &b) {
             int32_t index;
-            call(*b.w, [&](sadmm_world *h) { return sadmm_world_body_index(h, b.id, &index); });
+            call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_index(h, b.id, &index); });
             return index;
         }, "Row of the world's arrays.")
-        .def_prop_ro("name", [](const body &b) { return std::string(def_of(b).name); })
+        .def_prop_ro("name", [](const body &b) { return name_of(b); }, "As it was given, up to 63 bytes of UTF-8.")
         .def_prop_ro("type", [](const body &b) { return name_of(def_of(b).type, body_type_names); }, "'dynamic', 'static' or 'kinematic'.")
         .def_prop_ro("mass", [](const body &b) { return def_of(b).mass; }, "kg.")
         .def_prop_ro("inertia", [](const body &b) { return array_of<3>(def_of(b).inertia); }, "Principal moments, kg m^2.")
-        .def("set_mass", [](const body &b, double mass, vec3 inertia) {
-            call(*b.w, [&](sadmm_world *h) { return sadmm_world_set_body_mass(h, b.id, mass, inertia.data()); });
+        .def("set_mass", [](const body &b, double mass, numbers<3> moments) {
+            const vec3 inertia = moments.as("inertia");
+            call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_mass(h, b.id, mass, inertia.data()); });
         }, "mass"_a, "inertia"_a, "From the next step on.");
     bind_member<3>(c, "position", &sadmm_body_state::position, "Centre of mass, m.");
     bind_member<4>(c, "orientation", &sadmm_body_state::orientation, "w x y z, body to world.");
     bind_member<3>(c, "linear_velocity", &sadmm_body_state::linear_velocity, "m/s.");
     bind_member<3>(c, "angular_velocity", &sadmm_body_state::angular_velocity, "rad/s, world frame.");
     c.def("add_shape", &add_shape, "shape"_a, "Put a shape on the body, at the definition's position and orientation.")
-        .def("move_to", [](const body &b, vec3 x, quat q) {
-            call(*b.w, [&](sadmm_world *h) { return sadmm_world_move_body(h, b.id, x.data(), q.data()); });
+        .def("move_to", [](const body &b, numbers<3> position, numbers<4> orientation) {
+            const vec3 x = position.as("position");
+            const quat q = orientation.as("orientation");
+            call(b.in(), [&](sadmm_world *h) { return sadmm_world_move_body(h, b.id, x.data(), q.data()); });
         }, "position"_a, "orientation"_a, "Let a kinematic body go to a pose within the next step.")
-        .def("set_wrench", [](const body &b, vec3 f, vec3 t) {
-            call(*b.w, [&](sadmm_world *h) { return sadmm_world_set_body_wrench(h, b.id, f.data(), t.data()); });
+        .def("set_wrench", [](const body &b, numbers<3> force, numbers<3> torque) {
+            const vec3 f = force.as("force"), t = torque.as("torque");
+            call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_wrench(h, b.id, f.data(), t.data()); });
         }, "force"_a, "torque"_a = vec3{}, "External force (N) at the centre of mass and torque (N m), world frame, kept until set again.")
-        .def("add_force_at", [](const body &b, vec3 f, vec3 x) {
-            call(*b.w, [&](sadmm_world *h) { return sadmm_world_add_body_force_at(h, b.id, f.data(), x.data()); });
+        .def("add_force_at", [](const body &b, numbers<3> force, numbers<3> point) {
+            const vec3 f = force.as("force"), x = point.as("point");
+            call(b.in(), [&](sadmm_world *h) { return sadmm_world_add_body_force_at(h, b.id, f.data(), x.data()); });
         }, "force"_a, "point"_a, "Add a force (N) at a point (m, world) to the external wrench.")
-        .def("apply_impulse_at", [](const body &b, vec3 p, vec3 x) {
-            call(*b.w, [&](sadmm_world *h) { return sadmm_world_apply_body_impulse_at(h, b.id, p.data(), x.data()); });
+        .def("apply_impulse_at", [](const body &b, numbers<3> impulse, numbers<3> point) {
+            const vec3 p = impulse.as("impulse"), x = point.as("point");
+            call(b.in(), [&](sadmm_world *h) { return sadmm_world_apply_body_impulse_at(h, b.id, p.data(), x.data()); });
         }, "impulse"_a, "point"_a, "Change the velocities at once by an impulse (N s) at a point (m, world).")
         .def("set_gravity_scale", [](const body &b, double s) {
-            call(*b.w, [&](sadmm_world *h) { return sadmm_world_set_body_gravity_scale(h, b.id, s); });
+            call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_gravity_scale(h, b.id, s); });
         }, "scale"_a)
         .def("set_damping", [](const body &b, double linear, double angular) {
-            call(*b.w, [&](sadmm_world *h) { return sadmm_world_set_body_damping(h, b.id, linear, angular); });
+            call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_damping(h, b.id, linear, angular); });
         }, "linear"_a, "angular"_a, "1/s.")
         .def_prop_ro("contact_wrench", [](const body &b) {
             vec6 out;
-            call(*b.w, [&](sadmm_world *h) { return sadmm_world_body_contact_wrench(h, b.id, out.data()); });
+            call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_contact_wrench(h, b.id, out.data()); });
             return out;
         }, "Force (N) and torque about the centre of mass (N m) of the last step's contacts.")
         .def("ignore", [](const body &a, const body &b, bool off) {
-            call(*a.w, [&](sadmm_world *h) { return sadmm_world_set_body_pair_contact(h, a.id, b.id, !off); });
+            const sadmm_body_id other = id_in(a.in(), b, "other");
+            call(a.in(), [&](sadmm_world *h) { return sadmm_world_set_body_pair_contact(h, a.id, other, !off); });
         }, "other"_a, "off"_a = true, "Turn contact with another body off, or on again.")
-        .def("remove", [](const body &b) { call(*b.w, [&](sadmm_world *h) { return sadmm_world_remove_body(h, b.id); }); },
+        .def("remove", [](const body &b) { call(b.in(), [&](sadmm_world *h) { return sadmm_world_remove_body(h, b.id); }); },
              "With its shapes, joints and couplings.");
 
-    nb::class_<shape>(m, "BodyShape", "A shape on a body.")
+    nb::class_<shape>(m, "BodyShape", collected<sadmm_shape_id>(), "A shape on a body.")
         .def("__eq__", [](const shape &a, const shape &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_shape_id>)
         .def_prop_ro("world", [](const shape &s) { return s.owner; })
         .def_prop_ro("index", [](const shape &s) {
             int32_t index;
-            call(*s.w, [&](sadmm_world *h) { return sadmm_world_shape_index(h, s.id, &index); });
+            call(s.in(), [&](sadmm_world *h) { return sadmm_world_shape_index(h, s.id, &index); });
             return index;
         })
         .def_prop_ro("body", [](const shape &s) {
             body out{s.owner, s.w, {}};
             sadmm_shape_def def;
-            call(*s.w, [&](sadmm_world *h) { return sadmm_world_shape_def(h, s.id, &def, &out.id); });
+            call(s.in(), [&](sadmm_world *h) { return sadmm_world_shape_def(h, s.id, &def, &out.id); });
             return out;
         })
         .def_prop_ro("definition", [](const shape &s) {
             shape_def out;
-            call(*s.w, [&](sadmm_world *h) {
+            call(s.in(), [&](sadmm_world *h) {
                 const sadmm_status status = sadmm_world_shape_def(h, s.id, &out.def, nullptr);
                 if (status == SADMM_OK) hold_parts(out); // the world could let go of them
                 return status;
@@ -200,12 +255,13 @@ static void bind_body(nb::module_ &m)
             return out;
         }, "As it is now.")
         .def("set_material", [](const shape &s, double mu, double e) {
-            call(*s.w, [&](sadmm_world *h) { return sadmm_world_set_shape_material(h, s.id, mu, e); });
+            call(s.in(), [&](sadmm_world *h) { return sadmm_world_set_shape_material(h, s.id, mu, e); });
         }, "friction"_a, "restitution"_a = 0.0)
         .def("set_pair_friction", [](const shape &a, const shape &b, double mu) {
-            call(*a.w, [&](sadmm_world *h) { return sadmm_world_set_pair_friction(h, a.id, b.id, mu); });
+            const sadmm_shape_id other = id_in(a.in(), b, "other");
+            call(a.in(), [&](sadmm_world *h) { return sadmm_world_set_pair_friction(h, a.id, other, mu); });
         }, "other"_a, "friction"_a, "Of the two shapes; -1: the geometric mean again.")
-        .def("remove", [](const shape &s) { call(*s.w, [&](sadmm_world *h) { return sadmm_world_remove_shape(h, s.id); }); });
+        .def("remove", [](const shape &s) { call(s.in(), [&](sadmm_world *h) { return sadmm_world_remove_shape(h, s.id); }); });
 }
 
 void bind_world(nb::module_ &m, nb::class_<world> &w)
@@ -216,9 +272,13 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
           "backend: 'auto', 'ref', 'cpu' or 'cuda'; precision: 'f64' or 'f32'; device: which accelerator; contact_margin: "
           "speculative margin as a share of the thinner shape's extent; settings: Settings, or the defaults.");
     w.def_prop_rw("settings", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_settings(h); }); },
-                  [](world &w, const sadmm_settings &s) { call(w, [&](sadmm_world *h) { return sadmm_world_set_settings(h, &s); }); },
+                  [](world &w, nb::object given) {
+                      const sadmm_settings s = read_settings(given);
+                      call(w, [&](sadmm_world *h) { return sadmm_world_set_settings(h, &s); });
+                  },
                   "A copy: change it and set it again. From the next step on.");
-    w.def("set_backend", [](world &w, const std::string &backend, const std::string &precision, int device) {
+    w.def("set_backend", [](world &w, const std::string &backend, const std::string &precision, whole which) {
+        const int device = which.as_int("device");
         const auto b = named("backend", backend, backend_names);
         const auto p = named("precision", precision, precision_names);
         call(w, [&](sadmm_world *h) {
@@ -229,19 +289,20 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
     }, "backend"_a, "precision"_a = "f64", "device"_a = 0, "Who makes the steps from the next one on.");
     w.def("add_body", &add_body, nb::kw_only(), "type"_a = "dynamic", "mass"_a = 0.0, "inertia"_a = vec3{}, "position"_a = vec3{},
           "orientation"_a = quat{1, 0, 0, 0}, "linear_velocity"_a = vec3{}, "angular_velocity"_a = vec3{},
-          "environment"_a = 0, "name"_a = "", "gravity_scale"_a = 1.0, "linear_damping"_a = 0.0, "angular_damping"_a = 0.0,
-          "A body without shapes. SI units; `inertia`: principal moments. World.add_solid computes masses.");
+          "environment"_a = 0, "name"_a = "", "gravity_scale"_a = 1.0, "linear_damping"_a = 0.0, "angular_damping"_a = 0.0, "shapes"_a = nb::tuple(),
+          "A body. SI units; `inertia`: principal moments; `shapes`: Shapes to put on it, none by default. Where one of them is\n"
+          "refused there is no body. World.add_solid computes masses.");
     w.def_prop_ro("body_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_body_count(h); }); });
     w.def_prop_ro("shape_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_shape_count(h); }); });
     w.def_prop_ro("bodies", [](nb::handle_t<world> self) {
-        return all_of<body>(self, sadmm_world_body_count(nb::cast<world &>(self).handle), &sadmm_world_body_at);
+        return all_of<body>(self, &sadmm_world_body_count, &sadmm_world_body_at);
     }, "All bodies, in the order of the arrays' rows.");
     w.def_prop_ro("shapes", [](nb::handle_t<world> self) {
-        return all_of<shape>(self, sadmm_world_shape_count(nb::cast<world &>(self).handle), &sadmm_world_shape_at);
+        return all_of<shape>(self, &sadmm_world_shape_count, &sadmm_world_shape_at);
     }, "All shapes.");
-    w.def("step", [](world &w, int64_t n) { step(w, n, true); }, "n"_a = 1,
+    w.def("step", [](world &w, whole n) { step(w, n, true); }, "n"_a = 1,
           "Make n steps. A scene's scripted inputs come with them.");
-    w.def("step_async", [](world &w, int64_t n) { step(w, n, false); }, "n"_a = 1,
+    w.def("step_async", [](world &w, whole n) { step(w, n, false); }, "n"_a = 1,
           "Begin n steps without waiting for them, where the backend can.");
     w.def("wait", [](world &w) { call(w, [](sadmm_world *h) { return sadmm_world_wait(h); }); }, "Until all steps begun are done.");
     w.def_prop_ro("report", [](world &w) {

@@ -52,6 +52,7 @@ from ._core import (
     version,
 )
 from .decomposition import decompose
+from .given import indices, numbers, real
 from .importing import load
 
 __version__ = version()
@@ -72,10 +73,10 @@ __all__ = [
 
 
 def _with(shape, options):
-    for name, value in options.items():
+    for name in options:
         if name not in ("position", "orientation", "friction", "restitution", "category", "mask", "sensor"):
             raise TypeError(f"{name}: no such option of a shape")
-        setattr(shape, name, value)
+    _core._set_members(shape, options)
     return shape
 
 
@@ -115,27 +116,23 @@ def ellipsoid(x, y, z, **options):
     return _with(Shape("ellipsoid", [x, y, z]), options)
 
 
-def _points(points):
-    return np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
-
-
 def hull(points, merge=None, rounding=0.0, **options):
     """The convex hull of points (n x 3, m). merge: faces that are flat to within this share of the extent become one;
     rounding: radius of a ball around every point of it, m."""
-    return _with(_core._hull(_points(points), -1.0 if merge is None else merge, rounding), options)
+    return _with(_core._hull(numbers("points", points, 3), -1.0 if merge is None else merge, rounding), options)
 
 
 def mesh(vertices, triangles, **options):
     """Triangles (m x 3 indices, counter-clockwise seen from outside) of vertices (n x 3, m), for static and kinematic
     bodies."""
-    corners = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
-    return _with(_core._mesh(_points(vertices), corners), options)
+    vertices = numbers("vertices", vertices, 3)
+    return _with(_core._mesh(vertices, indices("triangles", triangles, len(vertices))), options)
 
 
 def heightfield(heights, spacing, **options):
     """Heights (rows along y x columns along x, m) over a grid whose middle is the origin; spacing: (x, y), m. For static and
     kinematic bodies."""
-    return _with(_core._heightfield(np.ascontiguousarray(heights, dtype=np.float64), spacing), options)
+    return _with(_core._heightfield(numbers("heights", heights), spacing), options)
 
 
 # ---- scenes -----------------------------------------------------------------------------------------------------------
@@ -159,9 +156,9 @@ def scene_from_json(text, *, backend="auto", precision=None, method=None, device
 
 def _add_ground(self, friction=0.5, height=0.0):
     """A static plane z = height that bodies of all environments meet."""
-    ground = self.add_body(type="static", environment=-1, position=(0, 0, height), name="ground")
-    ground.add_shape(plane(friction=friction))
-    return ground
+    return self.add_body(
+        type="static", environment=-1, position=(0, 0, height), name="ground", shapes=[plane(friction=friction)]
+    )
 
 
 def _add_solid(self, shapes, density=None, mass=None, *, position=(0, 0, 0), orientation=(1, 0, 0, 0), type="dynamic",
@@ -170,35 +167,36 @@ def _add_solid(self, shapes, density=None, mass=None, *, position=(0, 0, 0), ori
 
     `position` and `orientation` are those of the frame that the shapes are placed in (the layout); the body itself has its
     origin at the centre of mass and its axes along the principal ones. Of static and kinematic bodies both frames are the
-    same, and neither density nor mass is needed. Sensors have no mass. Other options: as of add_body.
+    same, and neither density nor mass is needed. Sensors have no mass. Other options: as of add_body. After an error there
+    is no body.
     """
-    shapes = [shapes] if isinstance(shapes, Shape) else list(shapes)
+    if isinstance(shapes, Shape):
+        shapes = [shapes]
+    elif not hasattr(shapes, "__iter__"):
+        raise TypeError(f"shapes = {shapes!r}: must be a subadmm.Shape, or several")
+    shapes = list(shapes)
     if not shapes:
         raise ValueError("shapes: must be one at least")
     if type != "dynamic":
-        body = self.add_body(type=type, position=position, orientation=orientation, **options)
-        for shape in shapes:
-            body.add_shape(shape)
-        return body
+        return self.add_body(type=type, position=position, orientation=orientation, shapes=shapes, **options)
+    for k, shape in enumerate(shapes):
+        if not isinstance(shape, Shape):
+            raise TypeError(f"shapes[{k}] = {shape!r}: must be a subadmm.Shape")
     if (density is None) == (mass is None):
         raise ValueError("density, mass: one of the two must be given")
     solid = [shape for shape in shapes if not shape.sensor]
     if not solid:
         raise ValueError("shapes: one at least must be no sensor, which has no mass")
+    if mass is not None:
+        mass = real("mass", mass, 1e-9, 1e12)
     whole = mass_of(solid, 1.0)
     density = density if density is not None else mass / whole.mass
     whole = mass_of(solid, density)
     place, turn = whole.pose_of_body(position, orientation)
-    body = self.add_body(mass=whole.mass, inertia=whole.inertia, position=place, orientation=turn, **options)
-    try:
-        for shape in shapes:
-            own = shape.copy()
-            own.position, own.orientation = whole.pose_in_body(shape.position, shape.orientation)
-            body.add_shape(own)
-    except Error:
-        body.remove()
-        raise
-    return body
+    own = [shape.copy() for shape in shapes]
+    for shape in own:
+        shape.position, shape.orientation = whole.pose_in_body(shape.position, shape.orientation)
+    return self.add_body(mass=whole.mass, inertia=whole.inertia, position=place, orientation=turn, shapes=own, **options)
 
 
 def _struct_dtype(members, size):
@@ -241,7 +239,7 @@ def _to_json(self, name=None, description=None, duration=None):
     scene_from_json(text) read; duration: how long it is meant to be run for, s. Of scenes all three are the scene's own where
     they are not given, of other worlds 'world', nothing and 10 s. What steps leave for the next ones is not in it: see
     save()."""
-    return self._to_json(name, description, duration)
+    return self._to_json(name, description, None if duration is None else real("duration", duration, 0, 1e9))
 
 
 def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(), category=0, mask=0, from_inside=True,
@@ -251,8 +249,8 @@ def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(
     of a mesh, else -1). ignore: a Body; types: of bodies, as ("dynamic",); category, mask: only what would meet a shape with
     these; from_inside: what the origin is inside of counts, at distance 0; from_behind: triangles count from behind too;
     sensors: sensor shapes count too."""
-    return self._cast_rays(_points(origins), _points(directions), length, ignore, list(types), category, mask, from_inside,
-                           from_behind, sensors)
+    return self._cast_rays(numbers("origins", origins, 3), numbers("directions", directions, 3), length, ignore, list(types),
+                           category, mask, from_inside, from_behind, sensors)
 
 
 World.to_json = _to_json

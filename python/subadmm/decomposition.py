@@ -3,6 +3,7 @@
 import numpy as np
 
 from . import _core
+from .given import indices, numbers, whole
 
 #: Share of a mesh's size that its hulls may be off by, where nothing else is said: coacd's own default.
 THRESHOLD = 0.05
@@ -17,12 +18,19 @@ def vertices_and_triangles(mesh):
         vertices, triangles = geometry
     elif hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         vertices, triangles = mesh.vertices, mesh.faces
-    else:
+    elif isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         vertices, triangles = mesh
-    vertices = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
-    triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
-    if len(triangles) == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise ValueError(f"mesh: triangles must be of vertices in [0, {len(vertices)}), one at least")
+    else:
+        raise TypeError(f"mesh: must be a Shape, a pair (vertices, triangles) or have vertices and faces; is {type(mesh).__name__}")
+    vertices = numbers("mesh: vertices", vertices, 3)
+    if not np.isfinite(vertices).all():
+        raise ValueError("mesh: vertices: must be finite numbers")
+    try:
+        triangles = indices("triangles", triangles, len(vertices))
+    except ValueError as error:
+        raise ValueError(f"mesh: triangles must be of its vertices: {error}") from None
+    if len(triangles) == 0:
+        raise ValueError("mesh: triangles must be one at least")
     return vertices, triangles
 
 
@@ -53,8 +61,8 @@ def decompose(mesh, threshold=THRESHOLD, *, most=None, seed=0, **options):
     """
     if not 0.01 <= threshold <= 1:
         raise ValueError(f"threshold: {threshold} is not in [0.01, 1]")
-    if most is not None and most < 1:
-        raise ValueError(f"most: {most} must be 1 or more")
+    most = -1 if most is None else whole("most", most, 1, 2**31 - 1)
+    seed = whole("seed", seed, 0, 2**31 - 1)
     vertices, triangles = vertices_and_triangles(mesh)
     try:
         import coacd
@@ -62,7 +70,7 @@ def decompose(mesh, threshold=THRESHOLD, *, most=None, seed=0, **options):
         raise ImportError("subadmm.decompose needs the package coacd: pip install subadmm[decompose]") from error
     coacd.set_log_level("error")
     parts = coacd.run_coacd(
-        coacd.Mesh(vertices, triangles), threshold=threshold, max_convex_hull=-1 if most is None else most, seed=seed
+        coacd.Mesh(vertices, triangles), threshold=threshold, max_convex_hull=most, seed=seed
     )
     if not parts:
         raise ValueError("mesh: coacd makes no parts of it")

@@ -78,7 +78,11 @@ def load(
     there), ValueError (what MuJoCo does not compile or USD does not open; an argument out of range), subadmm.Error (a
     body that the world does not take, named).
     """
+    from .. import Settings
+
     threshold = _threshold_of(decompose)
+    if settings is not None and not isinstance(settings, Settings):
+        raise TypeError(f"settings = {settings!r}: must be a subadmm.Settings")
     if _is_stage(path):
         given = dict(floating=floating, keyframe=keyframe, qpos=qpos, qvel=qvel)
         for name, value in given.items():

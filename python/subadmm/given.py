@@ -1,0 +1,65 @@
+"""Arrays that are given: of the numbers and the shape that are meant, or an error that says what is wrong."""
+import operator
+
+import numpy as np
+
+
+def _array(name, given):
+    try:
+        return np.asarray(given)
+    except ValueError as error:  # rows of different lengths
+        raise ValueError(f"{name}: {error}") from None
+
+
+def _refuse(name, array, kinds, must):
+    error = ValueError if array.dtype.kind in kinds else TypeError
+    raise error(f"{name}: must {must}; is {array.dtype} of shape {array.shape}")
+
+
+def numbers(name, given, columns=None):
+    """n x columns (None: any number) float64 in C order, of an array or nested lists of real numbers; of no numbers at
+    all 0 x columns."""
+    array = _array(name, given)
+    if array.shape == (0,) and columns is not None:
+        array = np.zeros((0, columns))
+    if array.dtype.kind not in "iuf" or array.ndim != 2 or (columns is not None and array.shape[1] != columns):
+        _refuse(name, array, "iuf", f"have {'rows and' if columns is None else columns} columns of real numbers")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def indices(name, given, count):
+    """m x 3 int32 in C order, of an array or nested lists of whole numbers in [0, count)."""
+    array = _array(name, given)
+    if array.shape == (0,):
+        array = np.zeros((0, 3), np.int32)
+    if array.dtype.kind not in "iu" or array.ndim != 2 or array.shape[1] != 3:
+        _refuse(name, array, "iu", "have 3 columns of whole numbers")
+    wrong = (array < 0) | (array >= min(count, 2**31))
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise ValueError(f"{name}[{row}][{column}] = {array[row, column]}: must be in [0, {count})")
+    return np.ascontiguousarray(array, dtype=np.int32)
+
+
+def whole(name, value, low, high):
+    """An int, of what is one."""
+    try:
+        out = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} = {value!r}: must be a whole number in [{low}, {high}]") from None
+    if not low <= out <= high:
+        raise ValueError(f"{name} = {value!r}: must be a whole number in [{low}, {high}]")
+    return out
+
+
+def real(name, value, low, high):
+    """A finite float, of what is one."""
+    try:
+        out = float(value) if not isinstance(value, (str, bytes)) else None
+    except (TypeError, ValueError):
+        out = None
+    if out is None:
+        raise TypeError(f"{name} = {value!r}: must be a number in [{low:g}, {high:g}]")
+    if not low <= out <= high or not np.isfinite(out):
+        raise ValueError(f"{name} = {value!r}: must be a finite number in [{low:g}, {high:g}]")
+    return out
