@@ -1,10 +1,15 @@
 """python -m subadmm view | record | picture SCENE: scenes to look at; convert FILE: robots as scene files."""
 import argparse
+import signal
 import sys
+import threading
 import time
+from contextlib import contextmanager
 
 import subadmm
 from subadmm.convert import MODELS
+from subadmm.given import real, whole
+from subadmm.output import Output
 
 
 def _arguments():
@@ -54,23 +59,26 @@ _DURATION = 10.0  # s, of worlds that do not say
 def _steps(world, given):
     """How many to make."""
     if given.steps is not None:
-        if given.steps < 0:
-            raise ValueError(f"--steps: {given.steps}; must be 0 or more")
         return given.steps
     seconds = given.seconds if given.seconds is not None else world.duration or _DURATION
-    if not 0 <= seconds < float("inf"):
-        raise ValueError(f"--seconds: {seconds}; must be 0 or more")
     return round(seconds / world.settings.dt)
 
 
-def _record(world, given):
-    from subadmm import show
+def _check_run(given):
+    """What is known to be wrong before anything is done."""
+    if given.seconds is not None:
+        real("--seconds", given.seconds, 0, 1e9)
+    if given.steps is not None:
+        whole("--steps", given.steps, 0, 2**63 - 1)
 
-    dt = world.settings.dt
-    if given.certify:
-        settings = world.settings
-        settings.certify = True
-        world.settings = settings
+
+def _record(build, given):
+    from subadmm import show
+    from subadmm.show.recording import check_ending, check_frames
+
+    check_ending("--output", given.output)
+    check_frames(given.fps, given.contacts, "--")
+    _check_run(given)
     said = [0.0]
 
     def progress(frame, frames):
@@ -81,14 +89,22 @@ def _record(world, given):
                 f"\rframe {frame + 1} of {frames}", end="\n" if frame + 1 == frames else "", file=sys.stderr, flush=True
             )
 
-    if not given.output.endswith((".html", ".glb")):
-        raise ValueError(f"--output: {given.output}; must end in .html or .glb")
-    show.record(world, _steps(world, given) * dt, given.fps, title=given.scene, contacts=given.contacts,
-                after_frame=progress).save(given.output)
+    with Output("--output", given.output, reads=[given.scene]) as file:
+        world = build()
+        if given.certify:
+            settings = world.settings
+            settings.certify = True
+            world.settings = settings
+        seconds = _steps(world, given) * world.settings.dt
+        made = show.record(world, seconds, given.fps, title=given.scene, contacts=given.contacts, after_frame=progress)
+        file.write(made.data(given.output))
 
 
-def _picture(world, given):
+def _picture(build, given):
     from subadmm import show
+    from subadmm.show.camera import check_place
+    from subadmm.show.picture import check_size
+    from subadmm.show.png import png_of
 
     if not given.output.endswith(".png"):
         raise ValueError(f"--output: {given.output}; must end in .png")
@@ -96,10 +112,21 @@ def _picture(world, given):
         width, height = map(int, given.size.split("x"))
     except ValueError:
         raise ValueError(f"--size: {given.size}; must be WIDTHxHEIGHT, as 960x600") from None
-    world.step(_steps(world, given))
-    description = show.describe(world)
-    camera = show.looking_at(description, given.azimuth, given.elevation, given.zoom)
-    show.save_picture(given.output, world, width=width, height=height, camera=camera, description=description)
+    check_size(width, height, "--size: ")
+    check_place(given.azimuth, given.elevation, given.zoom, "--")
+    _check_run(given)
+    with Output("--output", given.output, reads=[given.scene]) as file:
+        world = build()
+        world.step(_steps(world, given))
+        description = show.describe(world)
+        camera = show.looking_at(description, given.azimuth, given.elevation, given.zoom)
+        file.write(png_of(show.picture(world, width, height, camera=camera, description=description)))
+
+
+def _view(build, given):
+    from subadmm.show.view import serve
+
+    serve(build, given.scene, host=given.host, port=whole("--port", given.port, 0, 65535))
 
 
 def _convert(given):
@@ -107,13 +134,32 @@ def _convert(given):
 
     if not given.output.endswith(".json"):
         raise ValueError(f"output: {given.output}; must end in .json")
-    if given.duration is not None and not 0 <= given.duration < float("inf"):
-        raise ValueError(f"--duration: {given.duration}; must be 0 or more")
+    if given.duration is not None:
+        real("--duration", given.duration, 0, 1e9)
     options = {name: getattr(given, name) for name in ("floating", "keyframe", "decompose") if getattr(given, name)}
     notes = convert(given.source, given.output, report=given.report, duration=given.duration, **options)
     if notes:
         print(f"not carried over, or not exactly ({len(notes)}):")
         print(notes)
+
+
+class _Ended(BaseException):
+    """By SIGTERM: what is not complete is dropped on the way out."""
+
+
+@contextmanager
+def _ended_by_signals():
+    def end(*_):
+        raise _Ended
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def main(arguments=None):
@@ -133,18 +179,18 @@ def main(arguments=None):
                              settings=settings)
 
     try:
-        if given.command == "convert":
-            _convert(given)
-        elif given.command == "view":
-            from subadmm.show.view import serve
-            serve(build, given.scene, host=given.host, port=given.port)
-        else:
-            {"record": _record, "picture": _picture}[given.command](build(), given)
+        with _ended_by_signals():
+            if given.command == "convert":
+                _convert(given)
+            else:
+                {"record": _record, "picture": _picture, "view": _view}[given.command](build, given)
     except (subadmm.Error, ValueError, ImportError, OSError) as error:
         print(f"subadmm: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130
+    except _Ended:
+        return 143
     return 0
 
 

@@ -2,9 +2,11 @@
 
 import json
 import os
+from contextlib import ExitStack
 
 from .importing import load
 from .importing.model import Report
+from .output import Output
 
 #: Suffixes of files that are loaded; all else is a scene's name, or the path of a scene file.
 MODELS = (".xml", ".mjcf", ".urdf", ".usd", ".usda", ".usdc", ".usdz")
@@ -51,9 +53,16 @@ def convert(source, path, *, report=None, duration=None, **options):
     """Write a robot, or a scene, as a scene file at `path`, and return the report (a list of (element, reason)).
 
     source: an MJCF, URDF or USD file, a scene's name ("pile:300") or a scene file. report: a file to write the report
-    to, as JSON, with the joints' places in the scene file. duration: how long the scene is meant to be run for, s
-    (default: the scene's, 10). Other options: as of load().
+    to, as JSON, with the joints' places in the scene file. duration: how long the scene is meant to be run for, s, in
+    [0, 1e9] (default: the scene's, 10). Other options: as of load(). Both files are complete, or as they were.
     """
+    with ExitStack() as files:
+        file = files.enter_context(Output("path", path, reads=[source]))
+        said = files.enter_context(Output("report", report, reads=[source], others=[file])) if report is not None else None
+        return _convert(source, file, said, duration, options)
+
+
+def _convert(source, file, said, duration, options):
     world, notes, joints = open_source(os.fspath(source), **options)
     named = {}
     if world.duration is None:  # no scene of the library and no scene file
@@ -62,11 +71,8 @@ def convert(source, path, *, report=None, duration=None, **options):
             "description": f"from {os.path.basename(source)}",
         }
     text = world.to_json(duration=duration, **named)
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text)
-    if report is not None:
-        said = {"not_carried_over": [note._asdict() for note in notes], "joints": joints}
-        with open(report, "w", encoding="utf-8") as file:
-            json.dump(said, file, indent=1, ensure_ascii=False)
-            file.write("\n")
+    file.write(text)
+    if said is not None:
+        told = {"not_carried_over": [note._asdict() for note in notes], "joints": joints}
+        said.write(json.dumps(told, indent=1, ensure_ascii=False) + "\n")
     return notes

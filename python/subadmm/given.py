@@ -42,24 +42,36 @@ def indices(name, given, count):
 
 
 def whole(name, value, low, high):
-    """An int, of what is one."""
+    """An int, of what is one, in [low, high]."""
+    must = f"must be a whole number in [{low}, {high}]"
     try:
         out = operator.index(value)
     except TypeError:
-        raise TypeError(f"{name} = {value!r}: must be a whole number in [{low}, {high}]") from None
+        raise TypeError(f"{name}: {value!r}; {must}") from None
     if not low <= out <= high:
-        raise ValueError(f"{name} = {value!r}: must be a whole number in [{low}, {high}]")
+        raise ValueError(f"{name}: {value}; {must}")
     return out
 
 
-def real(name, value, low, high):
-    """A finite float, of what is one."""
+def real(name, value, low, high, above=False):
+    """A finite float, of what is a number, in [low, high]; above: in (low, high]."""
+    must = f"must be a number in {'(' if above else '['}{low:g}, {high:g}]"
     try:
-        out = float(value) if not isinstance(value, (str, bytes)) else None
-    except (TypeError, ValueError):
+        out = None if isinstance(value, (str, bytes, bytearray)) else float(value)
+    except (TypeError, ValueError, OverflowError):
         out = None
     if out is None:
-        raise TypeError(f"{name} = {value!r}: must be a number in [{low:g}, {high:g}]")
-    if not low <= out <= high or not np.isfinite(out):
-        raise ValueError(f"{name} = {value!r}: must be a finite number in [{low:g}, {high:g}]")
+        raise TypeError(f"{name}: {value!r}; {must}")
+    if not low <= out <= high or (above and out == low):
+        raise ValueError(f"{name}: {value}; {must}")
     return out
+
+
+def point(name, value, count=3):
+    """Finite numbers, as an array of float64."""
+    out = np.asarray(value)
+    if out.shape != (count,) or out.dtype.kind not in "iuf":
+        raise TypeError(f"{name}: {value!r}; must be {count} numbers")
+    if not np.isfinite(out).all():
+        raise ValueError(f"{name}: {value!r}; must be {count} finite numbers")
+    return out.astype(np.float64)

@@ -180,12 +180,12 @@ def test_whole_numbers_are_whole_and_of_their_size(name):
     argument = name.split()[0]
     before = world.state_hash()
     for wrong in (1.0, 1.5, np.float32(1.5), np.float64(1), "1", (1, 1)):
-        with pytest.raises(TypeError, match=f"{argument}.*: must be a whole number"):
+        with pytest.raises(TypeError, match=f"{argument}.*[:;] must be a whole number"):
             WHOLE[name](world, joint, wrong)
     for wrong in (2**31 if argument not in ("category", "mask", "locks", "id", "n") else 2**32, 2**63, 2**70, -(2**31) - 1):
         if argument == "n" and 0 <= wrong < 2**63:
             continue
-        with pytest.raises(ValueError, match=f"{argument}.* = {wrong}: must be a whole number"):
+        with pytest.raises(ValueError, match=f"{argument}.*{wrong}[:;] must be a whole number"):
             WHOLE[name](world, joint, wrong)
     assert world.state_hash() == before
 
@@ -263,10 +263,10 @@ def test_texts_have_no_end_within():
     (lambda: subadmm.World().add_solid([None], mass=1), r"shapes\[0\] = None: must be a subadmm.Shape"),
     (lambda: subadmm.World().add_solid(3), "shapes = 3: must be a subadmm.Shape"),
     (lambda: subadmm.World().add_body(shapes=[subadmm.sphere(1), 3]), r"shapes\[1\] = 3: must be a subadmm.Shape"),
-    (lambda: subadmm.World().add_solid(subadmm.sphere(1), mass="1"), "mass = '1': must be a number in"),
+    (lambda: subadmm.World().add_solid(subadmm.sphere(1), mass="1"), "mass: '1'; must be a number in"),
     (lambda: subadmm.mass_of([None], 1.0), r"shapes\[0\] = None: must be a subadmm.Shape"),
     (lambda: subadmm.World().find_body(3), r"id = 3: must be \(slot, generation\)"),
-    (lambda: subadmm.World().to_json(duration="x"), "duration = 'x': must be a number"),
+    (lambda: subadmm.World().to_json(duration="x"), "duration: 'x'; must be a number"),
     (lambda: subadmm.decompose(3), "mesh: must be a Shape, a pair"),
 ])
 def test_other_types_are_named(call, said):
@@ -277,9 +277,9 @@ def test_other_types_are_named(call, said):
 def test_other_values_are_named():
     world = subadmm.World()
     for duration in (np.nan, np.inf, -1, 1e10):
-        with pytest.raises(ValueError, match=f"duration = {duration}: must be a finite number"):
+        with pytest.raises(ValueError, match=rf"duration: {duration}; must be a number in \[0, 1e\+09\]"):
             world.to_json(duration=duration)
-    with pytest.raises(ValueError, match="mass = -1: must be a finite number"):
+    with pytest.raises(ValueError, match="mass: -1; must be a number in"):
         world.add_solid(subadmm.sphere(1), mass=-1)
     for type, size in (("sphere", [1, 2]), ("box", [1]), ("plane", [1]), ("capsule", [1, 2, 3])):
         with pytest.raises(ValueError, match="size: must have"):

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import Shape, hull
+from ..given import real, whole
 
 #: Corners around a round shape, and twice those from pole to pole.
 DETAIL = 24
@@ -154,9 +155,8 @@ def form_of(shape: Shape, patch=10.0, detail=DETAIL):
 def mesh_of(shape: Shape, patch=10.0, detail=DETAIL) -> Mesh:
     """The mesh of a shape, in its own frame (its position and orientation are left out).
 
-    patch: half the width of what is drawn of a plane, m; detail: corners around a round shape, from 8 on. Round shapes
-    are inscribed: their corners are on the surface."""
-    if detail < 8:
-        raise ValueError(f"detail: {detail}; must be 8 at least")
+    patch: half the width of what is drawn of a plane, m, in (0, 1e9]; detail: corners around a round shape, in
+    [8, 1024]. Round shapes are inscribed: their corners are on the surface."""
+    patch, detail = real("patch", patch, 0, 1e9, above=True), whole("detail", detail, 8, 1024)
     _, scale, make = form_of(shape, patch, detail)
     return make().scaled(scale)

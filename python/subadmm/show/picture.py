@@ -1,6 +1,8 @@
 """Pictures of a world without a window or a GPU: a rasteriser with a sun, its shadows and ambient occlusion."""
 import numpy as np
 
+from ..given import whole
+from ..output import Output
 from .camera import looking_at
 from .description import describe
 from .png import png_of
@@ -15,13 +17,18 @@ _SHADOW_PIXELS = 2048
 _NEIGHBOURS = 28
 
 
+def check_size(width, height, prefix=""):
+    """(width, height) of a picture, or an error; prefix: of their names in it."""
+    return whole(f"{prefix}width", width, 16, 8192), whole(f"{prefix}height", height, 16, 8192)
+
+
 def picture(world, width=960, height=600, camera=None, smooth=2, description=None):
     """The world as it is now: height x width x 3, uint8, sRGB. The same world gives the same picture.
 
-    camera: Camera, or None: all that moves in view; smooth: samples along a pixel's side, 1 to 4."""
-    for name, value, low, high in (("width", width, 16, 8192), ("height", height, 16, 8192), ("smooth", smooth, 1, 4)):
-        if not low <= value <= high:
-            raise ValueError(f"{name}: {value}; must be in [{low}, {high}]")
+    width, height: in [16, 8192]; camera: Camera, or None: all that moves in view; smooth: samples along a pixel's side,
+    1 to 4."""
+    width, height = check_size(width, height)
+    smooth = whole("smooth", smooth, 1, 4)
     description = description or describe(world)
     camera = camera or looking_at(description)
     state = world.get("body_state")
@@ -80,10 +87,9 @@ def picture(world, width=960, height=600, camera=None, smooth=2, description=Non
 
 
 def save_picture(path, world, **options):
-    """Write picture(world, ...) as a PNG file."""
-    data = png_of(picture(world, **options))
-    with open(path, "wb") as file:
-        file.write(data)
+    """Write picture(world, ...) as a PNG file, which is complete or as it was."""
+    with Output("path", path) as file:
+        file.write(png_of(picture(world, **options)))
 
 
 def _triangles(description, positions, orientations, hidden):

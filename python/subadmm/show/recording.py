@@ -4,9 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ..given import real, whole
+from ..output import Output
 from .description import Description, describe
 from .forces import forces_of
 from .measures import MEASURES, measure
+
+#: Frames of a recording.
+MOST_FRAMES = 10**7
 
 #: Quaternions are kept to whole multiples of this: half of it is the largest error of a component.
 TURN_STEP = 2.0 ** -12
@@ -33,17 +38,25 @@ class Recording:
         return self.positions[frame] * self.position_step, turns / np.linalg.norm(turns, axis=1, keepdims=True)
 
     def save(self, path):
-        """Write a file that its ending says: .html, a page that plays by itself, or .glb, glTF with animation."""
-        path = Path(path)
-        if path.suffix == ".html":
-            from .page import page_of
-            data = page_of(self).encode()
-        elif path.suffix == ".glb":
-            from .glb import glb_of
-            data = glb_of(self)
+        """Write a file that its ending says: .html, a page that plays by itself, or .glb, glTF with animation. It is
+        complete, or as it was."""
+        check_ending("path", path)
+        with Output("path", path) as file:
+            file.write(self.data(path))
+
+    def data(self, path):
+        """What save() writes, text or bytes."""
+        if Path(path).suffix == ".html":
+            from .page import page_of as made_of
         else:
-            raise ValueError(f"path: {path}; must end in .html or .glb")
-        path.write_bytes(data)
+            from .glb import glb_of as made_of
+        return made_of(self)
+
+
+def check_ending(name, path):
+    """Is it the name of a file that a recording can be?"""
+    if Path(path).suffix not in (".html", ".glb"):
+        raise ValueError(f"{name}: {path}; must end in .html or .glb")
 
 
 def position_step(description):
@@ -55,18 +68,21 @@ def position_step(description):
     return float(2.0 ** np.floor(np.log2(max(size, 1e-9) / 1000)))
 
 
+def check_frames(fps, contacts, prefix=""):
+    """(fps, contacts) as record() takes them, or an error; prefix: of their names in it."""
+    return real(f"{prefix}fps", fps, 0, 1000, above=True), whole(f"{prefix}contacts", contacts, 0, 2**31 - 1)
+
+
 def record(world, seconds, fps=30.0, title="", contacts=0, after_frame=None):
     """Step a world for a time (s, simulated) and keep its poses `fps` times a second, at the nearest step; the first
     frame is the world as it is. contacts: so many of the largest contact forces are kept a frame, with their errors
-    where settings ask for certificates. after_frame(frame, frames): called after each."""
-    if not seconds > 0:
-        raise ValueError(f"seconds: {seconds}; must be greater than 0")
-    if not 0 < fps <= 1000:
-        raise ValueError(f"fps: {fps}; must be in (0, 1000]")
-    if not contacts >= 0:
-        raise ValueError(f"contacts: {contacts}; must be 0 or more")
+    where settings ask for certificates. seconds: in (0, 1e9], fps: in (0, 1000], MOST_FRAMES frames at most. after_frame(frame, frames): called after each."""
+    seconds = real("seconds", seconds, 0, 1e9, above=True)
+    fps, contacts = check_frames(fps, contacts)
     dt = world.settings.dt
     frames = int(np.floor(seconds * fps + 1e-9)) + 1
+    if frames > MOST_FRAMES:
+        raise ValueError(f"seconds: {seconds:g}; with {fps:g} frames a second that is {frames} frames, and must be {MOST_FRAMES} at most")
     at = np.unique(np.rint(np.arange(frames) / (fps * dt)).astype(np.int64))
     description = describe(world)
     step = position_step(description)
