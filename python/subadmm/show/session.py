@@ -5,6 +5,8 @@ from collections import deque
 
 import numpy as np
 
+from .. import Error
+from ..given import point as read_point, real, whole
 from ..rotations import rotate
 from .measures import MEASURES, measure
 from .steering import Steering
@@ -21,8 +23,17 @@ class Session:
         self.lock = threading.RLock()
         self.build = build
         self.running = True
-        self.speed = 1.0
+        self._speed = 1.0
         self.reset()
+
+    @property
+    def speed(self):
+        """Of the world's time over the clock's, in [0, 1000]."""
+        return self._speed
+
+    @speed.setter
+    def speed(self, value):
+        self._speed = real("speed", value, 0, 1000)
 
     def reset(self):
         """A new world, from its beginning."""
@@ -36,14 +47,19 @@ class Session:
             self.steering = Steering(self.world)
 
     def change(self, backend=None, **settings):
-        """Other settings of the world, as method="paper", iterations=50, certify=True; from the next step on."""
+        """Other settings of the world, as method="paper", iterations=50, certify=True; from the next step on. All of
+        them, or, where one is refused, none."""
         with self.lock:
-            made = self.world.settings
+            before, made = self.world.settings, self.world.settings
             for name, value in settings.items():
                 setattr(made, name, value)
             self.world.settings = made
             if backend is not None:
-                self.world.set_backend(backend, self.world.report.precision or "f64")
+                try:
+                    self.world.set_backend(backend, self.world.report.precision or "f64")
+                except (Error, ValueError):
+                    self.world.settings = before
+                    raise
 
     def step(self, n=1):
         """Make steps, and keep their figures."""
@@ -59,6 +75,7 @@ class Session:
     def advance(self, seconds, budget):
         """Where it runs: as many steps as `seconds` of the clock ask for at this speed, but none begun after `budget`
         seconds of work. What could not be done is left out. Gives the number of steps."""
+        seconds, budget = real("seconds", seconds, 0, 1e6), real("budget", budget, 0, 1e6)
         with self.lock:
             if not self.running:
                 return 0
@@ -77,12 +94,14 @@ class Session:
     def grab(self, index, point):
         """Take the body of a row at a point (m, world); False: it is one that does not move by forces."""
         with self.lock:
+            index = whole("index", index, 0, self.world.body_count - 1)
+            point = read_point("point", point)
             self.release()
             body = self.world.bodies[index]
             if body.type != "dynamic":
                 return False
             turn = np.array(body.orientation)
-            self._held, self._at = body, rotate(turn * [1, -1, -1, -1], np.array(point) - body.position)
+            self._held, self._at = body, rotate(turn * [1, -1, -1, -1], point - body.position)
             rate = 2 * np.pi * _STIFFNESS
             self._coupling = self.world.add_coupling(
                 body, position=self._at.tolist(), target_position=list(map(float, point)),
@@ -93,9 +112,10 @@ class Session:
     def pull(self, point):
         """Move the hand to a point (m, world)."""
         with self.lock:
+            point = read_point("point", point)
             if self._coupling is not None:
-                self._target = np.array(point, float)
-                self._coupling.set_target(list(map(float, point)), velocity=[0.0] * 6)
+                self._coupling.set_target(point.tolist(), velocity=[0.0] * 6)
+                self._target = point
 
     def release(self):
         """Let go."""

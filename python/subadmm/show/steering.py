@@ -1,6 +1,7 @@
 """What a user leads: the targets of a world's couplings and of its joints' position drives."""
 import numpy as np
 
+from ..given import point, real, whole
 from ..rotations import multiply, rotate
 from .chains import Finger, driven_chains, opposing, opposing_thumb
 
@@ -41,6 +42,13 @@ class Lead:
         self.at, self.turn = (np.array(values) for values in coupling.target)
         self.position, self.orientation = self.at, self.turn
         self._speed = self._spin = np.zeros(3)
+
+    def go(self, position, orientation):
+        """Where the target is to go: finite numbers, and an orientation that is none of length 0."""
+        position, orientation = point("position", position), point("orientation", orientation, 4)
+        if not np.linalg.norm(orientation) > 1e-6:
+            raise ValueError(f"orientation: {orientation}; must be a quaternion, not 0")
+        self.position, self.orientation = position, _unit(orientation)
 
     def step(self, dt):
         """Bring the target on by a step."""
@@ -129,14 +137,15 @@ class Steering:
 
     def set_joint(self, joint, value):
         """Where a Driven is to go, m or rad."""
+        value = real("value", value, -1e9, 1e9)
         self.goals[joint.row, joint.coordinate] = value
 
     def close(self, hand, opening=None, finger=None, more=None):
         """Close a Hand's fingers, or one of them (its number)."""
         if opening is not None:
-            hand.opening = opening
+            hand.opening = real("opening", opening, -1e9, 1e9)
         if finger is not None:
-            hand.more[finger] = more
+            hand.more[whole("finger", finger, 0, len(hand.fingers) - 1)] = real("more", more, -1e9, 1e9)
         for k in range(len(hand.fingers)) if finger is None else [finger]:
             for joint, value in zip(hand.fingers[k].chain.joints, hand.targets(k)):
                 self.set_joint(joint, value)

@@ -17,8 +17,9 @@ def _label(joint, chain):
 class SteeringPanel:
     """Nothing where the world has neither couplings nor driven joints."""
 
-    def __init__(self, server, session):
-        self.server, self.session = server, session
+    def __init__(self, server, session, is_near):
+        """is_near(point): is it near enough to what there is to see for something to be led there?"""
+        self.server, self.session, self._is_near = server, session, is_near
         self._felt = []          # of each coupling: where it is held, force, torque
         self._time = deque(maxlen=_KEPT)
         self._force = deque(maxlen=_KEPT)
@@ -137,8 +138,9 @@ class SteeringPanel:
             # A coroutine: poses come in order. Assigning is all there is to do; a step takes the newest.
             @gizmo.on_update
             async def _(event, k=k):
-                lead = self.session.steering.leads[k]
-                lead.position, lead.orientation = np.array(event.target.position), np.array(event.target.wxyz)
+                position, orientation = np.array(event.target.position), np.array(event.target.wxyz)
+                if self._is_near(position):
+                    self.session.steering.leads[k].go(position, orientation)
 
             self._gizmos.append(gizmo)
         thin = 0.006 * radius

@@ -3,6 +3,9 @@ import time
 
 import numpy as np
 
+from .. import Error
+from ..given import whole
+from . import guard
 from .camera import looking_at
 from .description import describe
 from .forces import Forces, colours_of, forces_of, legend
@@ -13,6 +16,7 @@ from .steering_panel import SteeringPanel
 
 _FRAME = 1 / 30          # s between frames
 _PLOT = 0.5              # s between plots
+_REACH = 100             # radii of what there is to see: bodies are not pulled to places farther away
 _BY_POWER = ("kinetic", "error")   # drawn as powers of ten: they go over many
 _CERTIFIED = 500         # bodies
 _ARROWS = 2000           # contacts drawn at most: those with the largest forces
@@ -33,14 +37,15 @@ class View:
     def __init__(self, session, title="", host="127.0.0.1", port=8080):
         self._viser = viser = _viser()
         self.session = session
-        self.server = server = viser.ViserServer(host=host, port=port, verbose=False)
-        self.url = f"http://{host}:{server.get_port()}"
+        self.server = server = guard.serve(viser, host, port)
+        self.url = f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
         server.gui.set_panel_label(title or "subadmm")
         server.scene.set_up_direction("+z")
         self._build_controls()
         self._build_scene()
         self._last = time.perf_counter()
         self._plotted = 0.0
+        self._wrong = ""         # what is said until the user does something
 
     def stop(self):
         """End the server."""
@@ -65,7 +70,7 @@ class View:
             certify = gui.add_checkbox("measure the error", settings.certify)
         self._contacts = gui.add_checkbox("contact forces", False)
         self._legend = gui.add_html(f'<div style="padding:0 1em">{legend()}</div>', visible=False)
-        self._steering = SteeringPanel(self.server, session)
+        self._steering = SteeringPanel(self.server, session, self._is_near)
         self._said = gui.add_markdown("")
         self._plots = {}
         with gui.add_folder("Plots", expand_by_default=True):
@@ -82,9 +87,11 @@ class View:
                 )
 
         def settle(**changes):
+            self._wrong = ""
             try:
                 session.change(**changes)
             except Exception as error:              # a refused setting: say so, and go on with the old one
+                self._wrong = str(error)
                 self._said.content = f"**{error}**"
 
         def reset():
@@ -96,9 +103,13 @@ class View:
 
         @buttons.on_click
         def _(_):
+            self._wrong = ""
             if buttons.value == "Step":
                 session.running = False
-                session.step()
+                try:
+                    session.step()
+                except Error as error:
+                    self._wrong = str(error)
             elif buttons.value == "Reset":
                 reset()
             else:
@@ -153,19 +164,27 @@ class View:
         self.server.initial_camera.position = tuple(camera.eye)
         self.server.initial_camera.look_at = tuple(camera.target)
 
+    def _is_near(self, point):
+        """Within what a mouse can mean: farther away, a hand's spring would tear the scene apart."""
+        return np.linalg.norm(np.asarray(point) - self.description.centre) <= _REACH * self.description.radius
+
     def _drag(self, event, group):
-        if event.phase == "start":
-            self.session.grab(int(group.body[event.instance_index or 0]), event.start_position)
+        instance = event.instance_index or 0
         if event.phase == "end":
             self.session.release()
-        else:
+        elif instance < len(group.body) and self._is_near(event.start_position) and self._is_near(event.end_position):
+            if event.phase == "start":
+                self.session.grab(int(group.body[instance]), event.start_position)
             self.session.pull(event.end_position)
 
     def frame(self):
         """Run as far as the clock asks for, and send what has changed."""
         now = time.perf_counter()
         session = self.session
-        session.advance(min(now - self._last, 0.1), 0.8 * _FRAME)
+        try:
+            session.advance(min(now - self._last, 0.1), 0.8 * _FRAME)
+        except Error as error:      # a step that cannot be made: the page stays, for another setting or a reset
+            session.running, self._wrong = False, str(error)
         self._last = now
         with session.lock:
             state = session.world.get("body_state")
@@ -193,6 +212,8 @@ class View:
             said = f"{now_at:.2f} s, {report.contacts} contacts, {report.ms['total']:.2f} ms a step"
             if not session.running:
                 said += ", paused"
+            if self._wrong:
+                said += f"\n\n**{self._wrong}**"
             if hand is not None:
                 said += f"\n\nhand: {np.linalg.norm(hand[2]):.3g} N"
             self._said.content = said
@@ -218,7 +239,9 @@ def _backends():
 
 
 def serve(build, title="", host="127.0.0.1", port=8080):
-    """Show build(), a world, at http://host:port until it is interrupted."""
+    """Show build(), a world, at http://host:port until it is interrupted. host: an address or a name of this machine;
+    port: in [0, 65535], or the next one that is free; 0: any. Raises OSError where it cannot be served there."""
+    guard.free_port(host, whole("port", port, 0, 65535))     # before a world is built
     view = View(Session(build), title, host, port)
     print(f"{title}: {view.url}", flush=True)
     try:
