@@ -6,7 +6,7 @@ from ..model import world_name
 from ..poses import IDENTITY, inverse, mul, pose, q_turn
 from .colliders import shapes_of
 from .masses import weight_of
-from .stage import value
+from .stage import naming, value
 
 
 def _velocity(reader, prim):
@@ -26,20 +26,19 @@ def _add_moving(loaded, reader, filters, path, prim, colliders):
     """The Body of a rigid body. colliders: [(prim, shapes in the frame of the body's prim)]."""
     from pxr import UsdPhysics
 
-    from ... import Error
-
     kinematic = value(UsdPhysics.RigidBodyAPI(prim).GetKinematicEnabledAttr())
     place = reader.in_world(reader.place(prim))
     name = world_name(path)
     reader.report_motion(prim)
     if kinematic:
         inertial = IDENTITY
-        body = loaded.world.add_body(type="kinematic", position=place[0], orientation=place[1], name=name)
+        with naming(reader.element(prim)):
+            body = loaded.world.add_body(type="kinematic", position=place[0], orientation=place[1], name=name)
     else:
         mass, moments, inertial = weight_of(reader, prim, colliders)
         start = mul(place, inertial)
         linear, angular = _velocity(reader, prim)
-        try:
+        with naming(reader.element(prim)):
             body = loaded.world.add_body(
                 mass=mass,
                 inertia=moments,
@@ -49,24 +48,22 @@ def _add_moving(loaded, reader, filters, path, prim, colliders):
                 angular_velocity=angular,
                 name=name,
             )
-        except Error as error:
-            error.args = (f"{reader.element(prim)}: {error}",)
-            raise
     if value(UsdPhysics.RigidBodyAPI(prim).GetStartsAsleepAttr()):
         loaded.report.add(reader.element(prim), "startsAsleep is not carried over: bodies do not sleep")
     loaded.bodies[path] = body
     loaded.frames[path] = inverse(inertial)
-    _add_shapes(loaded, filters, body, inverse(inertial), colliders)
+    _add_shapes(loaded, reader, filters, body, inverse(inertial), colliders)
 
 
-def _add_shapes(loaded, filters, body, back, colliders):
+def _add_shapes(loaded, reader, filters, body, back, colliders):
     """back: the prim's frame in the body's."""
     for prim, shapes in colliders:
         added = []
         for shape in shapes:
             shape.position, shape.orientation = mul(back, pose(shape.position, shape.orientation))
             filters.mark(str(prim.GetPath()), shape)
-            added.append(body.add_shape(shape))
+            with naming(reader.element(prim)):
+                added.append(body.add_shape(shape))
         loaded.shapes[str(prim.GetPath())] = added
 
 
@@ -88,11 +85,12 @@ def add_bodies(loaded, reader, filters):
             continue
         reader.report_motion(prim)
         place = reader.in_world(reader.place(prim))
-        body = loaded.world.add_body(
-            type="static", environment=-1, position=place[0], orientation=place[1], name=world_name(path)
-        )
+        with naming(reader.element(prim)):
+            body = loaded.world.add_body(
+                type="static", environment=-1, position=place[0], orientation=place[1], name=world_name(path)
+            )
         loaded.bodies[path], loaded.frames[path] = body, IDENTITY
-        _add_shapes(loaded, filters, body, IDENTITY, [(prim, shapes)])
+        _add_shapes(loaded, reader, filters, body, IDENTITY, [(prim, shapes)])
     for path, prim in reader.bodies.items():
         kind = "kinematic" if value(UsdPhysics.RigidBodyAPI(prim).GetKinematicEnabledAttr()) else "dynamic"
         shapes = [(collider, shapes_of(reader, collider, prim, kind)) for collider in of_body[path]]

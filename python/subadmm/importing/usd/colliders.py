@@ -7,7 +7,7 @@ from ..poses import IDENTITY, inverse, mul, pose, q_matrix, q_of_matrix
 from ..shapes import MOST_FILLING
 from .materials import material_of
 from .meshes import NoMesh, mesh_of, outline
-from .stage import ALONG, value
+from .stage import ALONG, one_of, value
 
 #: Relative; up to here lengths are equal, and directions at right angles. Transforms may be of single precision.
 SAME = 1e-5
@@ -74,7 +74,7 @@ def _gprim(reader, prim, linear):
         return value(prim.GetAttribute(name))
 
     def along():
-        return linear @ ALONG[get("axis")]
+        return linear @ ALONG[one_of(prim.GetAttribute("axis"), ALONG)]
 
     if prim.IsA(UsdGeom.Sphere):
         return _sphere(get("radius"), linear)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..poses import inverse, mul, pose, q_mul, q_of_matrix
-from .stage import ALONG, quat, value
+from .stage import ALONG, one_of, quat, value
 
 #: Coordinates of a D6 joint by the names of its limits and drives.
 D6 = {"transX": 0, "transY": 1, "transZ": 2, "rotX": 3, "rotY": 4, "rotZ": 5}
@@ -70,7 +70,8 @@ def _drive(reader, prim, name, index, coordinate):
 
     drive = UsdPhysics.DriveAPI(prim, name)
     stiffness, damping = value(drive.GetStiffnessAttr()), value(drive.GetDampingAttr())
-    if value(drive.GetTypeAttr()) == UsdPhysics.Tokens.acceleration:
+    kinds = UsdPhysics.Tokens.force, UsdPhysics.Tokens.acceleration
+    if one_of(drive.GetTypeAttr(), kinds) == UsdPhysics.Tokens.acceleration:
         reader.report.add(
             reader.element(prim), f"drive '{name}' is not carried over: its force is relative to the mass"
         )
@@ -82,7 +83,7 @@ def _drive(reader, prim, name, index, coordinate):
     coordinate.drive_stiffness, coordinate.drive_damping = stiffness * force / unit, damping * force / unit
     coordinate.target_position = value(drive.GetTargetPositionAttr()) * unit
     coordinate.target_speed = value(drive.GetTargetVelocityAttr()) * unit
-    coordinate.drive_force = float(value(drive.GetMaxForceAttr())) * force
+    coordinate.drive_force = float(value(drive.GetMaxForceAttr(), infinite=True)) * force
 
 
 def _law(reader, prim):
@@ -101,18 +102,18 @@ def _law(reader, prim):
         joint = (UsdPhysics.RevoluteJoint if turns else UsdPhysics.PrismaticJoint)(prim)
         kind, index = ("revolute", 5) if turns else ("prismatic", 2)
         names = {"angular" if turns else "linear": index}
-        low, high = (value(a) * _unit(reader, index) for a in (joint.GetLowerLimitAttr(), joint.GetUpperLimitAttr()))
+        low, high = (value(a, infinite=True) * _unit(reader, index) for a in (joint.GetLowerLimitAttr(), joint.GetUpperLimitAttr()))
         if low > high:
             raise ValueError(f"lowerLimit is above upperLimit: {low:g}, {high:g}")
         coordinates[index] = Coordinate()
         _limit(coordinates[index], low, high)
     elif prim.IsA(UsdPhysics.SphericalJoint):
         kind, joint = "spherical", UsdPhysics.SphericalJoint(prim)
-        if max(value(joint.GetConeAngle0LimitAttr()), value(joint.GetConeAngle1LimitAttr())) >= 0:
+        if max(value(joint.GetConeAngle0LimitAttr(), True), value(joint.GetConeAngle1LimitAttr(), True)) >= 0:
             reader.report.add(reader.element(prim), "the limit of its cone is not carried over")
     elif prim.IsA(UsdPhysics.DistanceJoint):
         joint = UsdPhysics.DistanceJoint(prim)
-        low, high = (value(a) * reader.metre for a in (joint.GetMinDistanceAttr(), joint.GetMaxDistanceAttr()))
+        low, high = (value(a, infinite=True) * reader.metre for a in (joint.GetMinDistanceAttr(), joint.GetMaxDistanceAttr()))
         low, high = max(low, 0.0), high if high >= 0 else np.inf
         if low > high:
             raise ValueError(f"minDistance is above maxDistance: {low:g} m, {high:g} m")
@@ -145,7 +146,7 @@ def _d6(reader, prim, limits, coordinates):
     locks = 0
     for name in limits:
         api = UsdPhysics.LimitAPI(prim, name)
-        low, high = value(api.GetLowAttr()), value(api.GetHighAttr())
+        low, high = value(api.GetLowAttr(), infinite=True), value(api.GetHighAttr(), infinite=True)
         if name not in D6:
             if np.isfinite(low) or np.isfinite(high):
                 reader.report.add(
@@ -184,7 +185,7 @@ def _add_joint(loaded, reader, prim):
 
     joint = UsdPhysics.Joint(prim)
     axis = prim.GetAttribute("physics:axis")
-    turn = q_of_matrix(ALONG[value(axis)] if axis else np.eye(3))
+    turn = q_of_matrix(ALONG[one_of(axis, ALONG)] if axis else np.eye(3))
     a, b = (Side(loaded, reader, joint, number, turn) for number in (0, 1))
     if not a.moves and not b.moves:
         raise ValueError("neither of its bodies moves by forces")
@@ -205,8 +206,8 @@ def _add_joint(loaded, reader, prim):
         length=length,
         collide=meets,
         enabled=bool(value(joint.GetJointEnabledAttr())),
-        break_force=float(value(joint.GetBreakForceAttr())) * force,
-        break_torque=float(value(joint.GetBreakTorqueAttr())) * force * reader.metre,
+        break_force=float(value(joint.GetBreakForceAttr(), infinite=True)) * force,
+        break_torque=float(value(joint.GetBreakTorqueAttr(), infinite=True)) * force * reader.metre,
         coordinates=coordinates,
     )
     loaded.joints[str(prim.GetPath())] = made

@@ -5,7 +5,7 @@ import numpy as np
 
 from ..poses import IDENTITY, inverse, mul, pose, q_matrix, q_mul, q_of_matrix, q_turn
 from .materials import density_of
-from .stage import quat, value
+from .stage import naming, quat, value
 
 WATER = 1000.0  # kg/m^3
 MASS, RADIUS = 1.0, 0.1  # kg, m: the ball that stands in where nothing is known
@@ -31,9 +31,10 @@ def _given(reader, prim):
     if not prim.HasAPI(UsdPhysics.MassAPI):
         return 0.0, 0.0, None, None, IDENTITY[1]
     api = UsdPhysics.MassAPI(prim)
-    centre = np.array(value(api.GetCenterOfMassAttr()), dtype=np.float64)
+    centre = np.array(value(api.GetCenterOfMassAttr(), infinite=True), dtype=np.float64)
     place = reader.place(prim)
-    if np.all(np.isfinite(centre)):
+    if not np.all(np.isneginf(centre)):  # which says that there is none
+        value(api.GetCenterOfMassAttr())
         centre = q_matrix(place[1]).T @ (reader.point(prim, centre) - place[0])
     else:
         centre = None
@@ -61,7 +62,8 @@ def _collider(reader, prim, body, shapes, body_density):
     from ... import mass_of
 
     mass, density, centre, inertia, axes = _given(reader, prim) if prim != body else (0.0, 0.0, None, None, IDENTITY[1])
-    whole = mass_of(shapes, density or body_density or density_of(reader, prim) or WATER)
+    with naming(reader.element(prim)):
+        whole = mass_of(shapes, density or body_density or density_of(reader, prim) or WATER)
     out = Weight(whole.mass, np.array(whole.centre), _tensor(whole.inertia, whole.orientation))
     if mass > 0:
         out.inertia *= mass / out.mass

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .stage import value
+from .stage import one_of, value
 
 SIDES = 32  # of the polyhedra that stand in for round gprims with an elliptical section, or two radii
 
@@ -38,7 +38,8 @@ def mesh_of(prim, linear):
     if not triangles:
         raise NoMesh("all its faces are holes")
     triangles = np.concatenate(triangles).astype(np.int32)
-    if (value(mesh.GetOrientationAttr()) == UsdGeom.Tokens.leftHanded) != (np.linalg.det(linear) < 0):
+    sides = UsdGeom.Tokens.rightHanded, UsdGeom.Tokens.leftHanded
+    if (one_of(mesh.GetOrientationAttr(), sides) == UsdGeom.Tokens.leftHanded) != (np.linalg.det(linear) < 0):
         triangles = triangles[:, ::-1]
     return points @ linear.T, np.ascontiguousarray(triangles)
 

@@ -2,12 +2,14 @@
 
 import os
 from collections import Counter
+from contextlib import contextmanager
 
 import numpy as np
 
 from ..poses import IDENTITY, mul, pose, q_about, q_of_matrix, q_turn
 
 EARTH = 9.81  # m/s^2
+LARGEST = 1e30  # of a transform's numbers: squares of them are finite
 
 #: From z to the axis that a gprim or a joint is along: columns are where x, y, z go.
 ALONG = {
@@ -42,11 +44,62 @@ def quat(q):
     return out / length if length > 0 else IDENTITY[1].copy()
 
 
-def value(attribute):
-    """At the stage's beginning, where it is animated."""
+def _numbers_of(x):
+    """Of a value of USD that is numbers, as an array of them; None of one that is none."""
+    if hasattr(x, "GetReal"):
+        return np.array([x.GetReal(), *x.GetImaginary()])
+    out = np.asarray(x)
+    return out if out.dtype.kind in "iuf" else None
+
+
+def _is_like(x, wanted):
+    """Is a value of the type of another one? Numbers are, of any precision."""
+    if isinstance(wanted, (bool, str)):
+        return isinstance(x, type(wanted))
+    if hasattr(x, "GetReal") != hasattr(wanted, "GetReal"):
+        return False
+    found, like = _numbers_of(x), np.shape(wanted)
+    if hasattr(x, "GetReal") or found is None:
+        return found is not None
+    return found.ndim == len(like) and found.shape[1:] == like[1:] and (hasattr(wanted, "__len__") and not like[0] or found.shape == like)
+
+
+def value(attribute, infinite=False):
+    """At the stage's beginning, where it is animated. infinite: infinities mean something in it, as that there is no
+    limit. Raises ValueError, which names the attribute, where it is of another type than the schema's or has numbers that
+    are not finite. (A file may say anything.)"""
     from pxr import Usd
 
-    return attribute.Get(Usd.TimeCode.EarliestTime())
+    out, kind = attribute.Get(Usd.TimeCode.EarliestTime()), attribute.GetTypeName()
+    wanted = kind.defaultValue
+    if out is None or wanted is None:
+        return out
+    if not _is_like(out, wanted):
+        raise ValueError(f"{attribute.GetPath()} = {str(out)[:60]!r}: must be of type {kind}")
+    numbers = None if isinstance(wanted, (bool, str)) else _numbers_of(out)
+    if numbers is None or numbers.dtype.kind != "f":
+        return out
+    wrong = np.isnan(numbers) if infinite else ~np.isfinite(numbers)
+    if wrong.any():
+        place = tuple(int(k) for k in np.argwhere(wrong)[0])
+        named = "".join(f"[{k}]" for k in place)
+        raise ValueError(f"{attribute.GetPath()}{named} = {numbers[place]}: must be {'a number' if infinite else 'finite'}")
+    return out
+
+
+def one_of(attribute, names):
+    """The value of an attribute that is one of some names."""
+    out = value(attribute)
+    if out not in names:
+        raise ValueError(f"{attribute.GetPath()} = {out!r}: must be one of {', '.join(map(repr, names))}")
+    return out
+
+
+def _unit(name, size):
+    """Metres or kilograms of a unit of the stage."""
+    if not 1e-12 <= size <= 1e12:
+        raise ValueError(f"{name} = {size}: must be in [1e-12, 1e12]")
+    return size
 
 
 class Reader:
@@ -62,11 +115,13 @@ class Reader:
         self.stage, self.report, self.threshold = stage, report, threshold
         self.reported = set()  # paths of what several prims share and is said once
         self.forms = {}  # shapes of meshes that are equal
-        self.metre = UsdGeom.GetStageMetersPerUnit(stage)
-        self.kilogram = UsdPhysics.GetStageKilogramsPerUnit(stage)
+        self.metre = _unit("metersPerUnit", UsdGeom.GetStageMetersPerUnit(stage))
+        self.kilogram = _unit("kilogramsPerUnit", UsdPhysics.GetStageKilogramsPerUnit(stage))
         if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
             report.add("metersPerUnit", "is not given: 0.01, USD's default")
         up = UsdGeom.GetStageUpAxis(stage)
+        if up not in ("Y", "Z"):
+            raise ValueError(f"upAxis = {up!r}: must be 'Y' or 'Z'")
         self.turn = IDENTITY if up == "Z" else (np.zeros(3), q_about([1, 0, 0], np.pi / 2))
         self._transforms = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
         walk = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())
@@ -118,22 +173,33 @@ class Reader:
             prim = prim.GetParent()
         return None
 
+    def _matrix(self, prim):
+        """From a prim's own frame to the stage's, 4 x 4, of row vectors."""
+        from pxr import Tf
+
+        try:
+            m = np.array(self._transforms.GetLocalToWorldTransform(prim))
+        except Tf.ErrorException:
+            raise ValueError(f"{self.element(prim)}: its transform has values of the wrong type") from None
+        if not np.isfinite(m).all() or np.abs(m).max() > LARGEST:
+            raise ValueError(f"{self.element(prim)}: its transform must have finite numbers of at most {LARGEST:g}")
+        return m
+
     def linear(self, prim):
         """The linear part of where a prim's own frame is in the stage's: 3 x 3, with its scale."""
-        m = np.array(self._transforms.GetLocalToWorldTransform(prim))
-        return m[:3, :3].T
+        return self._matrix(prim)[:3, :3].T
 
     def place(self, prim):
         """The pose of a prim without its scale, in the stage's frame, m."""
         # Gf.Matrix4d.RemoveScaleShear, to the last digits: the rotation next to the matrix, of a mirror image's
         # negative
-        m = np.array(self._transforms.GetLocalToWorldTransform(prim))
+        m = self._matrix(prim)
         u, _, v = np.linalg.svd(m[:3, :3].T)
         return pose(m[3, :3] * self.metre, q_of_matrix(u @ v * np.sign(np.linalg.det(u @ v))))
 
     def point(self, prim, local):
         """A point of a prim's own frame (its units) in the stage's frame, m."""
-        m = np.array(self._transforms.GetLocalToWorldTransform(prim))
+        m = self._matrix(prim)
         return (m[:3, :3].T @ np.array(local, dtype=np.float64) + m[3, :3]) * self.metre
 
     def in_world(self, place):
@@ -157,13 +223,28 @@ def gravity_of(reader):
     if reader.scene is None:
         reader.report.add("PhysicsScene", "there is none: gravity is the Earth's")
         return [0.0, 0.0, -EARTH]
-    size = value(reader.scene.GetGravityMagnitudeAttr())
+    attribute = reader.scene.GetGravityMagnitudeAttr()
+    size = value(attribute, infinite=True)
+    if not size * reader.metre <= 1e6:
+        raise ValueError(f"{attribute.GetPath()} = {size}: must be less than 0, or at most {1e6 / reader.metre:g}")
     size = EARTH if size < 0 else size * reader.metre
     way = np.array(value(reader.scene.GetGravityDirectionAttr()), dtype=np.float64)
     length = np.linalg.norm(way)
     if length == 0:
         return [0.0, 0.0, -float(size)]
     return [float(x) for x in size * q_turn(reader.turn[1], way / length)]
+
+
+@contextmanager
+def naming(element):
+    """What the world refuses in here is of this element, and its message says so."""
+    from ... import Error
+
+    try:
+        yield
+    except Error as error:
+        error.args = (f"{element}: {error}",)
+        raise
 
 
 class Counts:
