@@ -18,6 +18,7 @@ static constexpr std::pair<const char *, sadmm_array> array_names[] = {
     {"coupling_felt", SADMM_ARRAY_COUPLING_FELT},
 };
 
+using matrix = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
 using out_rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using in_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
@@ -35,20 +36,11 @@ static std::string described(nb::handle given)
     return out;
 }
 
-// Where `out` has its numbers: itself, no copy of another type or layout, which would be filled in its place.
-static out_rows numbers_of(nb::handle out, size_t rows, size_t columns)
-{
-    out_rows to;
-    if (!nb::try_cast(out, to, false) || to.shape(0) != rows || to.shape(1) != columns)
-        throw nb::value_error(("out: must have shape (" + std::to_string(rows) + ", " + std::to_string(columns) +
-                               "), be of float64, in C order without gaps, and writable; is " + described(out)).c_str());
-    return to;
-}
-
-// Rows that the array has; first and count must be among them. Under the world's lock.
+// Some rows of an array.
 struct range {
     int32_t rows, first, count;
     bool to_the_end; // whatever `count` was
+    // Are they rows that it has? Under the world's lock.
     bool fits(sadmm_world *h, sadmm_array array)
     {
         rows = sadmm_world_array_rows(h, array);
@@ -68,24 +60,28 @@ static nb::object get(world &w, const std::string &name, whole first, std::optio
     const sadmm_array array = named("array", name, array_names);
     const size_t columns = (size_t)sadmm_array_columns(array);
     range r{0, (int32_t)first.in("first", 0, INT32_MAX), count ? (int32_t)count->in("count", 0, INT32_MAX) : 0, !count};
-    const auto fill = [&](sadmm_world *h, double *to) { return sadmm_world_get_array(h, array, r.first, r.count, to); };
-    if (!out.is_none()) {
-        if (!ask(w, [&](sadmm_world *h) { return r.fits(h, array); })) r.refuse();
-        const out_rows to = numbers_of(out, (size_t)r.count, columns);
-        call(w, [&](sadmm_world *h) { return fill(h, to.data()); });
-        return out;
-    }
+    const auto is_sized = [&](const out_rows &to) { return to.shape(0) == (size_t)r.count && to.shape(1) == columns; };
+    out_rows to; // where `out` has its numbers: itself, no copy of another type or layout, which would be filled in its place
+    const bool given = !out.is_none(), usable = given && nb::try_cast(out, to, false);
+    std::unique_ptr<double[]> made;
+    bool fits = false, sized = true;
     // How many rows there are, and what they are, in one: another thread may add some in between.
-    std::vector<double> values;
-    bool fits = false;
     call(w, [&](sadmm_world *h) {
         fits = r.fits(h, array);
-        if (!fits) return SADMM_OK;
-        values.resize((size_t)r.count * columns);
-        return fill(h, values.data());
+        sized = !given || (usable && is_sized(to));
+        if (!fits || !sized) return SADMM_OK;
+        if (!given) made.reset(new double[(size_t)r.count * columns + 1]);
+        return sadmm_world_get_array(h, array, r.first, r.count, given ? to.data() : made.get());
     });
     if (!fits) r.refuse();
-    return numpy_of(std::move(values), {(size_t)r.count, columns});
+    if (!sized)
+        throw nb::value_error(("out: must have shape (" + std::to_string(r.count) + ", " + std::to_string(columns) +
+                               "), be of float64, in C order without gaps, and writable; is " + described(out)).c_str());
+    if (given) return out;
+    const size_t shape[2] = {(size_t)r.count, columns};
+    double *values = made.release();
+    nb::capsule owner(values, [](void *p) noexcept { delete[] (double *)p; });
+    return nb::cast(matrix(values, 2, shape, owner));
 }
 
 static void set(world &w, const std::string &name, nb::object given, whole first)
