@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import _core
-from .given import indices, numbers, whole
+from .given import indices, numbers, real, whole
 
 #: Share of a mesh's size that its hulls may be off by, where nothing else is said: coacd's own default.
 THRESHOLD = 0.05
@@ -59,8 +59,7 @@ def decompose(mesh, threshold=THRESHOLD, *, most=None, seed=0, **options):
 
     Raises ImportError (no coacd), ValueError (arguments), subadmm.Error (a part that is no solid).
     """
-    if not 0.01 <= threshold <= 1:
-        raise ValueError(f"threshold: {threshold} is not in [0.01, 1]")
+    threshold = real("threshold", threshold, 0.01, 1)
     most = -1 if most is None else whole("most", most, 1, 2**31 - 1)
     seed = whole("seed", seed, 0, 2**31 - 1)
     vertices, triangles = vertices_and_triangles(mesh)

@@ -542,3 +542,32 @@ def test_finalizers_in_a_cycle_find_the_world_as_it_was():
     make()
     gc.collect()
     assert found == [[0, 0, 1]]
+
+
+# ---- files ---------------------------------------------------------------------------------------------------------
+
+
+def test_arguments_of_load_are_named(tmp_path):
+    pytest.importorskip("mujoco")
+    path = tmp_path / "a.xml"
+    path.write_text('<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody>'
+                    '<keyframe><key qpos="0 0 1 1 0 0 0"/><key qpos="0 0 2 1 0 0 0"/></keyframe></mujoco>')
+    assert subadmm.load(path, keyframe=np.int64(1)).world.positions[0].tolist() == [0, 0, 2]
+    for options, error, said in (
+        (dict(keyframe=1.9), TypeError, "keyframe: 1.9; must be a whole number"),
+        (dict(keyframe=2**31 - 1), ValueError, "keyframe: 2147483647 is none of the file's"),
+        (dict(keyframe=-1), ValueError, "keyframe: -1 is none of the file's"),
+        (dict(qpos=np.ones(7) * 1j), ValueError, "qpos: must be 7 finite numbers"),
+        (dict(qpos=[0, 0, np.nan, 1, 0, 0, 0]), ValueError, "qpos: must be 7 finite numbers"),
+        (dict(qvel=np.zeros((6, 1))), ValueError, "qvel: must be 6 finite numbers"),
+        (dict(carrier_share=np.nan), ValueError, r"carrier_share: nan; must be a number in \[1e-06, 0.1\]"),
+        (dict(carrier_share="a"), TypeError, "carrier_share: 'a'; must be a number"),
+        (dict(decompose=2), ValueError, r"decompose: 2; must be a number in \[0.01, 1\]"),
+        (dict(decompose="a"), TypeError, "decompose: 'a'; must be a number"),
+        (dict(device=2**31), subadmm.InvalidArgument, "device = 2147483648: must be a whole number"),
+    ):
+        with pytest.raises(error, match=said):
+            subadmm.load(path, **options)
+    for threshold in (np.nan, np.inf, 0, 2):
+        with pytest.raises(ValueError, match=f"threshold: {threshold}; must be a number in"):
+            subadmm.decompose((np.eye(3), [[0, 1, 2]]), threshold=threshold)

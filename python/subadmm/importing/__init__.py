@@ -11,6 +11,7 @@ docs/import.md says what is carried over, and how. What is not is in `report`, e
 import os
 
 from ..decomposition import THRESHOLD
+from ..given import real
 from .actuators import add_actuators
 from .equality import add_equalities
 from .model import Loaded, LoadedActuator, LoadedJoint, LoadedModel, LoadedStage, Note, Report
@@ -28,10 +29,7 @@ def _threshold_of(decompose):
     """Of decompose=: coacd's threshold, or None."""
     if decompose is False or decompose is None:
         return None
-    threshold = THRESHOLD if decompose is True else float(decompose)
-    if not 0.01 <= threshold <= 1:
-        raise ValueError(f"decompose: {decompose} is neither True nor in [0.01, 1]")
-    return threshold
+    return THRESHOLD if decompose is True else real("decompose", decompose, 0.01, 1)
 
 
 def _is_stage(path):
@@ -97,8 +95,7 @@ def load(
         raise ImportError("subadmm.load needs the package mujoco: pip install subadmm[import]") from error
     from .compile import compile_file
 
-    if not 1e-6 <= carrier_share <= 1e-1:
-        raise ValueError(f"carrier_share: {carrier_share} is not in [1e-6, 1e-1]")
+    carrier_share = real("carrier_share", carrier_share, 1e-6, 1e-1)
     if overlaps not in ("ignore", "keep"):
         raise ValueError(f"overlaps: {overlaps!r} is neither 'ignore' nor 'keep'")
     report = Report()

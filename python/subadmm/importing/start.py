@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from ..given import whole
+
 
 def start_of(source, keyframe, qpos, qvel):
     """A mujoco.MjData in the start state, with poses and velocities of all bodies."""
@@ -12,7 +14,7 @@ def start_of(source, keyframe, qpos, qvel):
         if isinstance(keyframe, str):
             index = mujoco.mj_name2id(source, mujoco.mjtObj.mjOBJ_KEY, keyframe)
         else:
-            index = int(keyframe)
+            index = whole("keyframe", keyframe, -(2**31), 2**31 - 1)
         if not 0 <= index < source.nkey:
             names = [source.key(k).name or str(k) for k in range(source.nkey)]
             raise ValueError(f"keyframe: {keyframe!r} is none of the file's: {', '.join(names) or 'it has none'}")
@@ -20,8 +22,8 @@ def start_of(source, keyframe, qpos, qvel):
     for name, values, into in (("qpos", qpos, data.qpos), ("qvel", qvel, data.qvel)):
         if values is None:
             continue
-        values = np.asarray(values, dtype=np.float64)
-        if values.shape != into.shape or not np.all(np.isfinite(values)):
+        values = np.asarray(values)
+        if values.dtype.kind not in "iuf" or values.shape != into.shape or not np.all(np.isfinite(values)):
             raise ValueError(f"{name}: must be {into.size} finite numbers")
         into[:] = values
     mujoco.mj_kinematics(source, data)
