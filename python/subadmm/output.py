@@ -9,6 +9,7 @@ import errno
 import os
 import stat
 import sys
+from contextlib import suppress
 
 _MOST_HOPS = 40
 
@@ -43,8 +44,8 @@ class Output:
     """
 
     def __init__(self, name, path, reads=(), others=()):
-        self.name, self.path = name, os.fsdecode(path)
         self._stream = self._temporary = None
+        self.name, self.path = name, os.fsdecode(path)
         if not self.path or "\0" in self.path:
             raise ValueError(f"{name} = {self.path!r}: must be the name of a file")
         try:
@@ -94,11 +95,13 @@ class Output:
         for attempt in range(100):
             name = f".subadmm-{os.getpid()}-{attempt}.part"
             temporary = os.path.join(os.path.dirname(self._target), name)
+            self._temporary = temporary  # before it is there: a signal may come between
             try:
                 file = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
             except FileExistsError:
+                self._temporary = None
                 continue
-            self._temporary, self._stream = temporary, os.fdopen(file, "wb")
+            self._stream = os.fdopen(file, "wb")
             if self._old:
                 os.chmod(temporary, stat.S_IMODE(self._old.st_mode))
             return
@@ -131,7 +134,11 @@ class Output:
             pass
         finally:
             if temporary:
-                os.unlink(temporary)
+                with suppress(FileNotFoundError):
+                    os.unlink(temporary)
+
+    def __del__(self):  # of one that a signal kept from its context
+        self.drop()
 
     def __enter__(self):
         return self

@@ -172,7 +172,10 @@ def test_what_is_no_file_is_written_directly(tmp_path):
 def test_a_run_that_is_ended_leaves_what_was_there(tmp_path, number, status):
     path = tmp_path / "a.html"
     path.write_text("old")
-    run = subprocess.Popen([sys.executable, "-m", "subadmm", "record", "pyramid:2", "-o", str(path), "--seconds", "100000",
+    # A shell that begins the tests in the background has SIGINT ignored.
+    program = ("import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); from subadmm.__main__ import main; "
+               "sys.exit(main())")
+    run = subprocess.Popen([sys.executable, "-c", program, "record", "pyramid:2", "-o", str(path), "--seconds", "100000",
                             "--fps", "0.001", "--backend", "cpu"])
     end = time.monotonic() + 60
     while not any(name.endswith(".part") for name in left(tmp_path)) and time.monotonic() < end:
