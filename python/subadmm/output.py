@@ -134,7 +134,7 @@ class Output:
             pass
         finally:
             if temporary:
-                with suppress(FileNotFoundError):
+                with suppress(OSError):  # it may never have been there
                     os.unlink(temporary)
 
     def __del__(self):  # of one that a signal kept from its context

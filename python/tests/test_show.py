@@ -122,14 +122,41 @@ def test_a_ball_is_lit_from_the_sun_and_throws_a_shadow():
 
 def test_what_is_wrong_is_said(tmp_path, capsys):
     world = subadmm.World()
+    description = show.describe(world)
     for call, said in [
         (lambda: show.picture(world, width=4), "width: 4"),
         (lambda: show.record(world, 0), "seconds: 0"),
         (lambda: show.record(world, 1, fps=-1), "fps: -1"),
         (lambda: show.record(world, 1, contacts=-1), "contacts: -1"),
         (lambda: show.record(world, 1).save("x.txt"), "x.txt"),
+        (lambda: show.picture(world, height=2**31 - 1), "height: 2147483647; must be a whole number in \\[16, 8192\\]"),
+        (lambda: show.picture(world, smooth=5), "smooth: 5"),
+        (lambda: show.record(world, np.inf), "seconds: inf; must be a number in \\(0, 1e\\+09\\]"),
+        (lambda: show.record(world, np.nan), "seconds: nan"),
+        (lambda: show.record(world, 1e9, fps=1000), "must be 10000000 at most"),
+        (lambda: show.record(world, 1, fps=np.nan), "fps: nan"),
+        (lambda: show.record(world, 1, contacts=2**31), "contacts: 2147483648"),
+        (lambda: show.looking_at(description, azimuth=np.inf), "azimuth: inf; must be a number in \\[-3600, 3600\\]"),
+        (lambda: show.looking_at(description, elevation=np.nan), "elevation: nan"),
+        (lambda: show.looking_at(description, zoom=np.inf), "zoom: inf; must be a number in \\[0.001, 1000\\]"),
+        (lambda: show.looking_at(description, field=0), "field: 0"),
+        (lambda: show.Camera((0, 0, np.nan), (0, 0, 0)), "eye: .*; must be 3 finite numbers"),
+        (lambda: show.Camera((0, 0, 1), (0, 0, 1)), "eye: .*; must be apart from the target"),
+        (lambda: show.Camera((0, 0, 1), (0, 0, 0), np.inf), "field: inf"),
+        (lambda: show.mesh_of(subadmm.sphere(1), detail=2**31 - 1), "detail: 2147483647; must be a whole number in"),
+        (lambda: show.mesh_of(subadmm.plane(), patch=np.inf), "patch: inf"),
     ]:
         with pytest.raises(ValueError, match=said):
+            call()
+    for call, said in [
+        (lambda: show.picture(world, width=960.0), "width: 960.0; must be a whole number"),
+        (lambda: show.picture(world, camera=3), "camera: 3; must be a Camera"),
+        (lambda: show.looking_at(description, azimuth="a"), "azimuth: 'a'; must be a number"),
+        (lambda: show.record(world, "1"), "seconds: '1'; must be a number"),
+        (lambda: show.record(world, 1, contacts=1.5), "contacts: 1.5; must be a whole number"),
+        (lambda: show.Camera((0, 1), (0, 0, 0)), "eye: .*; must be 3 numbers"),
+    ]:
+        with pytest.raises(TypeError, match=said):
             call()
     for arguments, said in [
         (["picture", "nothing", "-o", "a.png"], "nothing"),

@@ -3,7 +3,7 @@ import numpy as np
 
 from ..given import whole
 from ..output import Output
-from .camera import looking_at
+from .camera import Camera, looking_at
 from .description import describe
 from .png import png_of
 from .raster import rasterise
@@ -29,6 +29,8 @@ def picture(world, width=960, height=600, camera=None, smooth=2, description=Non
     1 to 4."""
     width, height = check_size(width, height)
     smooth = whole("smooth", smooth, 1, 4)
+    if camera is not None and not isinstance(camera, Camera):
+        raise TypeError(f"camera: {camera!r}; must be a Camera")
     description = description or describe(world)
     camera = camera or looking_at(description)
     state = world.get("body_state")
