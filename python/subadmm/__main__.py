@@ -7,7 +7,7 @@ import time
 from contextlib import contextmanager
 
 import subadmm
-from subadmm.convert import MODELS
+from subadmm.convert import MODELS, read_by
 from subadmm.given import real, whole
 from subadmm.output import Output
 
@@ -89,7 +89,7 @@ def _record(build, given):
                 f"\rframe {frame + 1} of {frames}", end="\n" if frame + 1 == frames else "", file=sys.stderr, flush=True
             )
 
-    with Output("--output", given.output, reads=[given.scene]) as file:
+    with Output("--output", given.output, read_by(given.scene)) as file:
         world = build()
         if given.certify:
             settings = world.settings
@@ -115,7 +115,7 @@ def _picture(build, given):
     check_size(width, height, "--size: ")
     check_place(given.azimuth, given.elevation, given.zoom, "--")
     _check_run(given)
-    with Output("--output", given.output, reads=[given.scene]) as file:
+    with Output("--output", given.output, read_by(given.scene)) as file:
         world = build()
         world.step(_steps(world, given))
         description = show.describe(world)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import xml.etree.ElementTree as tree
 from contextlib import ExitStack
 
 from .importing import load
@@ -10,6 +11,43 @@ from .output import Output
 
 #: Suffixes of files that are loaded; all else is a scene's name, or the path of a scene file.
 MODELS = (".xml", ".mjcf", ".urdf", ".usd", ".usda", ".usdc", ".usdz")
+
+
+def _collect(path, files, folders, names):
+    """Of an MJCF or URDF file: itself and what it includes, the folders that it gives, the files that it names."""
+    if path in files:
+        return
+    files.append(path)
+    try:
+        root = tree.parse(path).getroot()
+    except (OSError, tree.ParseError):
+        return
+    for one in root.iter():
+        folders += [one.get(kind) for kind in ("assetdir", "meshdir", "texturedir") if one.get(kind)]
+        name = (one.get("file") or one.get("filename") or "").rpartition("://")[2]
+        if name and one.tag == "include":
+            _collect(os.path.join(os.path.dirname(files[0]), name), files, folders, names)
+        elif name:
+            names.append(name)
+
+
+def read_by(source):
+    """Paths of the files that a robot's file or a scene is read from; some of them may not be there."""
+    source, seen = os.fspath(source), []
+    suffix = os.path.splitext(source)[1].lower()
+    if suffix in (".xml", ".mjcf", ".urdf"):
+        folders, names = [""], []
+        _collect(source, seen, folders, names)
+        seen += [os.path.join(os.path.dirname(source), folder, name) for folder in folders for name in names]
+    elif suffix in MODELS:
+        try:
+            from pxr import UsdUtils
+
+            layers, assets, _ = UsdUtils.ComputeAllDependencies(source)
+            seen = [layer.realPath for layer in layers] + list(assets)
+        except Exception:  # no usd-core, or no stage: what reads it says so
+            pass
+    return [source, *seen]
 
 
 def open_source(source, **options):
@@ -57,8 +95,10 @@ def convert(source, path, *, report=None, duration=None, **options):
     [0, 1e9] (default: the scene's, 10). Other options: as of load(). Both files are complete, or as they were.
     """
     with ExitStack() as files:
-        file = files.enter_context(Output("path", path, reads=[source]))
-        said = files.enter_context(Output("report", report, reads=[source], others=[file])) if report is not None else None
+        reads, said = read_by(source), None
+        file = files.enter_context(Output("path", path, reads))
+        if report is not None:
+            said = files.enter_context(Output("report", report, reads, [file]))
         return _convert(source, file, said, duration, options)
 
 

@@ -74,8 +74,11 @@ class Output:
         if self._old and stat.S_ISDIR(self._old.st_mode):
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         for path in reads:
-            info = _stat(path)
-            if info and self._old and os.path.samestat(info, self._old):
+            try:
+                info = os.stat(path)
+            except (OSError, ValueError):  # what is not there is not read either
+                continue
+            if self._old and os.path.samestat(info, self._old):
                 raise ValueError(f"{self.name} = {self.path!r}: is a file that is read: must be another")
         for other in others:
             if self._place() == other._place() and not (self._old and stat.S_ISCHR(self._old.st_mode)):

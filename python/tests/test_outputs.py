@@ -224,3 +224,33 @@ def test_arguments_out_of_range_are_named(arguments, said, tmp_path, capsys):
     told = capsys.readouterr().err
     assert said in told and told.count("\n") == 1, told
     assert not os.listdir(tmp_path)
+
+
+def test_what_a_robot_is_made_of_is_read_as_well(tmp_path, capsys):
+    pytest.importorskip("mujoco")
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "wedge.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    (tmp_path / "more.xml").write_text('<mujoco><asset><mesh file="wedge.obj"/></asset></mujoco>')
+    robot = tmp_path / "robot.xml"
+    robot.write_text('<mujoco><compiler meshdir="parts"/><include file="more.xml"/><worldbody><body><freejoint/>'
+                     '<geom type="mesh" mesh="wedge"/></body></worldbody></mujoco>')
+    out = tmp_path / "robot.json"
+    for name in ("robot.xml", "more.xml", "parts/wedge.obj"):
+        before = (tmp_path / name).read_text()
+        assert main(["convert", str(robot), str(out), "--report", str(tmp_path / name)]) == 1
+        assert "is a file that is read" in capsys.readouterr().err
+        assert (tmp_path / name).read_text() == before and not out.exists()
+    assert main(["convert", str(robot), str(out), "--report", str(tmp_path / "report.json")]) == 0 and out.exists()
+
+
+def test_layers_of_a_stage_are_read_as_well(tmp_path, capsys):
+    Usd = pytest.importorskip("pxr.Usd")
+    (tmp_path / "part.usda").write_text('#usda 1.0\ndef Cube "part" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsCollisionAPI"]) {}\n')
+    stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
+    stage.DefinePrim("/part").GetReferences().AddReference("./part.usda", "/part")
+    stage.Save()
+    before = (tmp_path / "part.usda").read_text()
+    out = tmp_path / "a.json"
+    assert main(["convert", str(tmp_path / "a.usda"), str(out), "--report", str(tmp_path / "part.usda")]) == 1
+    assert "is a file that is read" in capsys.readouterr().err and (tmp_path / "part.usda").read_text() == before
+    assert main(["convert", str(tmp_path / "a.usda"), str(out)]) == 0 and out.exists()
