@@ -87,7 +87,7 @@ static inline void check_same(const struct sadmm_contact_set *host, const struct
     }
     for (size_t k = 0; k < host->point_count; ++k) {
         const struct sadmm_contact_point *p = &host->points[k], *q = &device->points[k];
-        SAME(p->feature == q->feature && p->reserved == q->reserved, "%s: point %zu: feature %u instead of %u",
+        SAME(p->feature == q->feature && p->migrates == q->migrates, "%s: point %zu: feature %u instead of %u",
                       about, k, q->feature, p->feature);
         SAME(same_numbers(p->arm_a, q->arm_a, 3) && same_numbers(p->arm_b, q->arm_b, 3) &&
                           same_numbers(&p->gap, &q->gap, 1) && same_numbers(&p->error, &q->error, 1),

@@ -127,6 +127,11 @@ static void copy_set(struct sadmm_contact_set *to, const struct sadmm_contact_se
     if (from->point_count) memcpy(to->points, from->points, from->point_count * sizeof *to->points);
     to->pair_count = from->pair_count;
     to->point_count = from->point_count;
+    ck_assert(sadmm_grow((void **)&to->migrations, &to->migration_capacity, 0, from->point_count + 1,
+                         sizeof *to->migrations));
+    for (size_t k = 0; k < from->point_count; ++k)
+        if (from->points[k].migrates) to->migrations[k] = from->migrations[k];
+    to->migrating = from->migrating;
     to->dt = from->dt;
 }
 

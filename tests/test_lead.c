@@ -58,32 +58,36 @@ START_TEST(points)
     static const struct {
         double gap, push, speed, lead[2];
         int island, body[2];
+        bool rolls;
     } cases[] = {
         /* rest, and sliding: nothing along the normal */
-        {0, 1, 0, {0, 0}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}},
+        {0, 1, 0, {0, 0}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, false},
         /* a landing: it stops, from 1 m/s */
-        {0.003, 1, -0.3, {0, 0.35}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}},
+        {0.003, 1, -0.3, {0, 0.35}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, false},
         /* what falls is lifted */
-        {0.003, 0, -0.2, {0, -0.05}, 0, {0, 0}},
+        {0.003, 0, -0.2, {0, -0.05}, 0, {0, 0}, false},
         /* what flies up to something has room for it, or for half of it, or has not */
-        {0.003, 0, -0.2, {0, 0.04}, 0, {0, 0}},
-        {0.003, 0, -0.2, {0, 0.06}, 0, {0, TOUCH_CARRIED}},
-        {0.003, 0, -0.2, {0, 0.11}, TOUCH_JOLT, {0, TOUCH_CARRIED}},
+        {0.003, 0, -0.2, {0, 0.04}, 0, {0, 0}, false},
+        {0.003, 0, -0.2, {0, 0.06}, 0, {0, TOUCH_CARRIED}, false},
+        {0.003, 0, -0.2, {0, 0.11}, TOUCH_JOLT, {0, TOUCH_CARRIED}, false},
         /* two that fall as one */
-        {0.0001, 0, 0, {0.05, -0.05}, 0, {TOUCH_CARRIED, 0}},
+        {0.0001, 0, 0, {0.05, -0.05}, 0, {TOUCH_CARRIED, 0}, false},
         /* overlapping ones, and noise */
-        {-0.003, 1, 0.1, {0, 0.05}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}},
-        {0, 0, 0, {0, 4e-5}, 0, {0, 0}},
+        {-0.003, 1, 0.1, {0, 0.05}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, false},
+        {0, 0, 0, {0, 4e-5}, 0, {0, 0}, false},
         /* a bounce that keeps all of its speed goes back to where it was */
-        {0.003, 1, 1, {0, 1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}},
+        {0.003, 1, 1, {0, 1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, false},
+        /* what rolls stays as deep as it is, by the mean of an end where it opens as fast as it closed */
+        {-0.003, 1, 0.1, {0, 0.1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, true},
+        {-0.003, 1, 0.1, {0, 0.11}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, true},
     };
     const double size[2] = {fabs(cases[_i].lead[0]), fabs(cases[_i].lead[1])};
     struct lead_touch touch = {0, {0, 0}};
     static const double gravity[3] = {0, 0, -20}, force[3] = {0, 0, 8}; /* 1 kg: 0.01 x 2 m/s a step by itself */
     const double at_rest = lead_rest_speed(gravity, 0.5, force, 1, 0.01), rest[2] = {at_rest, at_rest};
     const double moves[2] = {0.0019, 0.0021};
-    lead_add_point(&touch, cases[_i].gap, cases[_i].push, cases[_i].speed, cases[_i].lead, size, moves, rest, 0.01,
-                   1e-5);
+    const struct lead_gap gap = {cases[_i].gap, cases[_i].speed, cases[_i].rolls};
+    lead_add_point(&touch, gap, cases[_i].push, cases[_i].lead, size, moves, rest, 0.01, 1e-5);
     ck_assert_int_eq(touch.island, cases[_i].island);
     for (int s = 0; s < 2; ++s) {
         ck_assert_int_eq(touch.body[s] & TOUCH_CARRIED, cases[_i].body[s]);
@@ -91,7 +95,7 @@ START_TEST(points)
     }
 }
 END_TEST
-enum { POINTS = 10 };
+enum { POINTS = 12 };
 
 int main(void)
 {

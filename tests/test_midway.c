@@ -194,11 +194,11 @@ END_TEST
 
 /* ---- rocking --------------------------------------------------------------------------------------------------- */
 
-/* A box of 1 kg rocks on a lying cylinder, from 0.2 rad. Energy is never gained; what is left of it after 4 s (section 9
- * of docs/algorithm.md has these figures): to 0.01, what another compiler's rounding may make of 4 s of contacts. */
+/* A box of 1 kg rocks on a lying cylinder, from 0.2 rad. Energy is never gained, and little of it lost in 4 s (section 9
+ * of docs/algorithm.md). */
 START_TEST(rocking_gains_no_energy)
 {
-    static const double left[] = {0.26, 0.48, 0.76}, cylinder[3] = {0.5, 1, 0}, half[3] = {0.2, 0.1, 0.05};
+    static const double cylinder[3] = {0.5, 1, 0}, half[3] = {0.2, 0.1, 0.05};
     const double dt = 0.005 / (1 << _i), tilt = 0.2, radius = cylinder[0], g = 9.81;
     sadmm_world_def def = sadmm_world_def_default();
     sadmm_body_def body = sadmm_body_def_default();
@@ -241,7 +241,8 @@ START_TEST(rocking_gains_no_energy)
         /* a step's own fall, g v dt / 2 with v of at most 1 m/s, may come and go */
         ck_assert_msg(energy <= start + g * dt / 2, "step %d: %g of %g J", k, energy, start);
     }
-    ck_assert_double_eq_tol(energy / start, left[_i], 0.01);
+    /* what an error of second order leaves: 2 % at 5 ms, a quarter of that at half the step */
+    ck_assert_double_ge(energy / start, 1 - 0.02 / (1 << 2 * _i));
     sadmm_world_destroy(world);
 }
 END_TEST

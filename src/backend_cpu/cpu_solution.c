@@ -4,6 +4,7 @@
 
 #include "core/math/array3.h"
 #include "core/math/lead.h"
+#include "core/model/rolling.h"
 #include "core/model/system_terms.h"
 #include "cpu_rows.h"
 
@@ -106,8 +107,11 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
         }
         const double *v_a = pair->body_a >= 0 ? &c->system->velocity[6 * (size_t)pair->body_a] : still,
                      *v_b = pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still;
-        const double leads[2] = {-lead_along(n, a->lead, arm_a), lead_along(n, b->lead, arm_b)};
-        lead_add_way(&touch, point->gap, lead_along(n, v_b, arm_b) - lead_along(n, v_a, arm_a), leads, size, dt, slop);
+        const struct rolling_halfway at = rolling_halfway_of(
+            n, point, sadmm_migration_of(c->system->contacts->points, c->system->contacts->migrations, k));
+        const double leads[2] = {-lead_along(at.normal, a->lead, at.arm_a), lead_along(at.normal, b->lead, at.arm_b)};
+        const double speed = lead_along(at.normal, v_b, at.arm_b) - lead_along(at.normal, v_a, at.arm_a);
+        lead_add_way(&touch, (struct lead_gap){point->gap, speed, point->migrates}, leads, size, dt, slop);
     }
     return touch;
 }
@@ -123,12 +127,13 @@ static void touch_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
 }
 
 /* In place of a body's lead what it takes back. */
-static void choose_lead(const struct sadmm_context *c, size_t i, double lead[6])
+static void choose_lead(const struct sadmm_context *c, size_t i, struct sadmm_lead *lead)
 {
-    switch (lead_kind_of(atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
-                         atomic_load_explicit(&c->touch[i], memory_order_relaxed))) {
-    case LEAD_STAYS: memset(lead, 0, 6 * sizeof *lead); break;
-    case LEAD_SHARED: lead_shared(c->settings.gravity, c->settings.dt, lead); break;
+    lead->kind = lead_kind_of(atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
+                              atomic_load_explicit(&c->touch[i], memory_order_relaxed));
+    switch (lead->kind) {
+    case LEAD_STAYS: memset(lead->lead, 0, sizeof lead->lead); break;
+    case LEAD_SHARED: lead_shared(c->settings.gravity, c->settings.dt, lead->lead); break;
     case LEAD_OWN: break;
     }
 }
@@ -153,7 +158,7 @@ static void integrate_share(void *argument, int thread, int threads)
         sadmm_share(c->system->contacts->pair_count, thread, threads, &begin, &end);
         for (size_t p = begin; p < end; ++p) touch_pair(c, &c->system->contacts->pairs[p], threads == 1);
         sadmm_barrier_wait(&c->barrier, threads);
-        for (size_t i = first; i < past; ++i) choose_lead(c, i, c->leads[i].lead);
+        for (size_t i = first; i < past; ++i) choose_lead(c, i, &c->leads[i]);
     }
     sadmm_advance(past - first, bodies + first, velocity + 6 * first, c->leads + first, c->settings.dt,
                   in->next + first);

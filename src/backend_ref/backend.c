@@ -66,6 +66,42 @@ static sadmm_status read_penalty(struct sadmm_context *c, double *beta, struct s
     return SADMM_OK;
 }
 
+/* Of the bodies and the island of a contact point. */
+static void touch_point(struct sadmm_context *c, const struct sadmm_contact_pair *pair, int32_t k)
+{
+    const struct sadmm_contact_set *contacts = c->system->contacts;
+    const struct ref_constraint *constraint = &c->constraints[k];
+    const bool inner = constraint->side[0].body >= 0 && constraint->side[1].body >= 0;
+    struct lead_touch touch = {inner ? TOUCH_INNER : constraint->mu > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH, {0, 0}};
+    const struct rolling_halfway at =
+        rolling_halfway_of(
+        pair->normal, &contacts->points[k], sadmm_migration_of(contacts->points, contacts->migrations, k));
+    double speed = 0, lead[2] = {0, 0}, size[2] = {0, 0}, moves[2] = {0, 0}, rest[2] = {0, 0};
+    for (int s = 0; s < 2; ++s) {
+        const struct ref_side *side = &constraint->side[s];
+        if (side->body < 0) continue;
+        const double sign = s ? 1 : -1, *arm_halfway = s ? at.arm_b : at.arm_a;
+        speed += sign * lead_along(at.normal, c->bodies[side->body].v, arm_halfway);
+        lead[s] = sign * lead_along(at.normal, c->bodies[side->body].lead, arm_halfway);
+        const double *arm = s ? contacts->points[k].arm_b : contacts->points[k].arm_a;
+        size[s] = lead_size(c->bodies[side->body].lead, arm);
+        moves[s] = lead_speed(c->system->rigid[side->body].velocity, c->bodies[side->body].v, arm);
+        const struct sadmm_rigid *rigid = &c->system->rigid[side->body];
+        rest[s] = lead_rest_speed(c->settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
+                                  c->settings->dt);
+        touch.island |= forces_touch(rigid);
+    }
+    lead_add_point(&touch, (struct lead_gap){contacts->points[k].gap, speed, contacts->points[k].migrates},
+                   constraint->lambda[0], lead, size, moves, rest,
+                   c->settings->dt, c->settings->slop);
+    for (int s = 0; s < 2; ++s) {
+        if (constraint->side[s].body < 0) continue;
+        struct ref_body *body = &c->bodies[constraint->side[s].body];
+        body->touch |= touch.body[s];
+        c->bodies[body->label].island_touch |= touch.island;
+    }
+}
+
 /* Of bodies and islands, what their contacts say of leads. */
 static void touch(struct sadmm_context *c)
 {
@@ -81,33 +117,9 @@ static void touch(struct sadmm_context *c)
         if (sadmm_pair_is_driven(c->system, pair))
             c->bodies[c->bodies[pair->body_a >= 0 ? pair->body_a : pair->body_b].label].island_touch |= TOUCH_JOLT;
     }
-    for (size_t k = 0; k < contacts->point_count; ++k) {
-        const struct ref_constraint *constraint = &c->constraints[k];
-        const bool inner = constraint->side[0].body >= 0 && constraint->side[1].body >= 0;
-        struct lead_touch touch = {inner ? TOUCH_INNER : constraint->mu > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH, {0, 0}};
-        double speed = 0, lead[2] = {0, 0}, size[2] = {0, 0}, moves[2] = {0, 0}, rest[2] = {0, 0};
-        for (int s = 0; s < 2; ++s) {
-            const struct ref_side *side = &constraint->side[s];
-            if (side->body < 0) continue;
-            speed += dense6_dot(side->J, c->bodies[side->body].v);
-            lead[s] = dense6_dot(side->J, c->bodies[side->body].lead);
-            const double *arm = s ? contacts->points[k].arm_b : contacts->points[k].arm_a;
-            size[s] = lead_size(c->bodies[side->body].lead, arm);
-            moves[s] = lead_speed(c->system->rigid[side->body].velocity, c->bodies[side->body].v, arm);
-            const struct sadmm_rigid *rigid = &c->system->rigid[side->body];
-            rest[s] = lead_rest_speed(c->settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
-                                      c->settings->dt);
-            if (forces_differ(rigid)) touch.island |= TOUCH_DIFFERS;
-        }
-        lead_add_point(&touch, contacts->points[k].gap, constraint->lambda[0], speed, lead, size, moves, rest,
-                       c->settings->dt, c->settings->slop);
-        for (int s = 0; s < 2; ++s) {
-            if (constraint->side[s].body < 0) continue;
-            struct ref_body *body = &c->bodies[constraint->side[s].body];
-            body->touch |= touch.body[s];
-            c->bodies[body->label].island_touch |= touch.island;
-        }
-    }
+    for (size_t p = 0; p < contacts->pair_count; ++p)
+        for (int32_t k = 0; k < contacts->pairs[p].count; ++k)
+            touch_point(c, &contacts->pairs[p], contacts->pairs[p].first + k);
 }
 
 /* Q: the primal iterate v, less its lead. */
@@ -131,6 +143,8 @@ static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next,
         v3_store(rigid_move(v3_load(body.position), v3_load(mean), dt), body.position);
         q_store(rigid_turn(q_load(body.orientation), v3_load(mean + 3), dt), body.orientation);
         memcpy(body.velocity, from->v, sizeof body.velocity);
+        rolling_forget(&body);
+        body.mean = kind == LEAD_OWN;
         next[i] = body;
     }
     return SADMM_OK;

@@ -86,6 +86,8 @@ static void copy_share(struct sadmm_contact_set *set, const struct sadmm_contact
            point = part->point_count * share / shares, point_end = part->point_count * (share + 1) / shares;
     if (point < point_end)
         memcpy(set->points + to_point + point, part->points + point, (point_end - point) * sizeof *set->points);
+    for (size_t k = part->migrating > 0 ? point : point_end; k < point_end; ++k)
+        if (part->points[k].migrates) set->migrations[to_point + k] = part->migrations[k];
     for (; pair < pair_end; ++pair) {
         set->pairs[to_pair + pair] = part->pairs[pair];
         set->pairs[to_pair + pair].first += (int32_t)to_point;
@@ -113,18 +115,21 @@ static void append_share(void *argument, int thread, int threads)
 static bool append_parts(struct sadmm_contact_set *set, struct sadmm_team *team, const struct sadmm_contact_set *parts,
                          size_t count)
 {
-    size_t pairs = set->pair_count, points = set->point_count;
+    size_t pairs = set->pair_count, points = set->point_count, migrating = set->migrating;
     for (size_t t = 0; t < count; ++t) {
         pairs += parts[t].pair_count;
         points += parts[t].point_count;
+        migrating += parts[t].migrating;
     }
     if (!sadmm_grow(&set->pairs, &set->pair_capacity, set->pair_count, pairs, sizeof *set->pairs) ||
-        !sadmm_grow(&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points))
+        !sadmm_grow(&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points) ||
+        (migrating > 0 && !sadmm_contact_set_reserve_migrations(set, points)))
         return false;
     struct appending appending = {set, parts, count};
     sadmm_parallel(team, (int)count + 1, append_share, &appending);
     set->pair_count = pairs;
     set->point_count = points;
+    set->migrating = migrating;
     return true;
 }
 
@@ -142,7 +147,7 @@ static void find_share(void *argument, int thread, int threads)
     struct sadmm_contact_set *out = thread == 0 ? f->out : &f->collision->parts[thread - 1];
     size_t begin, end;
     sadmm_share(f->collision->candidates.list.count, thread, threads, &begin, &end);
-    out->pair_count = out->point_count = 0;
+    out->pair_count = out->point_count = out->migrating = 0;
     if (!f->collision->candidates.kernels->narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out))
         atomic_store(&f->failed, true);
 }

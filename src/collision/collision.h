@@ -62,6 +62,7 @@ struct sadmm_collision_body {
     uint32_t placed;      /* changes whenever its pose is set: pairs forget the axis they remember (contact_match.h) */
     int32_t system_body;  /* index among dynamic bodies; -1: static; below: driven, core/base/contact_set.h */
     int32_t environment;  /* -1: meets all */
+    int32_t mean;         /* what touches it may roll (contact_migrate.h); not 0 of what is not dynamic */
 };
 
 struct sadmm_collision_input {

@@ -4,6 +4,7 @@
 
 #include "core/math/array3.h"
 #include "contact_match.h"
+#include "contact_migrate.h"
 #include "manifold.h"
 
 /* The value set for the two shapes (keys: unordered_key of slots, sorted), else the geometric mean. */
@@ -17,7 +18,7 @@ SADMM_INLINE double contact_friction(const uint64_t *keys, const double *values,
     return a->friction == b->friction ? a->friction : sqrt(a->friction * b->friction);
 }
 
-/* normal: the manifold's, in the world. first: index of its first point. */
+/* normal: the contact's, in the world. first: index of its first point. */
 SADMM_INLINE void contact_emit_pair(uint32_t slot_a, uint32_t slot_b, uint32_t child, const struct sadmm_proxy *a,
                                     const struct sadmm_proxy *b, const struct manifold *m, const double normal[3],
                                     double friction, int32_t first, struct sadmm_contact_pair *pair)
@@ -92,7 +93,7 @@ SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct s
                  dot3(motion->turn_b, arm_b);
     point->error = 0;
     point->feature = from->feature;
-    point->reserved = 0;
+    point->migrates = 0;
 }
 
 #endif

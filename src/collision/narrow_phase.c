@@ -18,15 +18,23 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
     const double friction = contact_friction(input->friction_pairs, input->friction_values,
                                              (int64_t)input->friction_pair_count, a, b, pa, pb);
     struct pair_motion motion;
+    const struct migration_set last = {old->points, old->migrations};
+    struct migration_pair rolling;
     double normal[3];
 
     rotate_to_world(pb->R, m->normal, normal);
     pair_motion_of(pa, pb, normal, m->ahead, input->dt, &motion);
-    contact_emit_pair(a, b, child, pa, pb, m, normal, friction, (int32_t)out->point_count, pair);
+    migration_begin(pa, pb, before, last, ratio, m->count, normal, &rolling);
+    contact_emit_pair(a, b, child, pa, pb, m, rolling.normal, friction, (int32_t)out->point_count, pair);
     for (int i = 0; i < m->count; ++i) {
-        struct sadmm_contact_point *point = &out->points[out->point_count++];
+        struct sadmm_contact_point *point = &out->points[out->point_count];
         contact_emit_point(pa, pb, &motion, &m->points[i], point);
-        if (before) contact_carry(before, old->points, i, normal, friction, ratio, point);
+        if (before) contact_carry(before, old->points, i, rolling.normal, friction, ratio, point);
+        const double radius = contact_radius(pa, pb, m->count, normal, point);
+        if ((rolling.before || radius > 0) &&
+            migrate_point(pa, pb, &rolling, last, i, radius, point, &out->migrations[out->point_count]))
+            ++out->migrating;
+        ++out->point_count;
     }
 }
 
@@ -42,6 +50,13 @@ static bool is_disabled(const struct sadmm_collision_input *input, uint64_t shap
 static bool has_capacity(const struct sadmm_contact_set *set)
 {
     return set->pair_count < set->pair_capacity && set->point_count + SADMM_MANIFOLD_POINTS <= set->point_capacity;
+}
+
+/* The same of migrations, where there may be some. */
+static bool has_migrations(struct sadmm_contact_set *set)
+{
+    return set->point_count + SADMM_MANIFOLD_POINTS <= set->migration_capacity ||
+           sadmm_contact_set_reserve_migrations(set, set->point_count + SADMM_MANIFOLD_POINTS);
 }
 
 static bool add_capacity(struct sadmm_contact_set *set)
@@ -82,6 +97,10 @@ SADMM_ALWAYS_INLINE bool keep(struct narrow_phase *n, uint32_t a, uint32_t b, ui
 {
     if (m->count == 0) return true;
     if (!has_capacity(n->out) && !add_capacity(n->out)) return false;
+    if (contact_may_migrate(&n->candidates->proxies[a], &n->candidates->proxies[b], before,
+                            n->old->points, m->count) &&
+        !has_migrations(n->out))
+        return false;
     emit(n->candidates, n->input, a, b, child, m, n->old, n->ratio, before, n->out);
     return true;
 }

@@ -22,6 +22,7 @@ struct sadmm_proxy {
     double friction, restitution;
     int32_t body, system_body;
     uint32_t revision, placed;
+    int32_t mean, reserved; /* of the body */
 };
 
 /* How a shape is turned ahead. */
@@ -84,6 +85,8 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     p->system_body = body->system_body;
     p->revision = shape->revision;
     p->placed = body->placed;
+    p->mean = body->mean;
+    p->reserved = 0;
     if (geometry->type != SADMM_SHAPE_PLANE) proxy_box(p, dt, margin, gravity, box);
 }
 

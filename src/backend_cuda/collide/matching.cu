@@ -65,6 +65,21 @@ static __device__ __forceinline__ emit_in_place emit_source_of(const collision_v
     return {*a, *b, {point.position, point.separation, feature}, *old, head};
 }
 
+/* The point goes on to the step's end, and its normal (core/model/rolling.h). By itself: few do. */
+static __device__ __noinline__ void migrate(const collision_view &v, const struct sadmm_proxy *a,
+                                            const struct sadmm_proxy *b, const struct sadmm_contact_pair *before,
+                                            double ratio, int32_t count, int32_t lane, int32_t at, double normal[3],
+                                            struct sadmm_contact_point *point)
+{
+    const struct migration_set last = {v.before.points, v.before.migrations};
+    const double radius = contact_radius(a, b, count, normal, point);
+    struct sadmm_contact_migration migration;
+    struct migration_pair pair;
+    migration_begin(a, b, before, last, ratio, count, normal, &pair);
+    if (migrate_point(a, b, &pair, last, lane, radius, point, &migration)) v.after.migrations[at] = migration;
+    for (int k = 0; k < 3; ++k) normal[k] = pair.normal[k];
+}
+
 /* Point `lane` of a candidate, and its pair into the new set by the first lane; place: pairs << 32 | points before it.
  * Points go out by the warp or by the lane, which the kernel knows. */
 template <class Source>
@@ -84,7 +99,10 @@ static __device__ __forceinline__ struct sadmm_contact_point emit_point(const co
     struct pair_motion motion;
     pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
     contact_emit_point(pa, pb, &motion, &source.point, &point);
-    if (start.match >= 0)
+    const struct sadmm_contact_pair *before = start.match >= 0 ? &source.old : nullptr;
+    if (contact_may_migrate(pa, pb, before, v.before.points, source.head.count))
+        migrate(v, pa, pb, before, step_ratio(dt.now, dt.before), source.head.count, lane, first + lane, normal, &point);
+    if (before)
         contact_carry(&source.old, wide_at(v.before.points, 0), lane, normal, friction,
                       step_ratio(dt.now, dt.before), &point);
     if (lane > 0) return point;

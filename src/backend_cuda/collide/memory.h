@@ -18,13 +18,14 @@ enum buffer_name {
     PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_NUMBERS, LEAF_NUMBERS_2, NODES, GROUPS, PARENTS, ARRIVALS,
     COUNTER, GRID, CANDIDATES, CANDIDATES_2, LISTED, WALKS, MESH_PAIRS, TOUCHES, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP,
     BOXES, REACHES, PAIR_OF,
-    PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2, PAIRS_3, POINTS_3, PAIR_KEYS_3,
-    COUNTS_3,
+    PAIRS, POINTS, MIGRATIONS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, MIGRATIONS_2, PAIR_KEYS_2, COUNTS_2,
+    PAIRS_3, POINTS_3, MIGRATIONS_3, PAIR_KEYS_3, COUNTS_3,
     TOUCHING,
     SHAPES, GEOMETRIES, HULLS, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
     /* pinned: first what was uploaded to the last buffers above, in their order */
     PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_HULLS, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS,
-    PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_PAIRS, PINNED_POINTS, PINNED_PAIR_KEYS, PINNED_COUNTS, PINNED_TOUCHING,
+    PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_PAIRS, PINNED_POINTS, PINNED_MIGRATIONS,
+    PINNED_PAIR_KEYS, PINNED_COUNTS, PINNED_TOUCHING,
     BUFFERS
 };
 enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
@@ -34,14 +35,14 @@ static const char *const buffer_names[BUFFERS] = {
     "parents", "arrivals", "counter", "grid", "candidates", "sorted candidates", "listed candidates",
     "walks of listed candidates", "pairs with meshes", "first touches", "manifolds", "matches", "sizes",
     "places", "sort", "boxes of sub-steps", "reaches", "pairs of candidates",
-    "contact pairs", "contact points", "contact keys", "contact counts",
-    "contact pairs", "contact points", "contact keys", "contact counts",
-    "contact pairs", "contact points", "contact keys", "contact counts",
+    "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
+    "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
+    "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "touching pairs",
     "shapes", "geometries", "hulls", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
     "staged shapes", "staged geometries", "staged hulls", "staged bodies", "staged list of shapes", "staged planes",
     "staged disabled pairs",
-    "staged friction pairs", "staged friction values", "staged contact pairs", "staged contact points",
+    "staged friction pairs", "staged friction values", "staged contact pairs", "staged contact points", "staged migrations",
     "staged contact keys", "staged contact counts", "staged touching pairs",
 };
 
@@ -225,6 +226,7 @@ static inline struct collision_set set_of(const struct sadmm_cuda_collision *c, 
     struct collision_set set;
     set.pairs = in<struct sadmm_contact_pair>(c, PAIRS + shift);
     set.points = in<struct sadmm_contact_point>(c, POINTS + shift);
+    set.migrations = in<struct sadmm_contact_migration>(c, MIGRATIONS + shift);
     set.keys = in<uint64_t>(c, PAIR_KEYS + shift);
     set.counts = in<struct sadmm_cuda_contact_counts>(c, COUNTS + shift);
     return set;

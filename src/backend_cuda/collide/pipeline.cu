@@ -90,6 +90,12 @@ extern "C" sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *c, void *
     if (set->point_count > 0) memcpy(in<void>(c, PINNED_POINTS), set->points, set->point_count * sizeof *set->points);
     TRY(copy(c, to.pairs, in<void>(c, PINNED_PAIRS), set->pair_count * sizeof *set->pairs, true, error));
     TRY(copy(c, to.points, in<void>(c, PINNED_POINTS), set->point_count * sizeof *set->points, true, error));
+    if (set->migrating > 0) {
+        const size_t bytes = set->point_count * sizeof *set->migrations;
+        TRY(reserve(c, PINNED_MIGRATIONS, bytes, 1, error));
+        memcpy(in<void>(c, PINNED_MIGRATIONS), set->migrations, bytes);
+        TRY(copy(c, to.migrations, in<void>(c, PINNED_MIGRATIONS), bytes, true, error));
+    }
     TRY(copy(c, to.keys, keys, set->pair_count * sizeof *keys, true, error));
     TRY(copy(c, to.counts, counts, sizeof *counts, true, error));
     c->current = which;
@@ -121,9 +127,27 @@ extern "C" sadmm_status COLLISION(find)(struct sadmm_cuda_collision *c, void *st
         const struct collision_set set = set_of(c, c->current);
         out->pairs = set.pairs;
         out->points = set.points;
+        out->migrations = set.migrations;
         out->device_counts = set.counts;
         out->counts = counts;
     }
+    return SADMM_OK;
+}
+
+/* Of points that have been downloaded, those that have one. */
+static sadmm_status download_migrations(struct sadmm_cuda_collision *c, size_t points,
+                                        struct sadmm_contact_set *contacts, size_t *migrating,
+                                        struct sadmm_error *error)
+{
+    const struct sadmm_contact_point *from = in<struct sadmm_contact_point>(c, PINNED_POINTS);
+    const size_t bytes = points * sizeof *contacts->migrations;
+    *migrating = 0;
+    for (size_t k = 0; k < points; ++k) *migrating += from[k].migrates;
+    if (*migrating == 0) return SADMM_OK;
+    TRY(reserve(c, PINNED_MIGRATIONS, bytes, 1, error));
+    TRY(copy(c, in<void>(c, PINNED_MIGRATIONS), set_of(c, c->current).migrations, bytes, false, error));
+    TRY(wait(c, error));
+    if (!sadmm_contact_set_reserve_migrations(contacts, points)) return sadmm_fail_memory(error, "contacts");
     return SADMM_OK;
 }
 
@@ -145,6 +169,11 @@ extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void
         !sadmm_grow(&contacts->points, &contacts->point_capacity, contacts->point_count, points,
                     sizeof *contacts->points))
         return sadmm_fail_memory(error, "contacts");
+    size_t migrating;
+    TRY(download_migrations(c, points, contacts, &migrating, error));
+    if (migrating > 0)
+        memcpy(contacts->migrations, in<void>(c, PINNED_MIGRATIONS), points * sizeof *contacts->migrations);
+    contacts->migrating = migrating;
     if (pairs > 0) memcpy(contacts->pairs, in<void>(c, PINNED_PAIRS), pairs * sizeof *contacts->pairs);
     if (points > 0) memcpy(contacts->points, in<void>(c, PINNED_POINTS), points * sizeof *contacts->points);
     contacts->pair_count = pairs;
@@ -156,7 +185,7 @@ extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void
 extern "C" struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_collision *c, int which)
 {
     const struct collision_set set = set_of(c, which);
-    struct sadmm_cuda_contacts out = {set.pairs, set.points, set.counts, {}};
+    struct sadmm_cuda_contacts out = {set.pairs, set.points, set.migrations, set.counts, {}};
     return out;
 }
 

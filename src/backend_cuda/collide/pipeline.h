@@ -17,6 +17,7 @@ struct sadmm_cuda_collision;
 struct sadmm_cuda_contacts {
     struct sadmm_contact_pair *pairs;
     struct sadmm_contact_point *points;
+    const struct sadmm_contact_migration *migrations;
     const struct sadmm_cuda_contact_counts *device_counts; /* the same numbers, on the device */
     struct sadmm_cuda_contact_counts counts;
 };

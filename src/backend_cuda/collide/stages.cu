@@ -47,6 +47,7 @@ sadmm_status COLLISION(reserve_set)(struct sadmm_cuda_collision *c, int which, s
     const int shift = which * SET_BUFFERS;
     TRY(reserve(c, PAIRS + shift, pairs, sizeof(struct sadmm_contact_pair), error));
     TRY(reserve(c, POINTS + shift, points, sizeof(struct sadmm_contact_point), error));
+    TRY(reserve(c, MIGRATIONS + shift, points, sizeof(struct sadmm_contact_migration), error));
     TRY(reserve(c, PAIR_KEYS + shift, pairs, sizeof(uint64_t), error));
     if (in<void>(c, COUNTS + shift)) return SADMM_OK;
     TRY(reserve(c, COUNTS + shift, 1, sizeof(struct sadmm_cuda_contact_counts), error));
@@ -329,6 +330,8 @@ extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, bool 
         TRY(keep_capacity(c, PAIRS + shift, (size_t)c->candidate_capacity, sizeof(struct sadmm_contact_pair), error));
         TRY(keep_capacity(c, PAIR_KEYS + shift, (size_t)c->candidate_capacity, sizeof(uint64_t), error));
         TRY(keep_capacity(c, POINTS + shift, (size_t)c->point_capacity, sizeof(struct sadmm_contact_point), error));
+        TRY(keep_capacity(c, MIGRATIONS + shift, (size_t)c->point_capacity, sizeof(struct sadmm_contact_migration),
+                          error));
         TRY(COLLISION(reserve_set)(c, which, 0, 0, error));
     }
     *candidates = c->candidate_capacity;

@@ -148,6 +148,7 @@ struct found_manifold {
 struct collision_set {
     struct sadmm_contact_pair *pairs;
     struct sadmm_contact_point *points;
+    struct sadmm_contact_migration *migrations; /* as points */
     uint64_t *keys; /* of the pairs: slot of a << 32 | slot of b; as often as the two have a manifold */
     struct sadmm_cuda_contact_counts *counts;
 };

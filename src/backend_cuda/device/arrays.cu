@@ -74,7 +74,7 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
     v->bodies.rigid = c->plan.rigid;
     v->bodies.line = v->bodies.rigid ? LINE_RIGID : LINE_GENERAL;
     v->contacts.point_slots = c->statistics.point_slots;
-    size_t out = (13 * n + 3 * points + 6 * (size_t)v->rows.count + 2) * sizeof(double);
+    size_t out = (14 * n + 3 * points + 6 * (size_t)v->rows.count + 2) * sizeof(double);
     const cuda_capacity wanted[] = {
         {BUFFER_STATE, (n + 1 + (v->raw.system.driven_count > 0 ? pairs : 0)) * ROW * real_size},
         {BUFFER_B, (c->fast ? 2 : 1) * n * ROW * real_size},

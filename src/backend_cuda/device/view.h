@@ -212,7 +212,7 @@ struct island_view {
 
 /* Why bodies may have to be moved again (step/move.h): an island is not as it is as a rule; some body's lead closes a
  * contact, and nothing presses on some body, which may be that one. */
-enum cuda_again { AGAIN, AGAIN_CLOSED, AGAIN_UNPRESSED, AGAIN_WHYS };
+enum cuda_again { AGAIN, AGAIN_CLOSED, AGAIN_UNPRESSED, AGAIN_ROLLS, AGAIN_WHYS };
 
 /* What passes from sweep to sweep, and what was measured of them. */
 struct iteration_view {
@@ -232,6 +232,7 @@ struct raw_view {
     const struct raw_row *rows; /* constraints x SADMM_MAX_ROWS */
     const struct sadmm_contact_pair *pairs;
     const struct sadmm_contact_point *points;
+    const struct sadmm_contact_migration *migrations; /* as points */
     double *out; /* results */
 };
 

@@ -50,6 +50,14 @@ static __device__ __forceinline__ bool any_touched(const cuda_view &v)
     return v.graph.offsets[first] < v.graph.offsets[end < v.model.bodies ? end : v.model.bodies];
 }
 
+/* Component `lane` of what contacts that rolled in the last step give it in this one. */
+static __device__ __forceinline__ void add_owed(const cuda_view &v, int32_t body, int32_t lane, double wrench[6])
+{
+#pragma unroll
+    for (int k = 0; k < 6; ++k)
+        if (k == lane) wrench[k] += rolling_wrench(&v.step.before[body], v.model.settings->dt, k);
+}
+
 /* What the lanes of a body do. */
 static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct finish_shared *shared)
 {
@@ -68,8 +76,9 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
         held = v.islands.info[label].held;
         own = load_lead_speeds<true>(v, body);
     }
-    const contact_sums sums = sum_touching<true>(v, own, &begun);
+    contact_sums sums = sum_touching<true>(v, own, &begun);
     if (t.lane == 0) shared->touch[in_block] = sums.touch;
+    if (t.begin < t.end && v.model.wrenches) add_owed(v, body, t.lane, sums.wrench);
     if (t.begin < t.end && v.model.wrenches)
         add_wrench(sums.wrench, t.lane, v.step.substep, v.step.substeps, v.step.wrench + 6 * t.body);
     if (touched && t.lane == 0) tell_touch(v.islands, body, label, held, sums.touch);
@@ -112,7 +121,7 @@ static __device__ __forceinline__ void end_move(const cuda_view &v, double dt, c
     if (!m.live) return;
 #pragma unroll
     for (int k = 0; k < PLACE; ++k) place[k] = keeps ? m.stays[k] : m.own[k];
-    store_moved(v, m.body, m.before, m.velocity, place, dt);
+    store_moved(v, m.body, m.before, m.velocity, place, !keeps, dt);
     if (!m.finite) atomicMin(&v.step.control->offending_body, m.body);
 }
 
@@ -129,12 +138,13 @@ static __device__ __noinline__ void finish_free(const cuda_view &v, double dt, i
     if (!live) return;
     load_end_velocity(v, body, velocity);
     move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
-    if (!moves_apart(v, body)) store_moved(v, body, before, velocity, place, dt);
+    if (!moves_apart(v, body)) store_moved(v, body, before, velocity, place, true, dt);
     const bool finite = finite_numbers(place, PLACE) && finite_numbers(velocity, 6);
     if (!finite) atomicMin(&v.step.control->offending_body, body);
-    const double none[6] = {};
+    double owed[6] = {};
+    for (int32_t k = 0; v.model.wrenches && k < 6; ++k) add_owed(v, body, k, owed);
     for (int32_t k = 0; v.model.wrenches && k < 6; ++k)
-        add_wrench(none, k, v.step.substep, v.step.substeps, v.step.wrench + 6 * (size_t)body);
+        add_wrench(owed, k, v.step.substep, v.step.substeps, v.step.wrench + 6 * (size_t)body);
 }
 
 /* ---- contacts -------------------------------------------------------------------------------------------------- */
@@ -213,6 +223,7 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
         if (v.driven.count > 0 && lane == 0) ways |= add_jolt(v, p);
         if (ways & TOUCH_JOLT) v.islands.again[AGAIN] = 1;
         if (ways & TOUCH_CARRIED) v.islands.again[AGAIN_CLOSED] = 1;
+        if (ways & TOUCH_ROLLS) v.islands.again[AGAIN_ROLLS] = 1;
     }
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;

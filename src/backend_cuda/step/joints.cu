@@ -270,7 +270,9 @@ static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t 
     if (looks) {
         bodies[0] = lead_of(v, a), bodies[1] = lead_of(v, b);
         for (int32_t k = lane; k < pair->count; k += v.contacts.lanes)
-            joint_contact_touches(pair->normal, &v.raw.points[pair->first + k], bodies, &settings, &touch);
+            joint_contact_touches(pair->normal, &v.raw.points[pair->first + k],
+                                  sadmm_migration_of(v.raw.points, v.raw.migrations, pair->first + k), bodies,
+                                  &settings, &touch);
     }
     for (int32_t o = 1; o < v.contacts.lanes; o *= 2) {
         touch.island |= __shfl_xor_sync((unsigned)ALL_LANES, touch.island, o);

@@ -45,10 +45,7 @@ static __device__ __forceinline__ void edit_joint(const joint_view &joints, int3
 static __device__ __forceinline__ void edit_state(struct sadmm_rigid *body, struct sadmm_steady *steady,
                                                   const double *values)
 {
-    steady_place(steady, body, values, values + 3);
-    for (int k = 0; k < 3; ++k) body->position[k] = values[k];
-    for (int k = 0; k < 4; ++k) body->orientation[k] = values[3 + k];
-    for (int k = 0; k < 6; ++k) body->velocity[k] = values[7 + k];
+    steady_set(steady, body, values, values + 3, values + 7);
 }
 
 static __device__ __forceinline__ void edit_driven(const driven_view &driven, const struct sadmm_resident_edit &edit)
@@ -130,6 +127,7 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
                  last_dt = steady->dt, change = steady->change[k];
     const int32_t streak = steady->streak[k / 3];
     const uint32_t placed = steady->placed;
+    const int32_t mean = body->mean;
     const vec3 force = v3_load(body->wrench), torque = v3_load(body->wrench + 3);
     const double scale = body->gravity_scale, damping[2] = {body->damping[0], body->damping[1]};
     struct sadmm_collision_body *out = &v.step.bodies[slot];
@@ -143,7 +141,10 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
     if (lane == LANE_TORQUE)
         out->acceleration[1] =
             v3_max_abs(torque) == 0 && damping[1] == 0 ? 0 : forces_angular_acceleration(body, dt);
-    if (lane == LANE_PLACED) out->placed = placed;
+    if (lane == LANE_PLACED) {
+        out->placed = placed;
+        out->mean = mean;
+    }
 }
 
 /* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
@@ -199,7 +200,43 @@ static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
     double velocity[6], place[PLACE];
     load_end_velocity(v, i, velocity);
     move_body(&before.body, velocity, dt, v.model.settings->gravity, kind, place);
-    store_moved(v, i, before, velocity, place, dt); /* finite, since both places were that it had to choose from */
+    store_moved(v, i, before, velocity, place, false, dt); /* finite, since both places were that it had to choose from */
+}
+
+/* Does any contact roll? */
+static __device__ __forceinline__ bool rolls_again(const cuda_view &v)
+{
+    return v.step.limits && v.islands.again[AGAIN_ROLLS];
+}
+
+/* What contacts that roll give body i to take along, which has been moved. */
+static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i)
+{
+    const double dt = v.model.settings->dt;
+    const int32_t slot = v.graph.slot_of[i];
+    struct sadmm_rigid *next = &v.step.after[i];
+    double owed[6] = {}, stiffness[6] = {};
+    for (int32_t at = v.graph.offsets[slot]; at < v.graph.offsets[slot + 1]; ++at) {
+        const int32_t code = v.graph.incident[at], side = code & 1;
+        if (code / 2 >= v.contacts.pair_capacity) continue; /* rows */
+        const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];
+        for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+            const struct sadmm_contact_point *point = &v.raw.points[k];
+            if (!point->migrates) continue;
+            const struct rolling_halfway halfway = rolling_halfway_of(pair->normal, point, &v.raw.migrations[k]);
+            const double *arm = side ? point->arm_b : point->arm_a;
+            rolling_owe(pair->normal, arm, halfway.normal, side ? halfway.arm_b : halfway.arm_a, point->impulse,
+                        side ? 1 : -1, owed);
+            rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->gap), v.raw.migrations[k].radius,
+                            sadmm_normal_impulse(pair, point), dt, stiffness);
+        }
+    }
+    rolling_moved(v.step.before[i].position, next->position, owed);
+    rolling_judge(next->inertia, dt, stiffness);
+    for (int k = 0; k < 6; ++k) {
+        next->owed[k] = owed[k];
+        next->stiffness[k] = stiffness[k];
+    }
 }
 
 /* Body i, where its island has joints as they let it go; else again, if need be. */
@@ -209,6 +246,7 @@ static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_
     if (joined && !v.joints.is_direct[i]) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
     if (bits & ISLAND_JOINED) move_joined(v, i, bits & ISLAND_LEADS_STAY);
     else if (again) move_again(v, i);
+    if (rolls_again(v) && v.islands.touch[i] & TOUCH_ROLLS) keep_rolling(v, i);
 }
 
 /* Are there bodies to be moved again (move.h)? */
@@ -264,11 +302,12 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
     const int32_t lane = (int32_t)(t % START_LANES);
     struct cuda_step_control *control = v.step.control;
     if (v.model.live->abort_code) return;
-    const bool again = moves_again(v), joined = v.joints.count > 0 && !v.joints.apart;
-    if ((again || joined) && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
+    const bool again = moves_again(v), joined = v.joints.count > 0 && !v.joints.apart,
+               any = again || joined || rolls_again(v);
+    if (any && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
         move_once_more(v, (int32_t)own, again, joined);
     if (joined) end_joints(v, (int32_t)t);
-    if (again || joined) __syncthreads(); /* threads of a block start bodies that others of it have moved */
+    if (any) __syncthreads(); /* threads of a block start bodies that others of it have moved */
     if (t == 0) {
         control->stamps[STAMP_END] = nanoseconds();
         control->totals = totals_of(v, args);
@@ -302,7 +341,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
             return;
         }
         const bool again = on && moves_again(v);
-        if ((again || joined) && i < v.model.bodies) move_once_more(v, i, again, joined);
+        if ((again || joined || (on && rolls_again(v))) && i < v.model.bodies) move_once_more(v, i, again, joined);
         return;
     }
     if (threadIdx.x > 0) return;

@@ -12,7 +12,7 @@ static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i, b
     const double dt = v.model.settings->dt;
     double next[6], place[PLACE];
     joint_move(&before.body, v.joints.velocity + 6 * (size_t)i, leads_stay, dt, place, place + 3, next);
-    store_moved(v, i, before, next, place, dt);
+    store_moved(v, i, before, next, place, !leads_stay, dt);
 }
 
 /* Joint j remembers how its bodies have been moved, once that is known; behind the joints, of a gear the first one. */

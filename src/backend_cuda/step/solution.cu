@@ -99,7 +99,7 @@ static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const _
     if (t.live && lane == 0) add_touch(v.islands, body, v.graph.label[body], sums.touch);
 }
 
-enum { MOVED = 13 }; /* position, orientation, velocity */
+enum { MOVED = PLACE + 7 }; /* position, orientation, velocity, sadmm_rigid.mean */
 
 static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -112,8 +112,9 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
         out[PLACE + k] = (double)v.bodies.state[(size_t)i * ROW + (size_t)k];
         if (v.raw.system.carried) out[PLACE + k] += v.raw.system.carried[6 * (size_t)i + (size_t)k];
     }
-    move_body(&v.raw.system.rigid[i], out + PLACE, v.model.settings->dt, v.model.settings->gravity,
-              lead_kind_of(island, own), out);
+    const enum lead_kind kind = lead_kind_of(island, own);
+    move_body(&v.raw.system.rigid[i], out + PLACE, v.model.settings->dt, v.model.settings->gravity, kind, out);
+    out[MOVED - 1] = kind == LEAD_OWN;
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
@@ -139,7 +140,9 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
         next[i] = c->system->rigid[i];
         memcpy(next[i].position, from, sizeof next[i].position);
         memcpy(next[i].orientation, from + 3, sizeof next[i].orientation);
-        memcpy(next[i].velocity, from + 7, sizeof next[i].velocity);
+        memcpy(next[i].velocity, from + PLACE, sizeof next[i].velocity);
+        rolling_forget(&next[i]);
+        next[i].mean = from[MOVED - 1] != 0;
     }
     return SADMM_OK;
 }

@@ -35,7 +35,7 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
  * lead_rest_speed. */
 struct lead_speeds {
     double moves[2], rest;
-    int touch; /* TOUCH_DIFFERS, or 0 */
+    int touch; /* forces_touch */
 };
 
 template <bool WHOLE> static __device__ __forceinline__ lead_speeds load_lead_speeds(const cuda_view &v, int32_t body)
@@ -46,7 +46,7 @@ template <bool WHOLE> static __device__ __forceinline__ lead_speeds load_lead_sp
         {lead_speed_part(own.before, own.velocity, 0), lead_speed_part(own.before, own.velocity, 1)},
         lead_rest_speed(v.model.settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
                         v.model.settings->dt),
-        forces_differ(rigid) ? TOUCH_DIFFERS : 0};
+        forces_touch(rigid)};
     return out;
 }
 
@@ -181,7 +181,7 @@ static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, 
     return sums;
 }
 
-enum { TOUCH_OF_BODY = TOUCH_CARRIED | TOUCH_MOVED };
+enum { TOUCH_OF_BODY = TOUCH_CARRIED | TOUCH_MOVED | TOUCH_ROLLS };
 
 /* Bits only come: one that is there already needs no more. */
 static __device__ __forceinline__ void add_bits(int32_t *to, int bits)
@@ -215,25 +215,31 @@ static __device__ __forceinline__ int add_ways(const cuda_view &v, const pair_en
 {
     const double dt = v.model.settings->dt, slop = v.model.settings->slop, *n = ends.normal;
     struct lead_touch touch = {0, {0, 0}};
+    int rolls = 0;
     lead_body sides[2] = {};
 #pragma unroll
     for (int s = 0; s < 2; ++s)
         if (ends.body[s] >= 0) sides[s] = load_lead_body<WHOLE>(v, ends.body[s]);
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
         const struct sadmm_contact_point *point = wide_at(v.raw.points, (size_t)(first + k));
-        const double leads[2] = {-lead_along(n, sides[0].lead, point->arm_a),
-                                 lead_along(n, sides[1].lead, point->arm_b)},
+        const struct rolling_halfway at =
+            rolling_halfway_of(n, point, sadmm_migration_of(v.raw.points, v.raw.migrations, first + k));
+        const double leads[2] = {-lead_along(at.normal, sides[0].lead, at.arm_a),
+                                 lead_along(at.normal, sides[1].lead, at.arm_b)},
                      size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)},
-                     speed = lead_along(n, sides[1].velocity, point->arm_b) -
-                             lead_along(n, sides[0].velocity, point->arm_a);
-        if (!lead_is_still(size, dt, slop)) lead_add_way(&touch, point->gap, speed, leads, size, dt, slop);
+                     speed = lead_along(at.normal, sides[1].velocity, at.arm_b) -
+                             lead_along(at.normal, sides[0].velocity, at.arm_a);
+        if (point->migrates) rolls = TOUCH_ROLLS;
+        if (lead_is_still(size, dt, slop)) continue;
+        const struct lead_gap gap = {point->gap, speed, point->migrates != 0};
+        lead_add_way(&touch, gap, leads, size, dt, slop);
     }
-    const int all = touch.island | touch.body[0] | touch.body[1];
+    const int all = touch.island | touch.body[0] | touch.body[1] | rolls;
     if (all == 0) return 0;
 #pragma unroll
     for (int s = 0; s < 2; ++s)
         if (ends.body[s] >= 0)
-            add_touch(v.islands, ends.body[s], v.graph.label[ends.body[s]], touch.island | touch.body[s]);
+            add_touch(v.islands, ends.body[s], v.graph.label[ends.body[s]], touch.island | touch.body[s] | rolls);
     return all;
 }
 

@@ -45,6 +45,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     c->view.raw.system.velocity = step->start_velocity;
     c->view.raw.pairs = set.pairs;
     c->view.raw.points = set.points;
+    c->view.raw.migrations = set.migrations;
     CUDA(view_driven)(c, into);
     CUDA(view_joints)(c, into, substep);
     CUDA(view_joined)(c);

@@ -19,11 +19,15 @@ static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *err
                     6 * (size_t)c->system->driven_count * sizeof(double),
            pairs = (size_t)v->contacts.pair_capacity * sizeof(struct sadmm_contact_pair);
     size_t points = (size_t)v->model.points * sizeof(struct sadmm_contact_point);
+    size_t migrations = c->system->contacts->migrating > 0
+                            ? (size_t)v->model.points * sizeof(struct sadmm_contact_migration)
+                            : 0;
     size_t row_bytes = CUDA(raw_row_bytes)(v->rows.count);
     const cuda_capacity wanted[] = {
         {BUFFER_RAW_BODIES, bodies}, {BUFFER_RAW_PAIRS, pairs}, {BUFFER_RAW_POINTS, points},
         {BUFFER_RAW_ROWS, row_bytes}, {PINNED_BODIES, bodies},   {PINNED_PAIRS, pairs},
-        {PINNED_POINTS, points},     {PINNED_ROWS, row_bytes},
+        {PINNED_POINTS, points},     {PINNED_ROWS, row_bytes},   {BUFFER_RAW_MIGRATIONS, migrations},
+        {PINNED_MIGRATIONS, migrations},
     };
     TRY(reserve_all(c, wanted, error));
     void *const none = nullptr;
@@ -41,6 +45,7 @@ static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *err
     CUDA(bind_raw_rows)(c, b[BUFFER_RAW_ROWS].data);
     v->raw.pairs = (struct sadmm_contact_pair *)b[BUFFER_RAW_PAIRS].data;
     v->raw.points = (struct sadmm_contact_point *)b[BUFFER_RAW_POINTS].data;
+    v->raw.migrations = (struct sadmm_contact_migration *)b[BUFFER_RAW_MIGRATIONS].data;
     return SADMM_OK;
 }
 
@@ -72,6 +77,9 @@ static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *erro
                      contacts->pair_count * sizeof *contacts->pairs, error));
     TRY(CUDA(upload)(c, (void *)v->raw.points, PINNED_POINTS, 0, contacts->points,
                      contacts->point_count * sizeof *contacts->points, error));
+    if (contacts->migrating > 0)
+        TRY(CUDA(upload)(c, (void *)v->raw.migrations, PINNED_MIGRATIONS, 0, contacts->migrations,
+                         contacts->point_count * sizeof *contacts->migrations, error));
     return CUDA(upload_rows)(c, error);
 }
 

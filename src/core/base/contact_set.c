@@ -4,10 +4,19 @@
 
 #include "memory.h"
 
+bool sadmm_contact_set_reserve_migrations(struct sadmm_contact_set *contacts, size_t points)
+{
+    const size_t there = contacts->point_count < contacts->migration_capacity ? contacts->point_count
+                                                                              : contacts->migration_capacity;
+    return sadmm_grow(&contacts->migrations, &contacts->migration_capacity, contacts->migrating > 0 ? there : 0,
+                      points, sizeof *contacts->migrations);
+}
+
 void sadmm_contact_set_free(struct sadmm_contact_set *contacts)
 {
     if (!contacts) return;
     sadmm_free(contacts->pairs);
     sadmm_free(contacts->points);
+    sadmm_free(contacts->migrations);
     memset(contacts, 0, sizeof *contacts);
 }

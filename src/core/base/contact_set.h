@@ -42,7 +42,14 @@ struct sadmm_contact_point {
     double error;              /* e, m/s: given at the problem level; at the world level see math/contact.h */
     double impulse[3];         /* lambda on b, world frame, N s: warm start in, solution out */
     uint32_t feature;
-    uint32_t reserved;
+    uint32_t migrates; /* 1: the set's `migrations` has an entry of it, 0: none */
+};
+
+/* How the point of a contact moves on its two bodies while these roll on each other. Normal and arms of a pair whose
+ * points migrate are those of the step's end (core/model/rolling.h). */
+struct sadmm_contact_migration {
+    double normal[3], arm_a[3], arm_b[3]; /* what they change by in half a step: 1, m, m; world */
+    double radius; /* of the two surfaces' relative curvature, at most, m; 0: a corner, an edge, or not known */
 };
 
 /* The shapes of a pair that touches; of one that does not, -1 both. */
@@ -74,10 +81,22 @@ SADMM_INLINE struct sadmm_touching_shapes sadmm_touching_of(const struct sadmm_c
 struct sadmm_contact_set {
     struct sadmm_contact_pair *pairs;
     struct sadmm_contact_point *points;
-    size_t pair_count, pair_capacity, point_count, point_capacity;
+    struct sadmm_contact_migration *migrations; /* as points; where there are none of a set, it may be shorter */
+    size_t pair_count, pair_capacity, point_count, point_capacity, migration_capacity;
+    size_t migrating; /* points that have one */
     double dt; /* of the step that its impulses are for, s; 0: of none */
 };
 
+/* NULL: it has none. */
+SADMM_INLINE const struct sadmm_contact_migration *sadmm_migration_of(const struct sadmm_contact_point *points,
+                                                                      const struct sadmm_contact_migration *migrations,
+                                                                      int32_t k)
+{
+    return points[k].migrates ? &migrations[k] : 0;
+}
+
+/* For so many points; those that there are stay. False when memory runs out. */
+bool sadmm_contact_set_reserve_migrations(struct sadmm_contact_set *contacts, size_t points);
 void sadmm_contact_set_free(struct sadmm_contact_set *contacts);
 
 #ifdef __cplusplus

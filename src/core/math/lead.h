@@ -23,7 +23,8 @@ enum {
     TOUCH_JOLT = 8,     /* a contact that taking back leads would close beyond what v does */
     TOUCH_CARRIED = 16, /* contacts that press on it, or that it might close by itself */
     TOUCH_MOVED = 32,   /* where it touches, it does not rest */
-    TOUCH_DIFFERS = 64  /* of the island again: a body of it has gravity or damping of its own (model/forces.h) */
+    TOUCH_DIFFERS = 64, /* of the island again: a body of it has gravity or damping of its own (model/forces.h) */
+    TOUCH_ROLLS = 128   /* of the body: a contact of it migrates (model/rolling.h); only where that is looked up */
 };
 
 enum lead_kind {
@@ -132,13 +133,20 @@ SADMM_INLINE bool lead_is_still(const double size[2], double dt, double slop)
     return dt * (size[0] + size[1]) <= LEAD_SLOP * slop / 2;
 }
 
-/* Of a point whose leads are not still, by its gap, the speed at which it opens, and what the leads of a and b add to
- * that. Each of two bodies may close half of what is left, whatever the other one does. */
-SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double speed, const double lead[2],
+/* A contact as the step moves it: its gap at the start, m, and the speed at which it opens, m/s. */
+struct lead_gap {
+    double start, speed;
+    bool rolls; /* it may stay as deep as it is (model/rolling.h) */
+};
+
+/* Of a point whose leads are not still, and what the leads of a and b add to its speed. Each of two bodies may close
+ * half of what is left, whatever the other one does. */
+SADMM_INLINE void lead_add_way(struct lead_touch *touch, struct lead_gap gap, const double lead[2],
                                const double size[2], double dt, double slop)
 {
-    const double end = gap + dt * speed,
-                 room = (end > 0 ? end : 0) + max_of(LEAD_SHARE * dt * (size[0] + size[1]), LEAD_SLOP * slop);
+    const double end = gap.start + dt * gap.speed, deep = gap.rolls && gap.start < 0 ? -gap.start : 0,
+                 room = (end > -deep ? end + deep : 0) +
+                        max_of(LEAD_SHARE * dt * (size[0] + size[1]), LEAD_SLOP * slop);
     if (dt * (lead[0] + lead[1]) > room) touch->island |= TOUCH_JOLT;
     SADMM_UNROLL
     for (int s = 0; s < 2; ++s)
@@ -146,12 +154,12 @@ SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double spee
 }
 
 /* Both. */
-SADMM_INLINE void lead_add_point(struct lead_touch *touch, double gap, double push, double speed, const double lead[2],
+SADMM_INLINE void lead_add_point(struct lead_touch *touch, struct lead_gap gap, double push, const double lead[2],
                                  const double size[2], const double moves[2], const double rest[2], double dt,
                                  double slop)
 {
     lead_add_push(touch, push, moves, rest);
-    if (!lead_is_still(size, dt, slop)) lead_add_way(touch, gap, speed, lead, size, dt, slop);
+    if (!lead_is_still(size, dt, slop)) lead_add_way(touch, gap, lead, size, dt, slop);
 }
 
 #endif

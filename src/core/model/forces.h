@@ -15,8 +15,9 @@
 
 #include <math.h>
 
+#include "core/math/lead.h"
 #include "core/math/rigid.h"
-#include "system.h"
+#include "rolling.h"
 
 #ifndef SADMM_REAL_IS_DOUBLE
 #error "forces.h is double only: do not include it in a source compiled per precision"
@@ -51,6 +52,12 @@ SADMM_INLINE double forces_gravity(const struct sadmm_rigid *body, const double 
 SADMM_INLINE bool forces_differ(const struct sadmm_rigid *body)
 {
     return body->gravity_scale != 1 || body->damping[0] > 0 || body->damping[1] > 0;
+}
+
+/* What a body brings to its island's bits (math/lead.h): leads of one that is stiff stay. */
+SADMM_INLINE int forces_touch(const struct sadmm_rigid *body)
+{
+    return (forces_differ(body) ? TOUCH_DIFFERS : 0) | (rolling_is_stiff(body) ? TOUCH_JOLT : 0);
 }
 
 /* What damping takes of the speed of a part in a step, as an acceleration. */

@@ -7,6 +7,7 @@
 #include "core/base/contact_set.h"
 #include "core/math/lead.h"
 #include "joint_law.h"
+#include "rolling.h"
 
 /* Of islands. */
 enum { ISLAND_JOINED = 1, ISLAND_LEADS_STAY = 2 };
@@ -33,24 +34,26 @@ SADMM_INLINE struct joint_lead joint_lead_of(const struct sadmm_rigid *rigid, co
 /* Of a pair of shapes in an island with joints, points with the solution's impulses: what one of them does; do leads
  * stay for what all of them do, since they would close a contact, or a body rests on one? */
 SADMM_INLINE void joint_contact_touches(const double normal[3], const struct sadmm_contact_point *point,
+                                        const struct sadmm_contact_migration *migration,
                                         const struct joint_lead bodies[2], const struct sadmm_settings *settings,
                                         struct lead_touch *touch)
 {
+    const struct rolling_halfway at = rolling_halfway_of(normal, point, migration);
     double speed = 0, lead[2], size[2], moves[2] = {0, 0}, rest[2] = {0, 0};
     int s;
     for (s = 0; s < 2; ++s) {
         const struct joint_lead *body = &bodies[s];
-        const double *arm = s ? point->arm_b : point->arm_a, sign = s ? 1 : -1;
-        speed += sign * lead_along(normal, body->velocity, arm);
-        lead[s] = sign * lead_along(normal, body->lead, arm);
+        const double *arm = s ? at.arm_b : at.arm_a, sign = s ? 1 : -1;
+        speed += sign * lead_along(at.normal, body->velocity, arm);
+        lead[s] = sign * lead_along(at.normal, body->lead, arm);
         size[s] = lead_size(body->lead, arm);
         if (!body->rigid) continue;
         moves[s] = lead_speed(body->rigid->velocity, body->velocity, arm);
         rest[s] = lead_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
                                   body->rigid->mass, settings->dt);
     }
-    lead_add_point(touch, point->gap, dot3(normal, point->impulse), speed, lead, size, moves, rest, settings->dt,
-                   settings->slop);
+    const struct lead_gap gap = {point->gap, speed, point->migrates};
+    lead_add_point(touch, gap, dot3(normal, point->impulse), lead, size, moves, rest, settings->dt, settings->slop);
 }
 SADMM_INLINE bool joint_contacts_hold(const struct lead_touch *touch, const struct joint_lead bodies[2])
 {

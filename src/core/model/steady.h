@@ -11,7 +11,7 @@
 #define SADMM_CORE_MODEL_STEADY_H
 
 #include "core/math/step.h"
-#include "system.h"
+#include "rolling.h"
 
 enum { STEADY_STEPS = 3 };
 /* Changes that differ by less than this share are the same. */
@@ -34,16 +34,29 @@ SADMM_INLINE void steady_start(const struct sadmm_rigid *body, const struct sadm
 /* Components of an orientation that was read and is set again: it is made a unit quaternion once more. */
 #define STEADY_ROUNDING (8 * DBL_EPSILON)
 
-/* A pose is set before the next step. The one that the body has already changes nothing. */
-SADMM_INLINE void steady_place(struct sadmm_steady *steady, const struct sadmm_rigid *body, const double position[3],
+/* A pose is set before the next step; false: the one that the body has already, which changes nothing. */
+SADMM_INLINE bool steady_place(struct sadmm_steady *steady, const struct sadmm_rigid *body, const double position[3],
                                const double orientation[4])
 {
     bool same = true;
     for (int k = 0; k < 3; ++k) same = same && position[k] == body->position[k];
     for (int k = 0; k < 4; ++k) same = same && fabs(orientation[k] - body->orientation[k]) <= STEADY_ROUNDING;
-    if (same) return;
+    if (same) return false;
     ++steady->placed;
     steady->streak[0] = steady->streak[1] = 0;
+    return true;
+}
+
+/* A state is set before the next step. */
+SADMM_INLINE void steady_set(struct sadmm_steady *steady, struct sadmm_rigid *body, const double position[3],
+                             const double orientation[4], const double velocity[6])
+{
+    bool other = steady_place(steady, body, position, orientation);
+    for (int k = 0; k < 6; ++k) other = other || velocity[k] != body->velocity[k];
+    if (other) rolling_forget(body);
+    for (int k = 0; k < 3; ++k) body->position[k] = position[k];
+    for (int k = 0; k < 4; ++k) body->orientation[k] = orientation[k];
+    for (int k = 0; k < 6; ++k) body->velocity[k] = velocity[k];
 }
 
 /* The step of length dt made `body` into `next`. */

@@ -14,6 +14,16 @@
 #error "system_math.h is double only: do not include it in a source compiled per precision"
 #endif
 
+/* Its inertia with dt^2 / 2 times its stiffness (rolling.h); b along with it: what is added resists changes alone. */
+SADMM_RARE sym3 sadmm_stiffened(const struct sadmm_rigid *body, double dt, sym3 I, double b[6])
+{
+    const double *k = body->stiffness, s = dt * dt / 2;
+    const sym3 more = {s * k[0], s * k[1], s * k[2], s * k[3], s * k[4], s * k[5]};
+    v3_store(v3_add(v3_load(b + 3), s3_mul(more, v3_load(body->velocity + 3))), b + 3);
+    I.xx += more.xx, I.yy += more.yy, I.zz += more.zz, I.xy += more.xy, I.xz += more.xz, I.yz += more.yz;
+    return I;
+}
+
 /* Eq. (1) of a rigid body: A = diag(m I, world inertia) and b = A v + dt (m g + f, tau) with the gyroscopic term inside
  * the angular momentum (math/rigid.h), and damping (forces.h). Returns the inertia; *mass: of A. */
 SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double *mass,
@@ -29,8 +39,10 @@ SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct 
         b[k] = body->mass * (linear.keep * body->velocity[k] + gained) + dt * body->wrench[k];
     }
     v3_store(v3_madd(v3_scale(momentum, angular.keep), dt, v3_load(body->wrench + 3)), b + 3);
+    for (int k = 0; k < 6; ++k) b[k] += body->owed[k];
     *mass = linear.mass * body->mass;
-    return rigid_world_inertia(q_matrix(q), v3_scale(inertia, angular.mass));
+    const sym3 I = rigid_world_inertia(q_matrix(q), v3_scale(inertia, angular.mass));
+    return rolling_is_stiff(body) ? sadmm_stiffened(body, dt, I, b) : I;
 }
 
 /* b of the motion less c, of a rigid body: b - A c. */

@@ -55,25 +55,28 @@ void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const doub
         out->moves_angular = lead_speed_part(bodies[i].velocity, velocity + 6 * i, 1);
         out->rest = lead_rest_speed(settings->gravity, bodies[i].gravity_scale, bodies[i].wrench, bodies[i].mass,
                                     settings->dt);
-        out->touch = forces_differ(&bodies[i]) ? TOUCH_DIFFERS : 0;
+        out->kind = LEAD_OWN;
+        out->touch = forces_touch(&bodies[i]);
     }
 }
 
-static void advance(const struct sadmm_rigid *body, const double velocity[6], const double lead[6], double dt,
+static void advance(const struct sadmm_rigid *body, const double velocity[6], const struct sadmm_lead *lead, double dt,
                     struct sadmm_rigid *next)
 {
     double mean[6];
-    for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - lead[k];
+    for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - lead->lead[k];
     const vec3 position = rigid_move(v3_load(body->position), v3_load(mean), dt);
     const quat orientation = rigid_turn(q_load(body->orientation), v3_load(mean + 3), dt);
     *next = *body;
     v3_store(position, next->position);
     q_store(orientation, next->orientation);
     memcpy(next->velocity, velocity, sizeof next->velocity);
+    rolling_forget(next);
+    next->mean = lead->kind == LEAD_OWN;
 }
 
 void sadmm_advance(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
                    const struct sadmm_lead *leads, double dt, struct sadmm_rigid *next)
 {
-    for (size_t i = 0; i < count; ++i) advance(&bodies[i], velocity + 6 * i, leads[i].lead, dt, &next[i]);
+    for (size_t i = 0; i < count; ++i) advance(&bodies[i], velocity + 6 * i, &leads[i], dt, &next[i]);
 }

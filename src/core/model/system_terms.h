@@ -2,6 +2,7 @@
 #ifndef SADMM_CORE_MODEL_SYSTEM_TERMS_H
 #define SADMM_CORE_MODEL_SYSTEM_TERMS_H
 
+#include "core/math/lead.h"
 #include "system.h"
 
 /* A (count x PACKED6: lower triangles) and b (count x 6) of eq. (1), of bodies [first, first + count). */
@@ -21,7 +22,8 @@ struct sadmm_lead {
     double linear, angular;             /* size3 of its parts */
     double moves_linear, moves_angular; /* lead_speed_part: m/s, rad/s */
     double rest;                        /* lead_rest_speed, m/s */
-    int touch;                          /* TOUCH_DIFFERS, or 0 */
+    enum lead_kind kind;                /* what becomes of it: LEAD_OWN, until contacts are known */
+    int touch;                          /* forces_touch (forces.h) */
 };
 
 /* Leads of `count` bodies, each by itself, which end the step with `velocity` (count x 6). */

@@ -287,11 +287,10 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     TRY(sadmm_world_check_body_state(body, state, orientation, error));
     /* A static body is part of what the backend was given once. */
     if (!sadmm_body_moves(body->system_body)) TRY(sadmm_world_take_back(world));
-    steady_place(&body->steady, &body->rigid, state->position, orientation);
-    memcpy(body->rigid.position, state->position, sizeof state->position);
-    memcpy(body->rigid.orientation, orientation, sizeof orientation);
-    memcpy(body->rigid.velocity, state->linear_velocity, sizeof state->linear_velocity);
-    memcpy(body->rigid.velocity + 3, state->angular_velocity, sizeof state->angular_velocity);
+    double velocity[6];
+    memcpy(velocity, state->linear_velocity, sizeof state->linear_velocity);
+    memcpy(velocity + 3, state->angular_velocity, sizeof state->angular_velocity);
+    steady_set(&body->steady, &body->rigid, state->position, orientation, velocity);
     sadmm_world_moved(world);
     sadmm_world_edit(world, body, SADMM_EDIT_STATE);
     if (body->target.set) sadmm_world_edit(world, body, SADMM_EDIT_TARGET);

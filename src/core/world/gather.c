@@ -25,6 +25,7 @@ static void place(struct sadmm_collision_body *out, const struct sadmm_rigid *ri
     memcpy(out->orientation, rigid->orientation, sizeof out->orientation);
     memcpy(out->velocity, rigid->velocity, sizeof out->velocity);
     out->acceleration[0] = out->acceleration[1] = out->inertia = 0;
+    out->mean = dynamic ? rigid->mean : 1;
     if (!dynamic) return;
     out->acceleration[0] = forces_acceleration(rigid, settings->gravity, settings->dt);
     out->acceleration[1] = forces_angular_acceleration(rigid, settings->dt);

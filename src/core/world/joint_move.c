@@ -47,7 +47,9 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
         const struct joint_lead bodies[2] = {lead_of(world, pair->body_a), lead_of(world, pair->body_b)};
         struct lead_touch touch = {0, {0, 0}};
         for (int32_t p = pair->first; p < pair->first + pair->count; ++p)
-            joint_contact_touches(pair->normal, &contacts->points[p], bodies, settings, &touch);
+            joint_contact_touches(pair->normal, &contacts->points[p],
+                                  sadmm_migration_of(contacts->points, contacts->migrations, p), bodies, settings,
+                                  &touch);
         if (sadmm_pair_is_driven(system, pair) || joint_contacts_hold(&touch, bodies)) *island |= ISLAND_LEADS_STAY;
     }
 }
@@ -63,9 +65,10 @@ sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *s
     for (size_t i = 0; i < n; ++i) {
         const uint8_t island = world->joint_touch[world->joint_labels[i]];
         struct sadmm_rigid *next = &world->next[i];
-        if (island & ISLAND_JOINED)
-            joint_move(&world->start.rigid[i], world->velocity + 6 * i, island & ISLAND_LEADS_STAY, settings->dt,
-                       next->position, next->orientation, next->velocity);
+        if (!(island & ISLAND_JOINED)) continue;
+        next->mean = !(island & ISLAND_LEADS_STAY);
+        joint_move(&world->start.rigid[i], world->velocity + 6 * i, island & ISLAND_LEADS_STAY, settings->dt,
+                   next->position, next->orientation, next->velocity);
     }
     for (size_t k = 0; k < system.rows->constraint_count; ++k) {
         const struct sadmm_row_constraint *constraint = &system.rows->constraints[k];

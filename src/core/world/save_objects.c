@@ -11,7 +11,7 @@
 /* A member that is added has to be listed below. */
 #define LISTED(type, size) _Static_assert(sizeof(type) == (size), #type " has other members than the list of a saved world")
 LISTED(sadmm_settings, 168);
-LISTED(struct sadmm_rigid, 208);
+LISTED(struct sadmm_rigid, 320);
 LISTED(struct sadmm_steady, 72);
 LISTED(sadmm_joint_coordinate, 112);
 LISTED(sadmm_joint_def, 840);
@@ -114,6 +114,7 @@ static bool body_fits(const sadmm_world *world, const struct sadmm_world_body *b
         (!sadmm_all_finite(body->target.position, 3) ||
          sadmm_check_orientation("orientation", body->target.orientation, ignored, error) != SADMM_OK))
         return false;
+    if (!sadmm_all_finite(rigid->owed, 6) || !sadmm_all_finite(rigid->stiffness, 6)) return false;
     return sadmm_all_finite(&rigid->gravity_scale, 1) && sadmm_all_finite(rigid->damping, 2) && sadmm_all_finite(body->steady.change, 6) &&
            body->steady.dt >= 0 && sadmm_all_finite(&body->steady.dt, 1) && body->steady.streak[0] >= 0 &&
            body->steady.streak[1] >= 0 && sadmm_all_finite(body->contact_wrench, 6);

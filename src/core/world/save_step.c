@@ -26,6 +26,12 @@ static bool child_fits(const sadmm_world *world, const struct sadmm_contact_pair
     return (int64_t)pair->child < sadmm_mesh_triangle_count(world->block_shapes[pair->shape_b].mesh);
 }
 
+static bool migration_fits(const struct sadmm_contact_migration *m)
+{
+    return sadmm_all_finite(m->normal, 3) && sadmm_all_finite(m->arm_a, 3) && sadmm_all_finite(m->arm_b, 3) &&
+           m->radius >= 0 && isfinite(m->radius);
+}
+
 static bool contacts_fit(const sadmm_world *world)
 {
     const struct sadmm_contact_set *set = &world->contacts;
@@ -49,10 +55,26 @@ static bool contacts_fit(const sadmm_world *world)
     for (size_t k = 0; k < points; ++k) {
         const struct sadmm_contact_point *point = &set->points[k];
         if (!sadmm_all_finite(point->impulse, 3) || !sadmm_all_finite(point->arm_a, 3) || !sadmm_all_finite(point->arm_b, 3) ||
-            !isfinite(point->gap) || !isfinite(point->error))
+            !isfinite(point->gap) || !isfinite(point->error) || point->migrates > 1 ||
+            (point->migrates && !migration_fits(&set->migrations[k])))
             return false;
     }
     return set->dt >= 0 && isfinite(set->dt);
+}
+
+/* Of the points that have one. */
+static void archive_migrations(struct sadmm_archive *archive, struct sadmm_contact_set *set)
+{
+    if (archive->reading && archive->status == SADMM_OK) {
+        set->migrating = 0;
+        for (size_t k = 0; k < set->point_count; ++k) set->migrating += set->points[k].migrates != 0;
+        if (set->migrating > 0 && !sadmm_contact_set_reserve_migrations(set, set->point_count)) {
+            archive->status = sadmm_fail_memory(archive->error, "the state of a world");
+            return;
+        }
+    }
+    for (size_t k = 0; k < set->point_count && archive->status == SADMM_OK; ++k)
+        if (set->points[k].migrates) SADMM_ARCHIVE(archive, set->migrations[k]);
 }
 
 static void archive_contacts(struct sadmm_archive *archive, sadmm_world *world)
@@ -62,6 +84,7 @@ static void archive_contacts(struct sadmm_archive *archive, sadmm_world *world)
     sadmm_archive_array(archive, &set->pairs, &set->pair_count, &set->pair_capacity, sizeof *set->pairs, INT32_MAX);
     sadmm_archive_array(archive, &set->points, &set->point_count, &set->point_capacity, sizeof *set->points, INT32_MAX);
     SADMM_ARCHIVE(archive, set->dt);
+    archive_migrations(archive, set);
     if (archive->reading && archive->status == SADMM_OK)
         sadmm_archive_expect(archive, contacts_fit(world), "contacts");
 }

@@ -210,6 +210,38 @@ static void add_substep(struct host_step *step)
     if (!sadmm_stages_in_last_substep(&step->stages) && above > step->islands_above) step->islands_above = above;
 }
 
+/* A contact that rolls, to what a body takes along into the next step. */
+static void keep_rolling(sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t k, double dt)
+{
+    const struct sadmm_contact_point *point = &world->contacts.points[k];
+    const struct sadmm_contact_migration *migration = &world->contacts.migrations[k];
+    const struct rolling_halfway at = rolling_halfway_of(pair->normal, point, migration);
+    const double push = sadmm_normal_impulse(pair, point);
+    const int32_t body[2] = {pair->body_a, pair->body_b};
+    for (int s = 0; s < 2; ++s) {
+        if (body[s] < 0) continue;
+        struct sadmm_rigid *next = &world->next[body[s]];
+        const double *arm = s ? point->arm_b : point->arm_a;
+        rolling_owe(pair->normal, arm, at.normal, s ? at.arm_b : at.arm_a, point->impulse, s ? 1 : -1, next->owed);
+        rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->gap), migration->radius, push, dt,
+                        next->stiffness);
+    }
+}
+
+static void keep_rolling_contacts(sadmm_world *world, double dt)
+{
+    const struct sadmm_contact_set *contacts = &world->contacts;
+    if (contacts->migrating == 0) return;
+    for (size_t p = 0; p < contacts->pair_count; ++p)
+        for (int32_t k = contacts->pairs[p].first; k < contacts->pairs[p].first + contacts->pairs[p].count; ++k)
+            if (contacts->points[k].migrates) keep_rolling(world, &contacts->pairs[p], k, dt);
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        struct sadmm_rigid *next = &world->next[i];
+        rolling_moved(world->start.rigid[i].position, next->position, next->owed);
+        rolling_judge(next->inertia, dt, next->stiffness);
+    }
+}
+
 static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage *stage)
 {
     sadmm_status status = sadmm_solve_stage(&step->solve, &step->stages, stage);
@@ -229,8 +261,21 @@ static sadmm_status integrate(struct host_step *step)
     }
     TRY(sadmm_world_move_driven(world, &step->settings));
     sadmm_world_move_targets(world, step->settings.dt);
+    keep_rolling_contacts(world, step->settings.dt);
     add_substep(step);
     return check_next(world);
+}
+
+static sadmm_status find_wrenches(const struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    sadmm_world_add_driven_wrenches(world, &step->settings);
+    if (step->direct == 0) TRY(world->kernels->recover_wrenches(world->context, world->wrench, &world->error));
+    else sadmm_world_find_wrenches(world, &step->settings); /* by impulses that the backend has not */
+    for (size_t i = 0; i < (size_t)world->dynamic_count; ++i)
+        for (int k = 0; k < 6; ++k)
+            world->wrench[6 * i + (size_t)k] += rolling_wrench(&world->start.rigid[i], step->settings.dt, k);
+    return SADMM_OK;
 }
 
 static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *stage)
@@ -241,12 +286,7 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     case SADMM_STAGE_FIND: return find_contacts(world, step->stages.substep);
     case SADMM_STAGE_PLAN: return make_plan(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
-    case SADMM_STAGE_WRENCHES:
-        sadmm_world_add_driven_wrenches(world, &step->settings);
-        if (step->direct == 0)
-            return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
-        sadmm_world_find_wrenches(world, &step->settings); /* by impulses that the backend has not */
-        return SADMM_OK;
+    case SADMM_STAGE_WRENCHES: return find_wrenches(step);
     case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;
     case SADMM_STAGE_CERTIFY:
         step->system.carried = NULL;
