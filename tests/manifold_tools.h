@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/math/array3.h"
 #include "collision/bounds.h"
 #include "collision/pair_manifold.h"
 
@@ -85,8 +86,6 @@ static inline void apply(const double R[9], const double v[3], double out[3])
     for (int i = 0; i < 3; ++i) t[i] = R[3 * i] * v[0] + R[3 * i + 1] * v[1] + R[3 * i + 2] * v[2];
     memcpy(out, t, sizeof t);
 }
-
-static inline double dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 static inline double thickness_of(const struct solid *s)
 {

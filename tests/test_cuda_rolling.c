@@ -13,11 +13,11 @@ static sadmm_world *new_world(int precision, bool device)
     return world;
 }
 
-/* The device's energy after a second is the host's, to what both round: 1e-9 in double, 1e-5 in single precision; by the
- * queue and by the host's stages the same bits. */
+/* The device's energy after a second is the host's, to what both round: 1e-9 in double; in single precision 1e-4, some
+ * 400 steps of velocities rounded to 6e-8 each, in phase. By the queue and by the host's stages the same bits. */
 START_TEST(rocking_is_the_hosts)
 {
-    const double tolerance = _i ? 1e-9 : 1e-5, seconds = EMULATED ? 0.4 : 2;
+    const double tolerance = _i ? 1e-9 : 1e-4, seconds = EMULATED ? 0.4 : 2;
     for (int kind = 0; kind < ROLL_SHAPES; ++kind) {
         const double friction = kind % 2 ? 0 : 10;
         uint64_t hash[2];

@@ -22,7 +22,7 @@ struct sadmm_proxy {
     double friction, restitution;
     int32_t body, system_body;
     uint32_t revision, placed;
-    int32_t mean, reserved; /* of the body */
+    int32_t mean, reserved[3]; /* of the body; whole pieces of 16 bytes */
 };
 
 /* How a shape is turned ahead. */
@@ -86,7 +86,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     p->revision = shape->revision;
     p->placed = body->placed;
     p->mean = body->mean;
-    p->reserved = 0;
+    for (i = 0; i < 3; ++i) p->reserved[i] = 0;
     if (geometry->type != SADMM_SHAPE_PLANE) proxy_box(p, dt, margin, gravity, box);
 }
 
