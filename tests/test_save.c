@@ -235,6 +235,38 @@ START_TEST(what_was_changed_is_kept)
 }
 END_TEST
 
+/* A body that no step has seen; a target that its velocity has carried beyond where one may be set; bodies beyond where a
+ * length may be taken from them. (Any calls: test_save_calls.c.) */
+START_TEST(whatever_can_be_reached_is_restored)
+{
+    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world *world = create_world(&def);
+    sadmm_coupling_def pull = sadmm_coupling_def_default();
+    sadmm_joint_def distance = sadmm_joint_def_default();
+    const sadmm_body_id first = add_ball(world, 0, 0.1, "");
+    pull.body = first;
+    pull.target_velocity[0] = 1e9;
+    MUST(world, sadmm_world_add_coupling(world, &pull, NULL));
+    step_world(world, 300); /* 1.5e9 m */
+    sadmm_body_state state = body_state(world, add_ball(world, 1, 0.1, ""));
+    const sadmm_body_id far = add_ball(world, 2, 0.1, "");
+    state.position[0] = 3e9;
+    MUST(world, sadmm_world_set_body_state(world, far, &state));
+    distance.kind = SADMM_JOINT_DISTANCE;
+    distance.body_a = first, distance.body_b = far;
+    ck_assert_int_eq(sadmm_world_add_joint(world, &distance, NULL), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), "def->length (-1: as it is) = 3e+09: must be in [0, 1e+09]"));
+    struct saved saved = save_world(world);
+    sadmm_world *other = restored(&saved);
+    step_world(world, 3);
+    step_world(other, 3);
+    expect_same(world, other, "after more steps");
+    free(saved.bytes);
+    sadmm_world_destroy(world);
+    sadmm_world_destroy(other);
+}
+END_TEST
+
 /* ---- another process --------------------------------------------------------------------------------------------- */
 
 static const char *program;
@@ -362,6 +394,7 @@ int main(int argc, char **argv)
     tcase_add_test(cases, a_world_before_its_first_step);
     tcase_add_test(cases, ten_thousand_steps);
     tcase_add_test(cases, what_was_changed_is_kept);
+    tcase_add_test(cases, whatever_can_be_reached_is_restored);
     tcase_add_test(cases, another_process_goes_on);
     tcase_add_test(cases, what_was_not_saved_is_refused);
     tcase_add_test(cases, without_memory_nothing_changes);

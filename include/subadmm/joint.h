@@ -87,8 +87,8 @@ typedef struct sadmm_joint_def {
                                     identity */
     double position_b[3];        /* the same of b */
     double orientation_b[4];
-    double length;               /* DISTANCE and LINK: m, in [0, 1e9], or -1: the distance when the joint is added (what
-                                    is read back); default -1 */
+    double length;               /* DISTANCE and LINK: m, in [0, 1e9], or -1: the distance when the joint is added (in
+                                    that range; what is read back); default -1 */
     bool collide;                /* do the two bodies meet each other? Default false. (With a static body only that one
                                     is left out; the static world is no body and leaves none out) */
     bool enabled;                /* default true. A joint that is not does nothing, but for `collide` */

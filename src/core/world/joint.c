@@ -259,7 +259,10 @@ sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *de
     TRY(sadmm_world_take_back(world));
     q_store(made.frame[0].orientation, made.def.orientation_a);
     q_store(made.frame[1].orientation, made.def.orientation_b);
-    if (def->length == -1 && joint_is_radial(def->kind)) made.def.length = geometry_now(world, &made).value[0];
+    if (def->length == -1 && joint_is_radial(def->kind)) {
+        made.def.length = geometry_now(world, &made).value[0];
+        TRY(sadmm_check_range("def->length (-1: as it is)", made.def.length, 0, FRAME_LIMIT, error));
+    }
     TRY(sadmm_world_insert_joint(world, &made, &slot));
     if (id) {
         id->slot = (uint32_t)slot + 1;

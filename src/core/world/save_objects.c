@@ -502,18 +502,23 @@ static void archive_gears(struct sadmm_archive *archive, sadmm_world *world)
     for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot) archive_gear(archive, world, slot);
 }
 
+/* A target moves on by its velocity, beyond where one may be set. */
+static bool target_fits(const struct sadmm_rigid *target, struct sadmm_error *error)
+{
+    double ignored[4];
+    return sadmm_all_finite(target->position, 3) && sadmm_all_finite(target->velocity, 6) &&
+           sadmm_check_orientation("orientation", target->orientation, ignored, error) == SADMM_OK;
+}
+
 static bool coupling_fits(const sadmm_world *world, size_t slot, struct sadmm_error *error)
 {
     const struct sadmm_world_coupling *coupling = &world->couplings[slot];
-    const struct sadmm_rigid *target = &coupling->last.target;
-    struct sadmm_rigid ignored;
     if (coupling->joint >= world->joint_slots) return false;
     const struct sadmm_world_joint *joint = &world->joints[coupling->joint];
     return joint->alive && joint->coupling == (int32_t)slot + 1 && joint->body[0] == -1 &&
            side_fits(world, joint->body[1], coupling->def.body) &&
            sadmm_world_check_coupling(&coupling->def, error) == SADMM_OK &&
-           sadmm_world_check_target(target->position, target->orientation, target->velocity, &ignored, error) == SADMM_OK &&
-           sadmm_all_finite(coupling->last.felt, 6) && sadmm_all_finite(coupling->last.body, 6);
+           target_fits(&coupling->last.target, error) && sadmm_all_finite(coupling->last.felt, 6) && sadmm_all_finite(coupling->last.body, 6);
 }
 
 static void archive_coupling(struct sadmm_archive *archive, sadmm_world *world, size_t slot)
