@@ -91,8 +91,8 @@ static void free_writer(struct sadmm_writer *w)
     sadmm_free(w->joint_slots.slots);
     sadmm_free(w->shape_place);
     sadmm_free(w->shape_body);
-    sadmm_free((void *)w->hull_list.list);
-    sadmm_free((void *)w->mesh_list.list);
+    sadmm_key_tree_free(&w->hull_numbers);
+    sadmm_key_tree_free(&w->mesh_numbers);
 }
 
 /* ---- bodies and shapes ------------------------------------------------------------------------------------------- */

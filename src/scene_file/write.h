@@ -2,6 +2,7 @@
 #ifndef SADMM_SCENE_FILE_WRITE_H
 #define SADMM_SCENE_FILE_WRITE_H
 
+#include "core/base/key_tree.h"
 #include "fields.h"
 #include "scene_file.h"
 
@@ -11,11 +12,6 @@ struct sadmm_slot_list {
     size_t count;
 };
 
-/* What has been written of hulls, or of meshes: each once. */
-struct sadmm_form_list {
-    const void **list;
-    size_t count, capacity;
-};
 
 struct sadmm_writer {
     sadmm_world *world;
@@ -24,7 +20,7 @@ struct sadmm_writer {
     struct sadmm_slot_list body_slots, shape_slots, joint_slots;
     size_t *shape_place; /* by the number of a shape: its place in its body's list */
     int32_t *shape_body;
-    struct sadmm_form_list hull_list, mesh_list;
+    struct sadmm_key_tree hull_numbers, mesh_numbers; /* by address: of those that have been written, each once */
     bool complete; /* no value was lost for want of memory */
     struct sadmm_error *error;
 };

@@ -3,20 +3,15 @@
 #include "write.h"
 
 /* *known: it was there. OUT_OF_MEMORY. */
-static sadmm_status number_of(struct sadmm_writer *w, struct sadmm_form_list *forms, const void *form, bool *known,
+static sadmm_status number_of(struct sadmm_writer *w, struct sadmm_key_tree *numbers, const void *form, bool *known,
                               json_int_t *number)
 {
-    *known = true;
-    for (size_t k = forms->count; k-- > 0;) /* the next shape mostly has the form of the last one */
-        if (forms->list[k] == form) {
-            *number = (json_int_t)k;
-            return SADMM_OK;
-        }
-    if (!sadmm_grow(&forms->list, &forms->capacity, forms->count, forms->count + 1, sizeof *forms->list))
-        return sadmm_fail_memory(w->error, "a list of hulls or meshes");
-    *known = false;
-    *number = (json_int_t)forms->count;
-    forms->list[forms->count++] = form;
+    const double *found = sadmm_key_tree_find(numbers, (uintptr_t)form);
+    *known = found != NULL;
+    *number = found ? (json_int_t)*found : (json_int_t)sadmm_key_tree_count(numbers);
+    if (found) return SADMM_OK;
+    if (!sadmm_key_tree_reserve(numbers)) return sadmm_fail_memory(w->error, "a list of hulls or meshes");
+    sadmm_key_tree_set(numbers, (uintptr_t)form, (double)*number);
     return SADMM_OK;
 }
 
@@ -25,7 +20,7 @@ sadmm_status sadmm_write_hull(struct sadmm_writer *w, const sadmm_hull *hull, js
     const sadmm_hull_def def = {.merge = sadmm_hull_merge(hull), .rounding = sadmm_hull_rounding(hull)};
     const double *vertices = sadmm_hull_vertices(hull);
     bool known;
-    TRY(number_of(w, &w->hull_list, hull, &known, number));
+    TRY(number_of(w, &w->hull_numbers, hull, &known, number));
     if (known) return SADMM_OK;
     json_t *points = sadmm_put(w, sadmm_append_object(w, w->hulls, &sadmm_hull_fields, &def), "points", json_array());
     for (int32_t v = 0; v < sadmm_hull_vertex_count(hull); ++v)
@@ -79,7 +74,7 @@ sadmm_status sadmm_write_mesh(struct sadmm_writer *w, const sadmm_mesh *mesh, js
     int32_t columns = 0, rows = 0;
     double spacing[2];
     bool known;
-    TRY(number_of(w, &w->mesh_list, mesh, &known, number));
+    TRY(number_of(w, &w->mesh_numbers, mesh, &known, number));
     if (known) return SADMM_OK;
     json_t *object = sadmm_append(w, w->meshes, json_object());
     sadmm_mesh_grid(mesh, &columns, &rows, spacing);

@@ -6,21 +6,11 @@
 #include "collision/mesh_data.h"
 #include "core/base/memory.h"
 
-/* Where an owner is in the list, or belongs. */
-static size_t place_of(const struct sadmm_block_pool *pool, const void *owner)
+/* Of an owner; NULL: it has no block here. */
+static struct sadmm_pooled_block *find(const struct sadmm_block_pool *pool, const void *owner)
 {
-    size_t low = 0, high = pool->count;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if ((uintptr_t)pool->pooled[middle].of.owner < (uintptr_t)owner) low = middle + 1;
-        else high = middle;
-    }
-    return low;
-}
-
-static bool has_at(const struct sadmm_block_pool *pool, size_t place, const void *owner)
-{
-    return place < pool->count && pool->pooled[place].of.owner == owner;
+    const double *place = sadmm_key_tree_find(&pool->places, (uintptr_t)owner);
+    return place ? &pool->pooled[(size_t)*place] : NULL;
 }
 
 /* Room for `end` doubles, and the first blocks. */
@@ -35,25 +25,26 @@ static sadmm_status reserve(struct sadmm_block_pool *pool, size_t end, struct sa
 sadmm_status sadmm_block_pool_add(struct sadmm_block_pool *pool, const struct sadmm_block_owner *of, uint32_t *offset,
                                   struct sadmm_error *error)
 {
-    const size_t place = place_of(pool, of->owner);
-    if (!has_at(pool, place, of->owner)) {
+    struct sadmm_pooled_block *pooled = find(pool, of->owner);
+    if (!pooled) {
         const size_t begin = pool->doubles > 0 ? pool->doubles : HULL_FIRST_OWN, end = begin + of->doubles;
         if (end > INT32_MAX)
             return sadmm_fail(error, SADMM_ERROR_LIMIT, "hulls and meshes of %zu numbers: a world has room for 2^31",
                               end);
-        if (!sadmm_grow(&pool->pooled, &pool->capacity, pool->count, pool->count + 1, sizeof *pool->pooled))
+        if (!sadmm_grow(&pool->pooled, &pool->capacity, pool->count, pool->count + 1, sizeof *pool->pooled) ||
+            !sadmm_key_tree_reserve(&pool->places))
             return sadmm_fail_memory(error, "the hull or mesh of a shape");
         TRY(reserve(pool, end, error));
         memcpy(pool->blocks + begin, of->block, of->doubles * sizeof *pool->blocks);
-        memmove(pool->pooled + place + 1, pool->pooled + place, (pool->count - place) * sizeof *pool->pooled);
-        pool->pooled[place] = (struct sadmm_pooled_block){.of = *of, .offset = (uint32_t)begin};
-        ++pool->count;
+        sadmm_key_tree_set(&pool->places, (uintptr_t)of->owner, (double)pool->count);
+        pooled = &pool->pooled[pool->count++];
+        *pooled = (struct sadmm_pooled_block){.of = *of, .offset = (uint32_t)begin};
         pool->doubles = end;
         ++pool->revision;
         of->retain(of->owner);
     }
-    ++pool->pooled[place].uses;
-    *offset = pool->pooled[place].offset;
+    ++pooled->uses;
+    *offset = pooled->offset;
     return SADMM_OK;
 }
 
@@ -100,7 +91,7 @@ static void close_gaps(struct sadmm_block_pool *pool, struct sadmm_geometry *geo
     const size_t end = pool->count > 0 ? assign_offsets(pool) : pool->holds > 0 ? HULL_FIRST_OWN : 0;
     for (size_t k = 0; k < pool->count; ++k)
         pool->pooled[k].offset = (uint32_t)header_at(pool, pool->pooled[k].offset)->reserved;
-    for (size_t k = 0; k < geometry_count && end > 0; ++k)
+    for (size_t k = 0; k < geometry_count && pool->count > 0; ++k)
         if (geometries[k].hull >= HULL_FIRST_OWN)
             geometries[k].hull = (uint32_t)header_at(pool, geometries[k].hull)->reserved;
     if (pool->count > 0) move_blocks(pool);
@@ -112,14 +103,17 @@ static void close_gaps(struct sadmm_block_pool *pool, struct sadmm_geometry *geo
 void sadmm_block_pool_remove(struct sadmm_block_pool *pool, const void *owner, struct sadmm_geometry *geometries,
                              size_t geometry_count)
 {
-    const size_t place = place_of(pool, owner);
-    if (!has_at(pool, place, owner) || --pool->pooled[place].uses > 0) return;
-    const struct sadmm_block_owner gone = pool->pooled[place].of;
-    --pool->count;
-    memmove(pool->pooled + place, pool->pooled + place + 1, (pool->count - place) * sizeof *pool->pooled);
+    struct sadmm_pooled_block *pooled = find(pool, owner);
+    if (!pooled || --pooled->uses > 0) return;
+    const struct sadmm_block_owner gone = pooled->of;
+    sadmm_key_tree_remove(&pool->places, (uintptr_t)owner);
+    *pooled = pool->pooled[--pool->count]; /* the last one takes its place */
+    double *place = sadmm_key_tree_find(&pool->places, (uintptr_t)pooled->of.owner);
+    if (place) *place = (double)(pooled - pool->pooled);
     pool->unused += gone.doubles;
     gone.release(gone.owner);
-    if (pool->count == 0 || 2 * pool->unused > pool->doubles) close_gaps(pool, geometries, geometry_count);
+    if (pool->count == 0 || (2 * pool->unused > pool->doubles && pool->unused >= geometry_count))
+        close_gaps(pool, geometries, geometry_count);
 }
 
 sadmm_status sadmm_block_pool_hold(struct sadmm_block_pool *pool, struct sadmm_error *error)
@@ -143,6 +137,7 @@ void sadmm_block_pool_let_go(struct sadmm_block_pool *pool)
 void sadmm_block_pool_free(struct sadmm_block_pool *pool)
 {
     for (size_t k = 0; k < pool->count; ++k) pool->pooled[k].of.release(pool->pooled[k].of.owner);
+    sadmm_key_tree_free(&pool->places);
     sadmm_free(pool->pooled);
     sadmm_free(pool->blocks);
     memset(pool, 0, sizeof *pool);

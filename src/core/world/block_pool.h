@@ -8,6 +8,7 @@
 
 #include "collision/collision.h"
 #include "core/base/error.h"
+#include "core/base/key_tree.h"
 
 /* A hull or a mesh: whose block it is, and how the pool holds on to it. */
 struct sadmm_block_owner {
@@ -24,8 +25,9 @@ struct sadmm_pooled_block {
 };
 
 struct sadmm_block_pool {
-    struct sadmm_pooled_block *pooled; /* by the owner's address, so that they are found */
+    struct sadmm_pooled_block *pooled; /* in any order */
     size_t count, capacity;
+    struct sadmm_key_tree places;    /* by the owner's address: where it is among them */
     double *blocks;                  /* in the order in which they came; none of them without an owner or a hold */
     size_t doubles, block_capacity;
     size_t unused;                   /* doubles of what is gone */
@@ -37,7 +39,7 @@ struct sadmm_block_pool {
  * changes. */
 sadmm_status sadmm_block_pool_add(struct sadmm_block_pool *pool, const struct sadmm_block_owner *of, uint32_t *offset,
                                   struct sadmm_error *error);
-/* One less. Where more than half of the pool is unused then, blocks move, and the offsets of those of `geometries` that
+/* One less. Where more than half of the pool is unused then, and as many numbers as there are geometries, blocks move, and the offsets of those of `geometries` that
  * have one with them; one that is no more has offset 0. */
 void sadmm_block_pool_remove(struct sadmm_block_pool *pool, const void *owner, struct sadmm_geometry *geometries,
                              size_t geometry_count);

@@ -110,18 +110,6 @@ static sadmm_status check_def(const sadmm_body_def *def, sadmm_precision precisi
     return SADMM_OK;
 }
 
-static bool alive(const sadmm_world *world, size_t slot)
-{
-    return world->bodies[slot].alive;
-}
-
-/* The lowest dead slot, or a new one. */
-static size_t free_slot(sadmm_world *world)
-{
-    if ((size_t)world->body_count == world->body_slots) return world->body_slots;
-    return sadmm_slot_free(&world->body_marks, world, alive);
-}
-
 /* A copy of `given`, cut to the characters that fit. */
 static sadmm_status copy_name(const char *given, char **name, struct sadmm_error *error)
 {
@@ -147,16 +135,13 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     TRY(sadmm_check_given(id, "id", error));
     TRY(check_def(def, world->def.precision, orientation, error));
     TRY(sadmm_world_take_back(world));
-    size_t slot = free_slot(world);
+    const size_t slot = sadmm_slots_free(&world->bodies_taken);
     if (slot >= (size_t)1 << 27)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: a world holds at most 2^27", world->body_count);
-    if (!sadmm_grow(&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies))
+    if (!sadmm_grow(&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies) ||
+        !sadmm_slots_reserve(&world->bodies_taken, slot + 1))
         return sadmm_fail_memory(error, "a body");
     TRY(copy_name(def->name, &name, error));
-    if (def->type == SADMM_BODY_KINEMATIC && !sadmm_world_add_driven(world, (int32_t)slot)) {
-        sadmm_free(name);
-        return sadmm_fail_memory(error, "a body");
-    }
 
     struct sadmm_world_body *body = &world->bodies[slot];
     uint32_t generation = slot < world->body_slots ? body->generation : 1;
@@ -181,8 +166,9 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
     body->name = name;
     if (slot == world->body_slots) ++world->body_slots;
-    sadmm_slot_taken(&world->body_marks, slot);
+    sadmm_slots_take(&world->bodies_taken, slot);
     ++world->body_count;
+    if (def->type == SADMM_BODY_KINEMATIC) sadmm_world_count_driven(world, 1);
     id->slot = (uint32_t)slot + 1;
     id->generation = generation;
     return SADMM_OK;
@@ -194,8 +180,7 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", &world->error);
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_world_take_back(world));
-    for (size_t s = body->first_shape; body->shape_count > 0; ++s)
-        if (world->shapes[s].alive && world->shapes[s].body == (int32_t)id.slot - 1) sadmm_world_kill_shape(world, s);
+    while (body->first_shape) sadmm_world_kill_shape(world, body->first_shape - 1);
     sadmm_world_kill_joints_of(world, (int32_t)id.slot - 1);
     sadmm_pair_table_forget(&world->disabled_pairs, id.slot - 1);
     sadmm_free(body->name);
@@ -203,9 +188,9 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     body->alive = false;
     ++body->generation;
     --world->body_count;
-    sadmm_slot_freed(&world->body_marks, id.slot - 1);
+    sadmm_slots_release(&world->bodies_taken, id.slot - 1);
     if (body->type == SADMM_BODY_DYNAMIC) --world->dynamic_count;
-    if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_remove_driven(world, (int32_t)id.slot - 1);
+    if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_count_driven(world, -1);
     world->contacts_readable = false;
     return SADMM_OK;
 }
@@ -223,9 +208,7 @@ sadmm_status sadmm_world_body_at(sadmm_world *world, int32_t index, sadmm_body_i
     if (index < 0 || index >= world->body_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
                           world->body_count);
-    size_t slot = (size_t)index;
-    if ((size_t)world->body_count < world->body_slots)
-        slot = sadmm_slot_at(&world->body_marks, index, world, alive);
+    const size_t slot = sadmm_slots_at(&world->bodies_taken, index);
     id->slot = (uint32_t)slot + 1;
     id->generation = world->bodies[slot].generation;
     return SADMM_OK;
@@ -236,9 +219,7 @@ sadmm_status sadmm_world_body_index(sadmm_world *world, sadmm_body_id id, int32_
     TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_body(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(index, "index", &world->error));
-    *index = (int32_t)id.slot - 1;
-    if ((size_t)world->body_count < world->body_slots)
-        *index = sadmm_slot_index(&world->body_marks, id.slot - 1, world, alive);
+    *index = sadmm_slots_index(&world->bodies_taken, id.slot - 1);
     return SADMM_OK;
 }
 
@@ -560,7 +541,7 @@ sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id
 
 int32_t sadmm_world_body_pair_off_count(const sadmm_world *world)
 {
-    return world ? (int32_t)world->disabled_pairs.count : 0;
+    return world ? (int32_t)sadmm_pair_table_count(&world->disabled_pairs) : 0;
 }
 
 sadmm_status sadmm_world_body_pair_off_at(sadmm_world *world, int32_t index, sadmm_body_id *a, sadmm_body_id *b)
@@ -569,10 +550,11 @@ sadmm_status sadmm_world_body_pair_off_at(sadmm_world *world, int32_t index, sad
     struct sadmm_error *error = &world->error;
     TRY(sadmm_check_given(a, "a", error));
     TRY(sadmm_check_given(b, "b", error));
-    if (index < 0 || (size_t)index >= world->disabled_pairs.count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %zu)", index,
-                          world->disabled_pairs.count);
-    const uint64_t key = world->disabled_pairs.keys[index];
+    const size_t count = sadmm_pair_table_count(&world->disabled_pairs);
+    double ignored;
+    if (index < 0 || (size_t)index >= count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %zu)", index, count);
+    const uint64_t key = sadmm_pair_table_at(&world->disabled_pairs, (size_t)index, &ignored);
     const uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
     *a = (sadmm_body_id){low + 1, world->bodies[low].generation};
     *b = (sadmm_body_id){high + 1, world->bodies[high].generation};

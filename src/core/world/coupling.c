@@ -92,8 +92,6 @@ static sadmm_status check_def(const sadmm_world *world, const sadmm_coupling_def
 
 /* ---- life -------------------------------------------------------------------------------------------------------- */
 
-static bool alive(const sadmm_world *world, size_t slot) { return world->couplings[slot].alive; }
-
 /* What its joint is to do. */
 static void set_drives(sadmm_joint_def *joint, const sadmm_coupling_def *def)
 {
@@ -131,10 +129,10 @@ sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_d
     TRY(sadmm_world_take_back(world));
     made.def = *def;
     q_store(frame.orientation, made.def.orientation);
-    size_t slot = world->coupling_slots;
-    if ((size_t)world->coupling_count < slot) slot = sadmm_slot_free(&world->coupling_marks, world, alive);
+    const size_t slot = sadmm_slots_free(&world->couplings_taken);
     if (!sadmm_grow(&world->couplings, &world->coupling_capacity, world->coupling_slots, slot + 1,
-                    sizeof *world->couplings))
+                    sizeof *world->couplings) ||
+        !sadmm_slots_reserve(&world->couplings_taken, slot + 1))
         return sadmm_fail_memory(error, "a coupling");
     const struct sadmm_world_joint joint = joint_of(&made.def, frame, slot);
     TRY(sadmm_world_insert_joint(world, &joint, &made.joint));
@@ -142,7 +140,7 @@ sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_d
     if (slot < world->coupling_slots) made.generation = world->couplings[slot].generation;
     else ++world->coupling_slots;
     world->couplings[slot] = made;
-    sadmm_slot_taken(&world->coupling_marks, slot);
+    sadmm_slots_take(&world->couplings_taken, slot);
     ++world->coupling_count;
     if (id) *id = (sadmm_coupling_id){(uint32_t)slot + 1, made.generation};
     return SADMM_OK;
@@ -168,9 +166,7 @@ sadmm_status sadmm_world_coupling_at(sadmm_world *world, int32_t index, sadmm_co
     if (index < 0 || index >= world->coupling_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
                           world->coupling_count);
-    size_t slot = (size_t)index;
-    if ((size_t)world->coupling_count < world->coupling_slots)
-        slot = sadmm_slot_at(&world->coupling_marks, index, world, alive);
+    const size_t slot = sadmm_slots_at(&world->couplings_taken, index);
     *id = (sadmm_coupling_id){(uint32_t)slot + 1, world->couplings[slot].generation};
     return SADMM_OK;
 }
@@ -180,9 +176,7 @@ sadmm_status sadmm_world_coupling_index(sadmm_world *world, sadmm_coupling_id id
     TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_coupling(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(index, "index", &world->error));
-    *index = (int32_t)id.slot - 1;
-    if ((size_t)world->coupling_count < world->coupling_slots)
-        *index = sadmm_slot_index(&world->coupling_marks, id.slot - 1, world, alive);
+    *index = sadmm_slots_index(&world->couplings_taken, id.slot - 1);
     return SADMM_OK;
 }
 

@@ -14,24 +14,18 @@
 #include "core/model/islands.h"
 #include "world_internal.h"
 
-bool sadmm_world_add_driven(sadmm_world *world, int32_t slot)
+static sadmm_status list_driven(sadmm_world *world)
 {
-    int32_t at = world->driven_count;
-    if (!sadmm_grow(&world->driven_slots, &world->driven_slot_capacity, (size_t)at, (size_t)at + 1,
-                    sizeof *world->driven_slots))
-        return false;
-    for (; at > 0 && world->driven_slots[at - 1] > slot; --at) world->driven_slots[at] = world->driven_slots[at - 1];
-    world->driven_slots[at] = slot;
-    ++world->driven_count;
-    return true;
-}
-
-void sadmm_world_remove_driven(sadmm_world *world, int32_t slot)
-{
-    int32_t at = 0;
-    while (world->driven_slots[at] != slot) ++at;
-    --world->driven_count;
-    for (; at < world->driven_count; ++at) world->driven_slots[at] = world->driven_slots[at + 1];
+    size_t count = 0;
+    if (world->driven_listed) return SADMM_OK;
+    if (!sadmm_grow_empty(&world->driven_slots, &world->driven_slot_capacity, (size_t)world->driven_count,
+                          sizeof *world->driven_slots))
+        return sadmm_fail_memory(&world->error, "kinematic bodies");
+    for (size_t slot = 0; slot < world->body_slots; ++slot)
+        if (world->bodies[slot].alive && world->bodies[slot].type == SADMM_BODY_KINEMATIC)
+            world->driven_slots[count++] = (int32_t)slot;
+    world->driven_listed = true;
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_world_slot_not_finite(sadmm_world *world, int32_t slot)
@@ -47,6 +41,7 @@ sadmm_status sadmm_world_gather_driven(sadmm_world *world)
     const size_t n = (size_t)world->driven_count;
     start->driven_count = 0;
     if (n == 0) return SADMM_OK;
+    TRY(list_driven(world));
     if (!sadmm_grow_empty(&start->driven, &start->driven_capacity, 6 * n, sizeof *start->driven) ||
         !sadmm_grow_empty(&world->driven, &world->driven_capacity, n, sizeof *world->driven))
         return sadmm_fail_memory(&world->error, "kinematic bodies");

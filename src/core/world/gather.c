@@ -152,7 +152,7 @@ void sadmm_world_swap_starts(sadmm_world *world)
 struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world, int substep)
 {
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
-    const bool joined = world->joined_pairs.count > 0;
+    const bool joined = sadmm_pair_table_count(&world->joined_pairs) > 0;
     struct sadmm_collision_input input = {
         .shapes = world->shapes,
         .shape_count = world->shape_slots,
@@ -168,10 +168,10 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
         .margin = world->def.contact_margin,
         .threads = last_threads(world),
         .disabled_body_pairs = joined ? world->filtered_pairs : world->disabled_pairs.keys,
-        .disabled_body_pair_count = joined ? world->filtered_count : world->disabled_pairs.count,
+        .disabled_body_pair_count = joined ? world->filtered_count : sadmm_pair_table_count(&world->disabled_pairs),
         .friction_pairs = world->friction_pairs.keys,
         .friction_values = world->friction_pairs.values,
-        .friction_pair_count = world->friction_pairs.count,
+        .friction_pair_count = sadmm_pair_table_count(&world->friction_pairs),
         .gravity = gravity_size(settings.gravity),
     };
     return input;

@@ -71,8 +71,6 @@ sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_d
 
 /* ---- life -------------------------------------------------------------------------------------------------------- */
 
-static bool alive(const sadmm_world *world, size_t slot) { return world->gears[slot].alive; }
-
 static sadmm_status measure(sadmm_world *world, const sadmm_gear_def *def, double *sum)
 {
     sadmm_joint_state states[2];
@@ -101,16 +99,16 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *def,
         TRY(measure(world, def, &made.def.offset));
         TRY(sadmm_check_range("def->offset (NaN: as it is)", made.def.offset, -OFFSET_LIMIT, OFFSET_LIMIT, error));
     }
-    size_t slot = world->gear_slots;
-    if ((size_t)world->gear_count < slot) slot = sadmm_slot_free(&world->gear_marks, world, alive);
+    const size_t slot = sadmm_slots_free(&world->gears_taken);
     if (slot >= MOST_GEARS)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d gears: a world holds at most 2^24", world->gear_count);
-    if (!sadmm_grow(&world->gears, &world->gear_capacity, world->gear_slots, slot + 1, sizeof *world->gears))
+    if (!sadmm_grow(&world->gears, &world->gear_capacity, world->gear_slots, slot + 1, sizeof *world->gears) ||
+        !sadmm_slots_reserve(&world->gears_taken, slot + 1))
         return sadmm_fail_memory(error, "a gear");
     if (slot < world->gear_slots) made.generation = world->gears[slot].generation;
     else ++world->gear_slots;
     world->gears[slot] = made;
-    sadmm_slot_taken(&world->gear_marks, slot);
+    sadmm_world_link_gear(world, slot);
     ++world->gear_count;
     if (id) *id = (sadmm_gear_id){(uint32_t)slot + 1, made.generation};
     return SADMM_OK;
@@ -135,9 +133,7 @@ sadmm_status sadmm_world_gear_at(sadmm_world *world, int32_t index, sadmm_gear_i
     if (index < 0 || index >= world->gear_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
                           world->gear_count);
-    size_t slot = (size_t)index;
-    if ((size_t)world->gear_count < world->gear_slots)
-        slot = sadmm_slot_at(&world->gear_marks, index, world, alive);
+    const size_t slot = sadmm_slots_at(&world->gears_taken, index);
     *id = (sadmm_gear_id){(uint32_t)slot + 1, world->gears[slot].generation};
     return SADMM_OK;
 }

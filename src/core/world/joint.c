@@ -178,9 +178,6 @@ sadmm_status sadmm_world_check_joint_def(const sadmm_joint_def *def, struct sadm
 
 /* ---- life -------------------------------------------------------------------------------------------------------- */
 
-static bool taken(const sadmm_world *world, size_t slot) { return world->joints[slot].alive; }
-static bool alive(const sadmm_world *world, size_t slot) { return taken(world, slot) && !world->joints[slot].coupling; }
-
 static const struct sadmm_rigid *pose_of(const sadmm_world *world, int32_t slot)
 {
     return slot >= 0 ? &world->bodies[slot].rigid : NULL;
@@ -204,31 +201,70 @@ static bool leaves_out(const struct sadmm_world_joint *joint, uint64_t *key)
 static sadmm_status add_pair(sadmm_world *world, const struct sadmm_world_joint *joint)
 {
     uint64_t key;
-    size_t at;
     if (!leaves_out(joint, &key)) return SADMM_OK;
-    const double before =
-        sadmm_pair_table_find(&world->joined_pairs, key, &at) ? world->joined_pairs.values[at] : 0;
-    return sadmm_pair_table_set(&world->joined_pairs, key, before + 1, &world->error);
+    const double *before = sadmm_pair_table_find(&world->joined_pairs, key);
+    return sadmm_pair_table_set(&world->joined_pairs, key, (before ? *before : 0) + 1, &world->error);
 }
 
 static void remove_pair(sadmm_world *world, const struct sadmm_world_joint *joint)
 {
     uint64_t key;
-    size_t at;
-    if (!leaves_out(joint, &key) || !sadmm_pair_table_find(&world->joined_pairs, key, &at)) return;
-    if (--world->joined_pairs.values[at] <= 0) sadmm_pair_table_remove(&world->joined_pairs, key);
+    if (leaves_out(joint, &key)) sadmm_pair_table_lower(&world->joined_pairs, key);
+}
+
+bool sadmm_world_reserve_joints(sadmm_world *world, size_t slots)
+{
+    return sadmm_grow(&world->joints, &world->joint_capacity, world->joint_slots, slots, sizeof *world->joints) &&
+           sadmm_slots_reserve(&world->joints_taken, slots) && sadmm_slots_reserve(&world->own_joints, slots);
 }
 
 static sadmm_status new_slot(sadmm_world *world, size_t *slot)
 {
-    *slot = world->joint_slots;
-    if ((size_t)world->joint_count < world->joint_slots) *slot = sadmm_slot_free(&world->joint_marks, world, taken);
+    *slot = sadmm_slots_free(&world->joints_taken);
     if (*slot >= MOST_JOINTS)
         return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d joints and couplings: a world holds at most 2^24",
                           world->joint_count);
-    if (!sadmm_grow(&world->joints, &world->joint_capacity, world->joint_slots, *slot + 1, sizeof *world->joints))
-        return sadmm_fail_memory(&world->error, "a joint");
+    if (!sadmm_world_reserve_joints(world, *slot + 1)) return sadmm_fail_memory(&world->error, "a joint");
     return SADMM_OK;
+}
+
+static struct sadmm_link *joint_link(sadmm_world *world, uint32_t name)
+{
+    return &world->joints[(name - 1) / 2].on_body[(name - 1) % 2];
+}
+
+static struct sadmm_link *gear_link(sadmm_world *world, uint32_t name)
+{
+    return &world->gears[(name - 1) / 2].on_joint[(name - 1) % 2];
+}
+
+static uint32_t link_name(size_t slot, int side) { return 2 * (uint32_t)slot + (uint32_t)side + 1; }
+
+void sadmm_world_link_joint(sadmm_world *world, size_t slot)
+{
+    const struct sadmm_world_joint *joint = &world->joints[slot];
+    sadmm_slots_take(&world->joints_taken, slot);
+    if (!joint->coupling) sadmm_slots_take(&world->own_joints, slot);
+    for (int s = 0; s < 2; ++s)
+        if (joint->body[s] >= 0)
+            sadmm_link_add(world, joint_link, &world->bodies[joint->body[s]].first_joint, link_name(slot, s));
+}
+
+static void unlink_joint(sadmm_world *world, size_t slot)
+{
+    const struct sadmm_world_joint *joint = &world->joints[slot];
+    sadmm_slots_release(&world->joints_taken, slot);
+    if (!joint->coupling) sadmm_slots_release(&world->own_joints, slot);
+    for (int s = 0; s < 2; ++s)
+        if (joint->body[s] >= 0)
+            sadmm_link_remove(world, joint_link, &world->bodies[joint->body[s]].first_joint, link_name(slot, s));
+}
+
+void sadmm_world_link_gear(sadmm_world *world, size_t slot)
+{
+    sadmm_slots_take(&world->gears_taken, slot);
+    for (int s = 0; s < 2; ++s)
+        sadmm_link_add(world, gear_link, &world->joints[world->gears[slot].joint[s]].first_gear, link_name(slot, s));
 }
 
 sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot)
@@ -240,7 +276,7 @@ sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_wor
     *made = *joint;
     made->generation = generation;
     if (*slot == world->joint_slots) ++world->joint_slots;
-    if (!made->coupling) sadmm_slot_taken(&world->joint_marks, *slot);
+    sadmm_world_link_joint(world, *slot);
     ++world->joint_count;
     return SADMM_OK;
 }
@@ -277,7 +313,7 @@ static void kill_coupling(sadmm_world *world, size_t slot)
     coupling->alive = false;
     ++coupling->generation;
     --world->coupling_count;
-    sadmm_slot_freed(&world->coupling_marks, slot);
+    sadmm_slots_release(&world->couplings_taken, slot);
 }
 
 static void set_table(sadmm_world *world, size_t slot, int index, double *table, int32_t count)
@@ -297,35 +333,26 @@ void sadmm_world_free_tables(sadmm_world *world)
 
 void sadmm_world_kill_gear(sadmm_world *world, size_t slot)
 {
-    world->gears[slot].alive = false;
-    ++world->gears[slot].generation;
+    struct sadmm_world_gear *gear = &world->gears[slot];
+    for (int s = 0; s < 2; ++s)
+        sadmm_link_remove(world, gear_link, &world->joints[gear->joint[s]].first_gear, link_name(slot, s));
+    gear->alive = false;
+    ++gear->generation;
     --world->gear_count;
-    sadmm_slot_freed(&world->gear_marks, slot);
-}
-
-static void kill_gears_of(sadmm_world *world, size_t joint)
-{
-    for (size_t slot = 0; world->gear_count > 0 && slot < world->gear_slots; ++slot) {
-        const struct sadmm_world_gear *gear = &world->gears[slot];
-        if (gear->alive && (gear->joint[0] == joint || gear->joint[1] == joint)) sadmm_world_kill_gear(world, slot);
-    }
+    sadmm_slots_release(&world->gears_taken, slot);
 }
 
 void sadmm_world_kill_joint(sadmm_world *world, size_t slot)
 {
     struct sadmm_world_joint *joint = &world->joints[slot];
     remove_pair(world, joint);
-    kill_gears_of(world, slot);
+    while (joint->first_gear) sadmm_world_kill_gear(world, (joint->first_gear - 1) / 2);
+    unlink_joint(world, slot);
     for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(world, slot, k, NULL, 0);
     joint->alive = false;
     ++joint->generation;
     --world->joint_count;
-    if (!joint->coupling) {
-        sadmm_slot_freed(&world->joint_marks, slot);
-        return;
-    }
-    if (slot < world->joint_marks.free) world->joint_marks.free = slot;
-    kill_coupling(world, (size_t)joint->coupling - 1);
+    if (joint->coupling) kill_coupling(world, (size_t)joint->coupling - 1);
 }
 
 sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_id id)
@@ -339,10 +366,8 @@ sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_id id)
 
 void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body)
 {
-    for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
-        const struct sadmm_world_joint *joint = &world->joints[slot];
-        if (joint->alive && (joint->body[0] == body || joint->body[1] == body)) sadmm_world_kill_joint(world, slot);
-    }
+    const uint32_t *first = &world->bodies[body].first_joint;
+    while (*first) sadmm_world_kill_joint(world, (*first - 1) / 2);
 }
 
 int32_t sadmm_world_joint_count(const sadmm_world *world)
@@ -358,9 +383,7 @@ sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint
     const int32_t count = sadmm_world_joint_count(world);
     if (index < 0 || index >= count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, count);
-    size_t slot = (size_t)index;
-    if ((size_t)count < world->joint_slots)
-        slot = sadmm_slot_at(&world->joint_marks, index, world, alive);
+    const size_t slot = sadmm_slots_at(&world->own_joints, index);
     id->slot = (uint32_t)slot + 1;
     id->generation = world->joints[slot].generation;
     return SADMM_OK;
@@ -371,9 +394,7 @@ sadmm_status sadmm_world_joint_index(sadmm_world *world, sadmm_joint_id id, int3
     TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_joint(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(index, "index", &world->error));
-    *index = (int32_t)id.slot - 1;
-    if ((size_t)sadmm_world_joint_count(world) < world->joint_slots)
-        *index = sadmm_slot_index(&world->joint_marks, id.slot - 1, world, alive);
+    *index = sadmm_slots_index(&world->own_joints, id.slot - 1);
     return SADMM_OK;
 }
 

@@ -21,17 +21,37 @@ LISTED(sadmm_coupling_def, 224);
 
 enum { MOST_SLOTS = 1 << 28 };
 
+static void fail_memory(struct sadmm_archive *archive)
+{
+    if (archive->status == SADMM_OK) archive->status = sadmm_fail_memory(archive->error, "the state of a world");
+}
+
+static bool pairs_fit(const struct sadmm_pair_table *table, size_t count, size_t slots)
+{
+    for (size_t k = 0; k < count; ++k) {
+        const uint64_t low = table->keys[k] >> 32, high = table->keys[k] & UINT32_MAX;
+        if (high >= slots || low >= high || (k > 0 && table->keys[k - 1] >= table->keys[k]) ||
+            !(table->values[k] >= 0 && table->values[k] <= 1e9))
+            return false;
+    }
+    return true;
+}
+
 static void archive_pair_table(struct sadmm_archive *archive, struct sadmm_pair_table *table, size_t slots)
 {
-    sadmm_archive_array(archive, &table->keys, &table->count, &table->key_capacity, sizeof *table->keys, SIZE_MAX);
-    size_t count = table->count;
-    sadmm_archive_array(archive, &table->values, &count, &table->value_capacity, sizeof *table->values, SIZE_MAX);
-    if (!archive->reading) return;
-    bool fine = count == table->count;
-    for (size_t k = 0; fine && k < count; ++k)
-        fine = (table->keys[k] & UINT32_MAX) < slots && table->keys[k] >> 32 < (table->keys[k] & UINT32_MAX) &&
-               (k == 0 || table->keys[k - 1] < table->keys[k]) && table->values[k] >= 0 && table->values[k] <= 1e9;
-    if (!sadmm_archive_expect(archive, fine, "pairs of bodies or shapes")) table->count = 0;
+    size_t count = sadmm_pair_table_count(table), values;
+    if (!archive->reading && sadmm_pair_table_list(table, archive->error) != SADMM_OK) {
+        archive->status = SADMM_ERROR_OUT_OF_MEMORY;
+        return;
+    }
+    values = count;
+    sadmm_archive_array(archive, &table->keys, &count, &table->key_capacity, sizeof *table->keys, SIZE_MAX);
+    sadmm_archive_array(archive, &table->values, &values, &table->value_capacity, sizeof *table->values, SIZE_MAX);
+    if (!archive->reading ||
+        !sadmm_archive_expect(archive, values == count && pairs_fit(table, count, slots), "pairs of bodies or shapes"))
+        return;
+    for (size_t k = 0; k < count && archive->status == SADMM_OK; ++k)
+        if (sadmm_pair_table_set(table, table->keys[k], table->values[k], archive->error) != SADMM_OK) fail_memory(archive);
 }
 
 /* ---- settings ---------------------------------------------------------------------------------------------------- */
@@ -143,8 +163,8 @@ static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size
     }
     ++world->body_count;
     world->dynamic_count += body->type == SADMM_BODY_DYNAMIC;
-    if (body->type == SADMM_BODY_KINEMATIC && !sadmm_world_add_driven(world, (int32_t)slot))
-        archive->status = sadmm_fail_memory(archive->error, "the state of a world");
+    sadmm_slots_take(&world->bodies_taken, slot);
+    if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_count_driven(world, 1);
 }
 
 /* ---- shapes ------------------------------------------------------------------------------------------------------ */
@@ -154,6 +174,7 @@ struct owners {
     const void **of; /* writing: sadmm_hull or sadmm_mesh; reading: likewise, new ones */
     bool *is_mesh;
     size_t count, capacity, mesh_capacity;
+    struct sadmm_key_tree numbers; /* writing: by address */
 };
 
 static const void *owner_of(const sadmm_world *world, size_t slot)
@@ -168,12 +189,10 @@ static bool has_owner(const sadmm_world *world, size_t slot)
     return world->shapes[slot].alive && (type == SADMM_SHAPE_HULL || type == SADMM_SHAPE_MESH);
 }
 
-/* Its number, or the number of them. */
-static size_t find_owner(const struct owners *owners, const void *owner)
+/* Its number; NULL: it has none yet. */
+static const double *find_owner(const struct owners *owners, const void *owner)
 {
-    size_t k = 0;
-    while (k < owners->count && owners->of[k] != owner) ++k;
-    return k;
+    return sadmm_key_tree_find(&owners->numbers, (uintptr_t)owner);
 }
 
 static void list_owners(struct sadmm_archive *archive, const sadmm_world *world, struct owners *owners)
@@ -181,13 +200,15 @@ static void list_owners(struct sadmm_archive *archive, const sadmm_world *world,
     for (size_t slot = 0; slot < world->shape_slots; ++slot) {
         if (!has_owner(world, slot)) continue;
         const void *owner = owner_of(world, slot);
-        if (find_owner(owners, owner) < owners->count) continue;
-        if (!sadmm_grow(&owners->of, &owners->capacity, owners->count, owners->count + 1, sizeof *owners->of) ||
+        if (find_owner(owners, owner)) continue;
+        if (!sadmm_key_tree_reserve(&owners->numbers) ||
+            !sadmm_grow(&owners->of, &owners->capacity, owners->count, owners->count + 1, sizeof *owners->of) ||
             !sadmm_grow(&owners->is_mesh, &owners->mesh_capacity, owners->count, owners->count + 1,
                         sizeof *owners->is_mesh)) {
-            archive->status = sadmm_fail_memory(archive->error, "the state of a world");
+            fail_memory(archive);
             return;
         }
+        sadmm_key_tree_set(&owners->numbers, (uintptr_t)owner, (double)owners->count);
         owners->of[owners->count] = owner;
         owners->is_mesh[owners->count++] = world->block_shapes[slot].mesh != NULL;
     }
@@ -222,6 +243,7 @@ static void release_owners(const struct sadmm_archive *archive, struct owners *o
     }
     sadmm_free(owners->of);
     sadmm_free(owners->is_mesh);
+    sadmm_key_tree_free(&owners->numbers);
 }
 
 /* What a shape is, in its own terms; reading: where contact finding has it, too. */
@@ -252,7 +274,7 @@ static struct kept_shape keep_shape(const sadmm_world *world, size_t slot, const
     memcpy(kept.def.position, owned ? world->block_shapes[slot].position : shape->position, sizeof kept.def.position);
     memcpy(kept.def.orientation, owned ? world->block_shapes[slot].orientation : shape->orientation,
            sizeof kept.def.orientation);
-    if (owned) kept.owner = find_owner(owners, owner_of(world, slot));
+    if (owned) kept.owner = (uint64_t)*find_owner(owners, owner_of(world, slot));
     return kept;
 }
 
@@ -322,11 +344,8 @@ static void archive_shapes(struct sadmm_archive *archive, sadmm_world *world)
     size_t slots = world->shape_slots;
     archive_owners(archive, world, &owners);
     sadmm_archive_count(archive, &slots, 5, MOST_SLOTS);
-    if (!archive->reading || (sadmm_archive_room(archive, &world->shapes, &world->shape_capacity, slots, sizeof *world->shapes) &&
-                              sadmm_archive_room(archive, &world->shape_generations, &world->shape_generation_capacity,
-                                                 slots, sizeof *world->shape_generations) &&
-                              sadmm_archive_room(archive, &world->geometries, &world->geometry_capacity, slots,
-                                                 sizeof *world->geometries))) {
+    if (archive->reading && !sadmm_world_reserve_shapes(world, slots)) fail_memory(archive);
+    if (archive->status == SADMM_OK) {
         world->shape_slots = slots;
         for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot)
             archive_shape(archive, world, slot, &owners);
@@ -446,16 +465,18 @@ static void archive_joint(struct sadmm_archive *archive, sadmm_world *world, siz
     archive_joint_memory(archive, &joint->last);
     if (!archive->reading) return;
     ++world->joint_count;
-    if (archive->status == SADMM_OK)
-        sadmm_archive_expect(archive, joint_fits(world, joint, archive->error), "a joint");
+    if (archive->status == SADMM_OK && sadmm_archive_expect(archive, joint_fits(world, joint, archive->error), "a joint"))
+        sadmm_world_link_joint(world, slot);
 }
 
 static void archive_joints(struct sadmm_archive *archive, sadmm_world *world)
 {
     size_t slots = world->joint_slots;
     sadmm_archive_count(archive, &slots, 5, MOST_SLOTS);
-    if (archive->reading && !sadmm_archive_room(archive, &world->joints, &world->joint_capacity, slots, sizeof *world->joints))
+    if (archive->reading && !sadmm_world_reserve_joints(world, slots)) {
+        fail_memory(archive);
         return;
+    }
     world->joint_slots = slots;
     for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot) archive_joint(archive, world, slot);
     archive_pair_table(archive, &world->joined_pairs, world->body_slots);
@@ -489,15 +510,20 @@ static void archive_gear(struct sadmm_archive *archive, sadmm_world *world, size
     if (!archive->reading) return;
     for (int s = 0; s < 2; ++s) gear->joint[s] = (size_t)joint[s];
     ++world->gear_count;
-    if (archive->status == SADMM_OK) sadmm_archive_expect(archive, gear_fits(world, gear, archive->error), "a gear");
+    if (archive->status == SADMM_OK && sadmm_archive_expect(archive, gear_fits(world, gear, archive->error), "a gear"))
+        sadmm_world_link_gear(world, slot);
 }
 
 static void archive_gears(struct sadmm_archive *archive, sadmm_world *world)
 {
     size_t slots = world->gear_slots;
     sadmm_archive_count(archive, &slots, 5, MOST_SLOTS);
-    if (archive->reading && !sadmm_archive_room(archive, &world->gears, &world->gear_capacity, slots, sizeof *world->gears))
+    if (archive->reading &&
+        !(sadmm_archive_room(archive, &world->gears, &world->gear_capacity, slots, sizeof *world->gears) &&
+          sadmm_slots_reserve(&world->gears_taken, slots))) {
+        fail_memory(archive);
         return;
+    }
     world->gear_slots = slots;
     for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot) archive_gear(archive, world, slot);
 }
@@ -551,6 +577,7 @@ static void archive_coupling(struct sadmm_archive *archive, sadmm_world *world, 
     if (!archive->reading) return;
     coupling->joint = (size_t)joint;
     ++world->coupling_count;
+    sadmm_slots_take(&world->couplings_taken, slot);
     if (archive->status == SADMM_OK)
         sadmm_archive_expect(archive, coupling_fits(world, slot, archive->error), "a coupling");
 }
@@ -560,8 +587,11 @@ static void archive_couplings(struct sadmm_archive *archive, sadmm_world *world)
     size_t slots = world->coupling_slots, of_couplings = 0;
     sadmm_archive_count(archive, &slots, 5, MOST_SLOTS);
     if (archive->reading &&
-        !sadmm_archive_room(archive, &world->couplings, &world->coupling_capacity, slots, sizeof *world->couplings))
+        !(sadmm_archive_room(archive, &world->couplings, &world->coupling_capacity, slots, sizeof *world->couplings) &&
+          sadmm_slots_reserve(&world->couplings_taken, slots))) {
+        fail_memory(archive);
         return;
+    }
     world->coupling_slots = slots;
     for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot) archive_coupling(archive, world, slot);
     for (size_t slot = 0; slot < world->joint_slots; ++slot)
@@ -577,8 +607,12 @@ void sadmm_archive_objects(struct sadmm_archive *archive, sadmm_world *world)
     size_t slots = world->body_slots;
     archive_def(archive, &world->def);
     sadmm_archive_count(archive, &slots, 5, MOST_SLOTS);
-    if (archive->reading && !sadmm_archive_room(archive, &world->bodies, &world->body_capacity, slots, sizeof *world->bodies))
+    if (archive->reading &&
+        !(sadmm_archive_room(archive, &world->bodies, &world->body_capacity, slots, sizeof *world->bodies) &&
+          sadmm_slots_reserve(&world->bodies_taken, slots))) {
+        fail_memory(archive);
         return;
+    }
     world->body_slots = slots;
     for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot) archive_body(archive, world, slot);
     archive_shapes(archive, world);

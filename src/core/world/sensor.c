@@ -8,8 +8,7 @@ enum { MOVING_TYPES = 1 << SADMM_BODY_DYNAMIC | 1 << SADMM_BODY_KINEMATIC };
 static bool apart(const sadmm_world *world, int32_t a, int32_t b)
 {
     const uint64_t key = sadmm_pair_key((size_t)a, (size_t)b);
-    size_t at;
-    return sadmm_pair_table_find(&world->disabled_pairs, key, &at) || sadmm_pair_table_find(&world->joined_pairs, key, &at);
+    return sadmm_pair_table_find(&world->disabled_pairs, key) || sadmm_pair_table_find(&world->joined_pairs, key);
 }
 
 sadmm_status sadmm_world_list_seen(sadmm_world *world, size_t slot, size_t *count)

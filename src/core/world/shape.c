@@ -20,11 +20,6 @@ sadmm_shape_def sadmm_shape_def_default(void)
     return def;
 }
 
-static bool alive(const sadmm_world *world, size_t slot)
-{
-    return world->shapes[slot].alive;
-}
-
 /* owner: what stands before the names, "def->" say. */
 static sadmm_status check_material(const char *owner, double friction, double restitution, struct sadmm_error *error)
 {
@@ -94,6 +89,19 @@ static void keep_given(sadmm_world *world, size_t slot, const sadmm_shape_def *d
     memcpy(kept->orientation, orientation, sizeof kept->orientation);
 }
 
+static struct sadmm_link *link_at(sadmm_world *world, uint32_t name) { return &world->shape_links[name - 1]; }
+
+bool sadmm_world_reserve_shapes(sadmm_world *world, size_t slots)
+{
+    const size_t used = world->shape_slots;
+    return sadmm_grow(&world->shapes, &world->shape_capacity, used, slots, sizeof *world->shapes) &&
+           sadmm_grow(&world->shape_generations, &world->shape_generation_capacity, used, slots,
+                      sizeof *world->shape_generations) &&
+           sadmm_grow(&world->geometries, &world->geometry_capacity, used, slots, sizeof *world->geometries) &&
+           sadmm_grow(&world->shape_links, &world->shape_link_capacity, used, slots, sizeof *world->shape_links) &&
+           sadmm_slots_reserve(&world->shapes_taken, slots);
+}
+
 sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body_slot, const sadmm_shape_def *def,
                                    struct sadmm_error *error)
 {
@@ -123,7 +131,8 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     ++world->shape_count;
     world->sensor_count += def->sensor;
     sadmm_world_reshaped(world);
-    if (body->shape_count++ == 0 || slot < body->first_shape) body->first_shape = slot;
+    sadmm_slots_take(&world->shapes_taken, slot);
+    sadmm_link_add(world, link_at, &body->first_shape, (uint32_t)slot + 1);
     return SADMM_OK;
 }
 
@@ -139,22 +148,15 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     TRY(check_def(body, def, ignored, error)); /* before the world is taken back */
     TRY(sadmm_world_take_back(world));
 
-    size_t slot = world->shape_slots;
-    if ((size_t)world->shape_count < world->shape_slots) slot = sadmm_slot_free(&world->shape_marks, world, alive);
+    const size_t slot = sadmm_slots_free(&world->shapes_taken);
     if (slot >= (size_t)1 << 28)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d shapes: a world holds at most 2^28", world->shape_count);
-    if (!sadmm_grow(&world->shapes, &world->shape_capacity, world->shape_slots, slot + 1, sizeof *world->shapes) ||
-        !sadmm_grow(&world->shape_generations, &world->shape_generation_capacity, world->shape_slots, slot + 1,
-                    sizeof *world->shape_generations) ||
-        !sadmm_grow(&world->geometries, &world->geometry_capacity, world->shape_slots, slot + 1,
-                    sizeof *world->geometries))
-        return sadmm_fail_memory(error, "a shape");
+    if (!sadmm_world_reserve_shapes(world, slot + 1)) return sadmm_fail_memory(error, "a shape");
     TRY(sadmm_world_put_shape(world, slot, (int32_t)body_id.slot - 1, def, error));
     if (slot == world->shape_slots) {
         ++world->shape_slots;
         world->shape_generations[slot] = 1;
     }
-    sadmm_slot_taken(&world->shape_marks, slot);
     if (id) {
         id->slot = (uint32_t)slot + 1;
         id->generation = world->shape_generations[slot];
@@ -180,8 +182,8 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
     ++world->shape_generations[slot];
     --world->shape_count;
     world->sensor_count -= world->shapes[slot].sensor;
-    --world->bodies[world->shapes[slot].body].shape_count;
-    sadmm_slot_freed(&world->shape_marks, slot);
+    sadmm_link_remove(world, link_at, &world->bodies[world->shapes[slot].body].first_shape, (uint32_t)slot + 1);
+    sadmm_slots_release(&world->shapes_taken, slot);
     sadmm_pair_table_forget(&world->friction_pairs, (uint32_t)slot);
     world->contacts_readable = false;
 }
@@ -208,9 +210,7 @@ sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape
     if (index < 0 || index >= world->shape_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
                           world->shape_count);
-    size_t slot = (size_t)index;
-    if ((size_t)world->shape_count < world->shape_slots)
-        slot = sadmm_slot_at(&world->shape_marks, index, world, alive);
+    const size_t slot = sadmm_slots_at(&world->shapes_taken, index);
     id->slot = (uint32_t)slot + 1;
     id->generation = world->shape_generations[slot];
     return SADMM_OK;
@@ -221,9 +221,7 @@ sadmm_status sadmm_world_shape_index(sadmm_world *world, sadmm_shape_id id, int3
     TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(index, "index", &world->error));
-    *index = (int32_t)id.slot - 1;
-    if ((size_t)world->shape_count < world->shape_slots)
-        *index = sadmm_slot_index(&world->shape_marks, id.slot - 1, world, alive);
+    *index = sadmm_slots_index(&world->shapes_taken, id.slot - 1);
     return SADMM_OK;
 }
 
@@ -292,7 +290,7 @@ sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a,
 
 int32_t sadmm_world_pair_friction_count(const sadmm_world *world)
 {
-    return world ? (int32_t)world->friction_pairs.count : 0;
+    return world ? (int32_t)sadmm_pair_table_count(&world->friction_pairs) : 0;
 }
 
 sadmm_status sadmm_world_pair_friction_at(sadmm_world *world, int32_t index, sadmm_shape_id *a, sadmm_shape_id *b,
@@ -303,13 +301,12 @@ sadmm_status sadmm_world_pair_friction_at(sadmm_world *world, int32_t index, sad
     TRY(sadmm_check_given(a, "a", error));
     TRY(sadmm_check_given(b, "b", error));
     TRY(sadmm_check_given(friction, "friction", error));
-    if (index < 0 || (size_t)index >= world->friction_pairs.count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %zu)", index,
-                          world->friction_pairs.count);
-    const uint64_t key = world->friction_pairs.keys[index];
+    const size_t count = sadmm_pair_table_count(&world->friction_pairs);
+    if (index < 0 || (size_t)index >= count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %zu)", index, count);
+    const uint64_t key = sadmm_pair_table_at(&world->friction_pairs, (size_t)index, friction);
     const uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
     *a = (sadmm_shape_id){low + 1, world->shape_generations[low]};
     *b = (sadmm_shape_id){high + 1, world->shape_generations[high]};
-    *friction = world->friction_pairs.values[index];
     return SADMM_OK;
 }

@@ -66,13 +66,16 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_block_pool_free(&world->block_pool);
     sadmm_query_tree_free(&world->query.tree);
     sadmm_world_free_events(world);
+    struct sadmm_slot_set *const taken[] = {&world->bodies_taken, &world->shapes_taken, &world->joints_taken,
+                                            &world->own_joints, &world->gears_taken, &world->couplings_taken};
+    struct sadmm_pair_table *const pairs[] = {&world->disabled_pairs, &world->joined_pairs, &world->friction_pairs};
+    for (size_t i = 0; i < sizeof taken / sizeof *taken; ++i) sadmm_slots_destroy(taken[i]);
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; ++i) sadmm_pair_table_free(pairs[i]);
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->block_shapes,
-                      world->disabled_pairs.keys, world->disabled_pairs.values, world->joined_pairs.keys,
-                      world->joined_pairs.values, world->filtered_pairs, world->joints, world->couplings, world->gears,
+                      world->shape_links, world->filtered_pairs, world->joints, world->couplings, world->gears,
                       world->joint_sources, world->joint_labels, world->joint_touch, world->joint_constraints,
                       world->start.multiplier, world->last_start.multiplier,
-                      world->friction_pairs.keys,
-                      world->friction_pairs.values, world->collision_bodies, world->start.rigid, world->start.velocity,
+                      world->collision_bodies, world->start.rigid, world->start.velocity,
                       world->start.impulse, world->last_start.rigid, world->last_start.velocity,
                       world->last_start.impulse, world->start.driven, world->last_start.driven, world->driven,
                       world->driven_slots, world->carried, world->carriers, world->carried_labels, world->next,

@@ -1,6 +1,6 @@
 /* A world's insides, shared by the files of this folder. Each calls those before it alone:
  *
- *   slots, pair_table, block_pool, ids, report   lists and names
+ *   slots, links, pair_table, block_pool, ids, report   lists and names
  *   driven                           kinematic bodies in a step
  *   gather                           what a step reads
  *   coupling_step                    what couplings keep from step to step
@@ -31,6 +31,7 @@
 #include "core/solve/joined.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
+#include "links.h"
 #include "pair_table.h"
 #include "slots.h"
 #include "subadmm/arrays.h"
@@ -51,8 +52,7 @@ struct sadmm_world_body {
     int32_t environment;
     int32_t system_body; /* in the last step, -1: static or not there, below: driven (core/base/contact_set.h) */
     struct sadmm_rigid rigid;
-    int32_t shape_count;
-    size_t first_shape;  /* none of its shapes is in a lower slot */
+    uint32_t first_shape, first_joint; /* links: names of a shape are its slot + 1, of a joint below */
     double contact_wrench[6];
     struct sadmm_steady steady;
     struct {
@@ -94,6 +94,8 @@ struct sadmm_world_joint {
     double *table[JOINT_COORDINATES];     /* of a coordinate's spring: positions, then loads; NULL: none */
     int32_t table_count[JOINT_COORDINATES]; /* points */
     struct sadmm_joint_memory last, next; /* of the last step; of the one at hand, or a sub-step of it */
+    struct sadmm_link on_body[2]; /* their names: 2 x slot + side + 1 */
+    uint32_t first_gear;
     int32_t resident;       /* its number in the backend that keeps the world */
     int32_t resident_constraints; /* that its rows may take there */
     uint32_t edits;         /* bits of enum sadmm_joint_edit, as in a body */
@@ -115,6 +117,7 @@ struct sadmm_world_gear {
     uint32_t generation;
     sadmm_gear_def def;
     size_t joint[2]; /* slots */
+    struct sadmm_link on_joint[2]; /* their names: 2 x slot + side + 1 */
     bool acts;       /* it has a row in the (sub-)step at hand */
     struct { double force; } last, next; /* along the first coordinate, of the last step and of the one at hand */
     bool edited;     /* its being enabled was set, and no step has taken that along yet; set_at: as in a body */
@@ -154,14 +157,17 @@ struct sadmm_world {
     struct sadmm_world_body *bodies;
     size_t body_slots, body_capacity;
     int32_t body_count, dynamic_count, driven_count; /* driven: kinematic */
-    int32_t *driven_slots;                           /* of these, ascending */
-    struct sadmm_slot_marks body_marks;
+    int32_t *driven_slots;                           /* of these, ascending, as of the last step */
+    bool driven_listed;                              /* none has come or gone since */
+    struct sadmm_slot_set bodies_taken;
     struct sadmm_shape *shapes;
     uint32_t *shape_generations;
     struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */
     size_t shape_slots, shape_capacity, shape_generation_capacity, geometry_capacity;
     int32_t shape_count, sensor_count; /* sensors: of these */
-    struct sadmm_slot_marks shape_marks;
+    struct sadmm_slot_set shapes_taken;
+    struct sadmm_link *shape_links;    /* by slot: the shapes of a body */
+    size_t shape_link_capacity;
     uint32_t shape_revisions;
     struct sadmm_block_pool block_pool;
     struct sadmm_world_block_shape *block_shapes; /* by slot, as far as there are hulls or meshes */
@@ -171,17 +177,17 @@ struct sadmm_world {
     struct sadmm_world_joint *joints;
     size_t joint_slots, joint_capacity;
     int32_t joint_count;                  /* live slots, those of couplings among them */
-    struct sadmm_slot_marks joint_marks;
+    struct sadmm_slot_set joints_taken, own_joints; /* all; those that are of no coupling */
     int32_t table_count;                  /* tables of springs, of all joints */
     struct sadmm_world_gear *gears;
     size_t gear_slots, gear_capacity;
     int32_t gear_count;
-    struct sadmm_slot_marks gear_marks;
+    struct sadmm_slot_set gears_taken;
     size_t joint_rows;                    /* of the step's rows: the first ones; those of gears follow */
     struct sadmm_world_coupling *couplings;
     size_t coupling_slots, coupling_capacity;
     int32_t coupling_count;
-    struct sadmm_slot_marks coupling_marks;
+    struct sadmm_slot_set couplings_taken;
     struct sadmm_pair_table joined_pairs; /* bodies that do not meet for their joints; values: how many joints */
     uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
     size_t filtered_count, filtered_capacity;
@@ -287,9 +293,12 @@ struct sadmm_world {
 /* Kinematic bodies in slot order into `driven` and `start`, and numbers of theirs for collision, which has their
  * poses. */
 sadmm_status sadmm_world_gather_driven(sadmm_world *world);
-/* Kinematic body in slot `slot`: it is one from here on, or no more. */
-bool sadmm_world_add_driven(sadmm_world *world, int32_t slot);
-void sadmm_world_remove_driven(sadmm_world *world, int32_t slot);
+/* A kinematic body has come (change 1) or gone (-1). */
+static inline void sadmm_world_count_driven(sadmm_world *world, int32_t change)
+{
+    world->driven_count += change;
+    world->driven_listed = false;
+}
 /* Islands that ride on a kinematic body are solved as what they are in its motion: system->carried, and
  * system->velocity less that; and back. */
 sadmm_status sadmm_world_carry(sadmm_world *world, struct sadmm_system *system);
@@ -351,7 +360,7 @@ struct acting_joint sadmm_world_act_joint(const sadmm_world *world, const struct
 
 /* ---- joint_rows.c ---- */
 
-/* Pairs of bodies that are not to meet, into `filtered_pairs`; and what joints kept of the last step into what they
+/* Pairs of bodies that are not to meet, into `filtered_pairs`, and frictions of pairs as lists; and what joints kept of the last step into what they
  * keep of this one. */
 sadmm_status sadmm_world_begin_joints(sadmm_world *world);
 /* The most constraints that a joint's rows may take; those of couplings have room for all of their drives. */
@@ -529,6 +538,8 @@ sadmm_status sadmm_world_check_target(const double position[3], const double ori
 
 /* ---- shape.c ---- */
 
+/* Room for so many slots of shapes; false when memory runs out. */
+bool sadmm_world_reserve_shapes(sadmm_world *world, size_t slots);
 /* A shape into a slot that there is room for and that has a generation. body: the slot of a live one. Errors as of
  * sadmm_world_add_shape, with nothing changed. */
 sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body, const sadmm_shape_def *def,
@@ -548,6 +559,11 @@ sadmm_status sadmm_world_check_coordinate(const struct sadmm_world_joint *joint,
 void sadmm_world_free_tables(sadmm_world *world);
 /* Something of a joint has been set: the next step of the backend that keeps the world takes it along. */
 sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
+/* Room for so many slots of joints; false when memory runs out. */
+bool sadmm_world_reserve_joints(sadmm_world *world, size_t slots);
+/* A joint in a slot is on its bodies' lists, a gear on its joints', from here on. */
+void sadmm_world_link_joint(sadmm_world *world, size_t slot);
+void sadmm_world_link_gear(sadmm_world *world, size_t slot);
 /* Put a joint that has been checked into a slot. */
 sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot);
 /* With its coupling, if it is of one, and the gears on it. */

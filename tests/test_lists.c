@@ -1,0 +1,165 @@
+/* Lists that stay quick wherever things come and go: key trees, sets of slots, tables of pairs, against plain arrays. */
+#include <check.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/key_tree.h"
+#include "core/base/memory.h"
+#include "core/world/pair_table.h"
+#include "core/world/slots.h"
+#include "run_suite.h"
+
+enum { KEYS = 300, SLOTS = 700, BODIES = 14, CALLS = 20000 };
+
+static uint64_t state;
+
+static int below(int n)
+{
+    state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (int)((state >> 33) % (uint64_t)n);
+}
+
+/* Key k, all over the 64 bits. */
+static uint64_t key_of(int k) { return (uint64_t)k << 55 | (uint64_t)k; }
+
+static void compare_tree(const struct sadmm_key_tree *tree, const double values[KEYS])
+{
+    size_t count = 0;
+    for (int k = 0; k < KEYS; ++k) {
+        const double *found = sadmm_key_tree_find(tree, key_of(k));
+        const struct sadmm_key_node *from = sadmm_key_tree_from(tree, key_of(k));
+        int next = k;
+        while (next < KEYS && values[next] < 0) ++next;
+        ck_assert((found != NULL) == (values[k] >= 0) && (!found || *found == values[k]));
+        ck_assert((from != NULL) == (next < KEYS) && (!from || from->key == key_of(next)));
+        if (!found) continue;
+        ck_assert(sadmm_key_tree_at(tree, count)->key == key_of(k));
+        ++count;
+    }
+    ck_assert_uint_eq(sadmm_key_tree_count(tree), count);
+}
+
+/* Negative values: keys that are not there. Few and many in turn. */
+START_TEST(key_trees)
+{
+    struct sadmm_key_tree tree = {0};
+    double values[KEYS];
+    state = 5;
+    for (int k = 0; k < KEYS; ++k) values[k] = -1;
+    for (int call = 0; call < CALLS; ++call) {
+        const int k = below(KEYS) * (call % 3 == 0) + below(KEYS) / 8 * (call % 3 != 0);
+        if (below(CALLS) < (call / 4000 % 2 ? 6000 : 14000)) {
+            values[k] = below(1000);
+            ck_assert(sadmm_key_tree_reserve(&tree));
+            sadmm_key_tree_set(&tree, key_of(k), values[k]);
+        } else {
+            values[k] = -1;
+            sadmm_key_tree_remove(&tree, key_of(k));
+        }
+        if (call % 50 == 0) compare_tree(&tree, values);
+    }
+    ck_assert_uint_le(tree.used, KEYS + 1); /* what was removed is used again */
+    sadmm_key_tree_free(&tree);
+}
+END_TEST
+
+static void compare_slots(const struct sadmm_slot_set *set, const bool taken[SLOTS], int room)
+{
+    int32_t count = 0;
+    int lowest = 0;
+    while (lowest < room && taken[lowest]) ++lowest;
+    const size_t free = sadmm_slots_free(set);
+    ck_assert(lowest < room ? free == (size_t)lowest : free >= (size_t)room);
+    for (int slot = 0; slot < room; ++slot) {
+        ck_assert_int_eq(sadmm_slots_index(set, (size_t)slot), count);
+        if (!taken[slot]) continue;
+        ck_assert_uint_eq(sadmm_slots_at(set, count), (size_t)slot);
+        ++count;
+    }
+}
+
+/* In room that grows slot by slot, as slots of worlds do. */
+START_TEST(slots)
+{
+    struct sadmm_slot_set set = {0};
+    bool taken[SLOTS] = {false};
+    int room = 0;
+    state = 9;
+    ck_assert_uint_eq(sadmm_slots_free(&set), 0);
+    for (int call = 0; call < CALLS; ++call) {
+        if (room < SLOTS && (room == 0 || call % 16 == 0)) {
+            ck_assert(sadmm_slots_reserve(&set, (size_t)++room));
+            taken[room - 1] = call % 1024 != 0;
+            if (taken[room - 1]) sadmm_slots_take(&set, (size_t)room - 1);
+        }
+        const int slot = below(room);
+        if (taken[slot] && below(4) > 0) continue;
+        (taken[slot] ? sadmm_slots_release : sadmm_slots_take)(&set, (size_t)slot);
+        taken[slot] = !taken[slot];
+        if (call % 50 < 2) compare_slots(&set, taken, room);
+    }
+    while (sadmm_slots_free(&set) < (size_t)room) { /* until none is free */
+        taken[sadmm_slots_free(&set)] = true;
+        sadmm_slots_take(&set, sadmm_slots_free(&set));
+    }
+    compare_slots(&set, taken, room);
+    sadmm_slots_destroy(&set);
+}
+END_TEST
+
+static void compare_pairs(struct sadmm_pair_table *table, double values[BODIES][BODIES])
+{
+    size_t count = 0;
+    ck_assert_int_eq(sadmm_pair_table_list(table, NULL), SADMM_OK);
+    for (int a = 0; a < BODIES; ++a)
+        for (int b = a + 1; b < BODIES; ++b) {
+            const uint64_t key = sadmm_pair_key((size_t)b, (size_t)a);
+            const double *found = sadmm_pair_table_find(table, key);
+            double at;
+            ck_assert((found != NULL) == (values[a][b] > 0) && (!found || *found == values[a][b]));
+            if (!found) continue;
+            ck_assert(table->keys[count] == key && table->values[count] == values[a][b]);
+            ck_assert(sadmm_pair_table_at(table, count, &at) == key && at == values[a][b]);
+            ++count;
+        }
+    ck_assert_uint_eq(sadmm_pair_table_count(table), count);
+}
+
+START_TEST(pairs)
+{
+    struct sadmm_pair_table table = {.listed = false};
+    double values[BODIES][BODIES] = {{0}};
+    state = 2;
+    for (int call = 0; call < CALLS; ++call) {
+        const int a = below(BODIES - 1), b = a + 1 + below(BODIES - 1 - a), kind = below(40);
+        const uint64_t key = sadmm_pair_key((size_t)a, (size_t)b);
+        if (kind == 0) {
+            sadmm_pair_table_forget(&table, (uint32_t)a);
+            for (int k = 0; k < BODIES; ++k) values[a][k] = values[k][a] = 0;
+        } else if (kind < 5) {
+            sadmm_pair_table_remove(&table, key);
+            values[a][b] = 0;
+        } else if (kind < 20) {
+            sadmm_pair_table_lower(&table, key);
+            if (values[a][b] > 0) --values[a][b];
+        } else {
+            values[a][b] = 1 + below(3);
+            ck_assert_int_eq(sadmm_pair_table_set(&table, key, values[a][b], NULL), SADMM_OK);
+        }
+        if (call % 20 == 0) compare_pairs(&table, values);
+    }
+    sadmm_pair_table_free(&table);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("lists");
+    TCase *cases = tcase_create("lists");
+    tcase_add_test(cases, key_trees);
+    tcase_add_test(cases, slots);
+    tcase_add_test(cases, pairs);
+    suite_add_tcase(suite, cases);
+    return run_suite(suite);
+}
