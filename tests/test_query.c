@@ -514,6 +514,108 @@ START_TEST(bad_rays)
 END_TEST
 
 /* Memory may run out anywhere: the error says so, and the next query is whole. */
+/* Shapes whose tops are one plane, at the poses of a world: what is hit first is decided by rounding, or by slots. */
+static sadmm_world *flush_world(struct random *r, bool turned)
+{
+    static const double square[4][3] = {{-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}}, flat[9] = {0};
+    static const int32_t halves[2][3] = {{0, 1, 2}, {0, 2, 3}};
+    static const sadmm_shape_type types[] = {SADMM_SHAPE_PLANE, SADMM_SHAPE_MESH, SADMM_SHAPE_BOX, SADMM_SHAPE_CYLINDER,
+                                             SADMM_SHAPE_MESH, SADMM_SHAPE_CONE};
+    const sadmm_mesh_def mesh_def = {square[0], 4, halves[0], 2};
+    const sadmm_heightfield_def field_def = {flat, 3, 3, {1.7, 1.7}};
+    sadmm_world *world = empty_world();
+    sadmm_body_def body_def = sadmm_body_def_default();
+    sadmm_body_id body;
+    sadmm_mesh *mesh, *field;
+    double norm = 0;
+    body_def.type = SADMM_BODY_STATIC;
+    for (int k = 0; k < 4; ++k) body_def.orientation[k] = turned || k == 0 ? random_in(r, -1, 1) : 0;
+    for (int k = 0; k < 4; ++k) norm += body_def.orientation[k] * body_def.orientation[k];
+    for (int k = 0; k < 4; ++k) body_def.orientation[k] /= sqrt(norm);
+    MUST(world, sadmm_world_add_body(world, &body_def, &body));
+    ck_assert_int_eq(sadmm_mesh_create(&mesh_def, &mesh), SADMM_OK);
+    ck_assert_int_eq(sadmm_heightfield_create(&field_def, &field), SADMM_OK);
+    const int first = (int)random_in(r, 0, 6);
+    for (int k = 0; k < 6; ++k) {
+        const int which = (first + k) % 6;
+        sadmm_shape_def def = shape_of(types[which], 1.5, 0.5, 0.5);
+        if (types[which] == SADMM_SHAPE_MESH) def.mesh = which == 1 ? mesh : field;
+        if (types[which] == SADMM_SHAPE_BOX) def.size[1] = 1.5, def.position[2] = -0.5;
+        if (types[which] == SADMM_SHAPE_CYLINDER) def.position[2] = -0.5;
+        if (types[which] == SADMM_SHAPE_CONE) { /* on its head */
+            def.orientation[0] = 0, def.orientation[1] = 1;
+            def.position[2] = -0.5;
+        }
+        add_shape(world, body, &def);
+    }
+    sadmm_mesh_destroy(mesh);
+    sadmm_mesh_destroy(field);
+    return world;
+}
+
+/* The first hit is the first of all hits, to the bit, and so are the first few. */
+START_TEST(first_is_first_of_all)
+{
+    struct random r = {12};
+    int ties = 0;
+    for (int w = 0; w < 30; ++w) {
+        sadmm_world *world = flush_world(&r, w % 3 > 0);
+        for (int k = 0; k < 1000; ++k) {
+            sadmm_ray_hit first, some[2], all[8];
+            int32_t count, of_some;
+            sadmm_ray ray = random_ray(&r);
+            if (k % 4 == 0) /* along the surface, nearly */
+                for (int i = 0; i < 3; ++i) ray.direction[i] = -ray.origin[i] * (1 + 1e-9 * random_in(&r, -1, 1));
+            MUST(world, sadmm_world_cast_ray(world, &ray, NULL, &first));
+            MUST(world, sadmm_world_cast_ray_all(world, &ray, NULL, 8, all, &count));
+            MUST(world, sadmm_world_cast_ray_all(world, &ray, NULL, 2, some, &of_some));
+            if (count == 0) {
+                ck_assert_int_eq((int)first.shape.slot, 0);
+                continue;
+            }
+            ck_assert_msg(same_hit(&first, &all[0]), "world %d, ray %d: slot %u at %.17g, of all slot %u at %.17g", w, k,
+                          first.shape.slot, first.distance, all[0].shape.slot, all[0].distance);
+            ck_assert_int_eq(of_some, count);
+            ck_assert(same_hits(some, all, count < 2 ? count : 2));
+            ties += count > 1 && all[1].distance - all[0].distance < 1e-12;
+        }
+        sadmm_world_destroy(world);
+    }
+    ck_assert_int_gt(ties, 1000);
+}
+END_TEST
+
+/* Numbers as small and as large as there are: what is hit has a distance, a point and a unit normal. */
+START_TEST(whatever_is_hit_has_numbers)
+{
+    static const double sizes[] = {0, 5e-324, 1e-310, 1e-300, 1e-160, 1e-20, 1, 1e298};
+    struct random r = {3};
+    int hits = 0;
+    for (int w = 0; w < 16; ++w) {
+        sadmm_world *world = flush_world(&r, w % 2);
+        sadmm_body_state state = body_state(world, body_at(world, 0));
+        if (w / 2 % 4) state.position[w / 2 % 4 - 1] = w < 8 ? -1e298 : 1e298;
+        MUST(world, sadmm_world_set_body_state(world, body_at(world, 0), &state));
+        for (int k = 0; k < 2000; ++k) {
+            sadmm_ray ray = {.length = k % 2 ? INFINITY : 1e300};
+            sadmm_ray_hit hit;
+            for (int i = 0; i < 3; ++i) {
+                ray.origin[i] = sizes[(int)random_in(&r, 0, 7)] * random_in(&r, -1, 1);
+                ray.direction[i] = sizes[(int)random_in(&r, 0, 8)] * random_in(&r, -1, 1);
+            }
+            if (ray.direction[0] == 0 && ray.direction[1] == 0 && ray.direction[2] == 0) continue;
+            MUST(world, sadmm_world_cast_ray(world, &ray, NULL, &hit));
+            if (!hit.shape.slot) continue;
+            ++hits;
+            for (int i = 0; i < 3; ++i) ck_assert(isfinite(hit.point[i]));
+            ck_assert(hit.distance >= 0 && isfinite(hit.distance) && fabs(v3_norm(v3_load(hit.normal)) - 1) < 1e-12);
+        }
+        sadmm_world_destroy(world);
+    }
+    ck_assert_int_gt(hits, 3000);
+}
+END_TEST
+
 START_TEST(out_of_memory)
 {
     struct crowd c = make_crowd(20, 3);
@@ -556,6 +658,8 @@ int main(void)
     tcase_add_test(tcase, batch_is_single);
     tcase_add_test(tcase, history_does_not_show);
     tcase_add_test(tcase, bad_rays);
+    tcase_add_test(tcase, first_is_first_of_all);
+    tcase_add_test(tcase, whatever_is_hit_has_numbers);
     tcase_add_test(tcase, out_of_memory);
     suite_add_tcase(suite, tcase);
     return run_suite(suite);

@@ -128,10 +128,16 @@ static bool comes_before(const struct sadmm_query_hit *a, const struct sadmm_que
     return a->find.distance < b->find.distance || (a->find.distance == b->find.distance && a->slot < b->slot);
 }
 
-static void try_shape(struct cast *c, const struct sadmm_placed *shape)
+/* enter: where the ray enters its box. */
+static void try_shape(struct cast *c, const struct sadmm_placed *shape, double enter)
 {
     struct sadmm_query_hit hit;
     if (!sadmm_query_sees(c->filter, shape) || !sadmm_ray_cast(c->ray, shape, c->limit, &hit.find)) return;
+    if (hit.find.distance < enter) { /* by rounding (ray_box.h) */
+        hit.find.distance = enter;
+        hit.find.inside = false;
+    }
+    if (hit.find.distance > c->limit) return;
     hit.slot = shape->slot;
     hit.body = shape->body;
     if (c->all < INT32_MAX) ++c->all;
@@ -152,13 +158,13 @@ int32_t sadmm_query_tree_cast(const struct sadmm_query_tree *tree, const struct 
         .ray = ray, .filter = filter, .hits = hits, .capacity = capacity, .first = first, .limit = ray->length};
     const struct mesh_node *leaf;
     struct ray_walk walk;
-    for (int32_t i = 0; i < tree->planes; ++i) try_shape(&c, &tree->shapes[tree->count + i]);
+    for (int32_t i = 0; i < tree->planes; ++i) try_shape(&c, &tree->shapes[tree->count + i], 0);
     ray_walk_begin(&walk, tree->tree.nodes, tree->tree.count, ray->origin, ray->direction);
     while ((leaf = ray_walk_next(&walk, c.limit)))
         for (int32_t s = leaf->first >> 3; s < (leaf->first >> 3) + (leaf->first & 7); ++s) {
             double enter;
             if (ray_meets_box(&walk.slabs, tree->boxes[s].lo, tree->boxes[s].hi, c.limit, &enter))
-                try_shape(&c, &tree->shapes[s]);
+                try_shape(&c, &tree->shapes[s], enter);
         }
     return first ? c.kept : c.all;
 }

@@ -31,8 +31,10 @@ static bool cast_plane(const struct sadmm_ray_line *ray, const struct sadmm_plac
         rate += n[k] * ray->direction[k];
     }
     if (height < 0) return starts_inside(ray, find);
-    if (!(rate < 0) || !(height <= -rate * limit)) return false;
-    enters_at(height / -rate, n, find);
+    if (!(rate < 0)) return false;
+    const double distance = height / -rate;
+    if (!(distance <= limit && distance < HUGE_VAL)) return false; /* so far away that there is no number for it */
+    enters_at(distance, n, find);
     return true;
 }
 

@@ -21,7 +21,8 @@ static inline struct ray_slabs ray_slabs_of(const double x[3], const double d[3]
 }
 
 /* Does it meet the box within the limit? *enter: where. Rounding favours meeting: of both ends of a slab each is off by
- * up to 3 units of itself. */
+ * up to 3 units of itself. A box around another one is not entered later, rounding included: where what is in a box is
+ * hit at `enter` or later (a distance that is less by rounding is put there), nothing that counts is left out for a limit. */
 static inline bool ray_meets_box(const struct ray_slabs *s, const float lo[3], const float hi[3], double limit,
                                  double *enter)
 {
@@ -52,6 +53,7 @@ struct ray_walk {
     } stack[RAY_STACK];
     int waiting;
     int32_t at, end; /* nodes to be walked in order */
+    double enter;    /* where the leaf's box is entered that came last */
 };
 
 static inline void ray_walk_begin(struct ray_walk *w, const struct mesh_node *nodes, int32_t count, const double x[3],
@@ -74,12 +76,14 @@ static inline const struct mesh_node *ray_walk_next(struct ray_walk *w, double l
     while (w->at < w->end) {
         const struct mesh_node *node = &w->nodes[w->at];
         const bool meets = ray_meets_node(&w->slabs, node, limit, &enter);
+        w->enter = enter;
         w->at = meets ? w->at + 1 : node->next;
         if (meets && node->first >= 0) return node;
     }
     while (w->waiting > 0) {
         int32_t at = w->stack[--w->waiting].node;
-        if (w->stack[w->waiting].enter > limit) continue;
+        enter = w->stack[w->waiting].enter;
+        if (enter > limit) continue;
         if (at == 0 && !ray_meets_node(&w->slabs, w->nodes, limit, &enter)) continue;
         while (w->nodes[at].first < 0) { /* inner: its children are the next node, and the one after that's subtree */
             int32_t near = at + 1, far = w->nodes[at + 1].next;
@@ -107,8 +111,10 @@ static inline const struct mesh_node *ray_walk_next(struct ray_walk *w, double l
                 at = near;
             } else {
                 at = to_near ? near : far;
+                enter = to_near ? enter : other;
             }
         }
+        w->enter = enter;
         if (at >= 0) return &w->nodes[at];
     }
     return NULL;

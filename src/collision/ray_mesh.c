@@ -55,7 +55,8 @@ struct search {
     int32_t triangle;
 };
 
-static void try_triangle(struct search *s, int32_t triangle)
+/* enter: where the ray enters the box that it is in (ray_box.h). */
+static void try_triangle(struct search *s, int32_t triangle, double enter)
 {
     int32_t corner[3], opposite[3];
     mesh_corners(s->mesh, triangle, corner, opposite);
@@ -67,8 +68,8 @@ static void try_triangle(struct search *s, int32_t triangle)
     if (!front && !back) return;
     const double all = u + v + w;
     if (all == 0) return; /* seen edge on */
-    const double distance = (u * a.z + v * b.z + w * c.z) / all;
-    if (!(distance >= 0 && distance <= s->limit)) return;
+    const double own = (u * a.z + v * b.z + w * c.z) / all, distance = own < enter ? enter : own;
+    if (!(own >= 0 && distance <= s->limit)) return;
     if (distance == s->limit && s->triangle >= 0 && triangle > s->triangle) return; /* the lower of two */
     s->limit = distance;
     s->triangle = triangle;
@@ -81,7 +82,7 @@ static void search_tree(struct search *s, const struct ray_line *line)
     struct ray_walk walk;
     ray_walk_begin(&walk, s->mesh->node, s->mesh->nodes, x, d);
     while ((leaf = ray_walk_next(&walk, s->limit)))
-        for (int32_t k = 0; k < (leaf->first & 7); ++k) try_triangle(s, (leaf->first >> 3) + k);
+        for (int32_t k = 0; k < (leaf->first & 7); ++k) try_triangle(s, (leaf->first >> 3) + k, walk.enter);
 }
 
 /* The cells [first, last] of `cells` that the coordinates from a to b are in, and one more on each side: which side of
@@ -104,7 +105,7 @@ static void search_heights(struct search *s, const struct ray_line *line)
     const int32_t cells[2] = {m->columns - 1, m->rows - 1};
     const double half[3] = {0.5 * cells[0] * m->spacing[0], 0.5 * cells[1] * m->spacing[1], m->half_height};
     const int major = fabs(d[0]) * m->spacing[1] >= fabs(d[1]) * m->spacing[0] ? 0 : 1, minor = 1 - major;
-    double in = 0, out = s->limit;
+    double in = 0, out = HUGE_VAL;
     for (int k = 0; k < 3; ++k) { /* within the box, and a little more */
         const double reach = half[k] * (1 + 1e-9) + 1e-9 * (fabs(x[k]) + half[0] + half[1]);
         if (fabs(d[k]) < 1e-300) {
@@ -125,7 +126,7 @@ static void search_heights(struct search *s, const struct ray_line *line)
         /* where the ray is in this column */
         const double begin = ((double)c - 0.5 * cells[major] - 0.01) * m->spacing[major],
                      end = begin + 1.02 * m->spacing[major];
-        double enter = in, leave = fmin(out, s->limit);
+        double enter = in, leave = out;
         if (fabs(d[major]) > 1e-300) {
             enter = fmax(enter, ((up ? begin : end) - x[major]) / d[major]);
             leave = fmin(leave, ((up ? end : begin) - x[major]) / d[major]);
@@ -138,8 +139,8 @@ static void search_heights(struct search *s, const struct ray_line *line)
             continue;
         for (int32_t r = low; r <= high; ++r) {
             const int32_t cell = major == 0 ? r * cells[0] + c : c * cells[0] + r;
-            try_triangle(s, 2 * cell);
-            try_triangle(s, 2 * cell + 1);
+            try_triangle(s, 2 * cell, enter);
+            try_triangle(s, 2 * cell + 1, enter);
         }
     }
 }

@@ -85,8 +85,7 @@ static sadmm_status check_range(sadmm_world *world, int32_t first, int32_t count
     const int32_t total = readable_contacts(world);
     if (first < 0 || count < 0 || first > total - count)
         return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "[first, first + count) = [%d, %lld): must be in [0, %d)", first, (long long)first + count,
-                          total);
+                          "first = %d, count = %d: must be contacts of the last step, which has %d", first, count, total);
     return SADMM_OK;
 }
 
