@@ -408,7 +408,7 @@ START_TEST(errors_of_contacts_are_the_certificates)
     double last = -1;
     MUST(world, sadmm_world_contact_errors(world, count - 1, 1, &last));
     ck_assert(last == errors[count - 1]);
-    REFUSED(world, sadmm_world_contact_errors(world, 1, count, errors), "[first, first + count)");
+    REFUSED(world, sadmm_world_contact_errors(world, 1, count, errors), "must be contacts of the last step");
 
     size_t size;
     MUST(world, sadmm_world_save(world, NULL, 0, &size));

@@ -88,7 +88,9 @@ typedef struct sadmm_joint_def {
     double position_b[3];        /* the same of b */
     double orientation_b[4];
     double length;               /* DISTANCE and LINK: m, in [0, 1e9], or -1: the distance when the joint is added (in
-                                    that range; what is read back); default -1 */
+                                    that range; what is read back); default -1. One of 0, or less than what the points
+                                    move in a step, is held to a share of that way, at the cost of energy: a SPHERICAL
+                                    joint holds two points together */
     bool collide;                /* do the two bodies meet each other? Default false. (With a static body only that one
                                     is left out; the static world is no body and leaves none out) */
     bool enabled;                /* default true. A joint that is not does nothing, but for `collide` */

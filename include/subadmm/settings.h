@@ -53,7 +53,9 @@ enum { SADMM_MOST_DIRECT_POINTS = 128 };
  * Symbols are the paper's (Sec. III-D). "kg/s^2" values are the paper's time-scaled units; the solver works
  * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/algorithm.md). */
 typedef struct sadmm_settings {
-    double dt;                   /* time step, s, in [1e-6, 1]; default 0.005. It may change from step to step */
+    double dt;                   /* time step, s, in [1e-6, 1]; default 0.005. It may change from step to step.
+                                    Joints lose energy where they turn by more than 0.1 rad in one
+                                    (docs/algorithm.md, section 10) */
     int substeps;                /* of a world's step, in [1, SADMM_MOST_SUBSTEPS = 64], dt / substeps >= 1e-6 s;
                                     default 1. A step is made of so many sub-steps of dt / substeps with a share of
                                     `iterations` each, so that bodies in motion overlap less (docs/motion.md). Pairs of

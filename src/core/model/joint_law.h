@@ -53,7 +53,7 @@ struct sadmm_joint_source {
     int32_t joint;
     int8_t role, coordinate, sign;
     double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step.
-                          Of springs, gap: the way to where a steep part of a table stops the coordinate, INFINITY where
+                          Of any row, slack: INFINITY where the step does not resolve its turning. Of springs, gap: the way to where a steep part of a table stops the coordinate, INFINITY where
                           there is none */
     double steered;    /* of the row's rate what sides give that are steered; it is in the bias */
 };
@@ -247,6 +247,8 @@ struct joint_moving {
     double turning;       /* what the row's rate by the velocities at the start is more: axes and arms turn */
     double turned;        /* what the rate at the end is more than the row's, so far as the law counts it */
     double steered;       /* of the rate what steered sides give */
+    bool turns;           /* by more than a step resolves: its bodies will be moved by the velocities of the step's end, */
+    bool late;            /* as they were in the last step, too */
     double reach;         /* it may move by so much */
     double response;
     double dt, most;      /* most: speed of corrections */
@@ -261,7 +263,36 @@ SADMM_INLINE void joint_add_law(struct joint_laws *laws, const struct joint_movi
     law->lo = lo, law->hi = hi;
     law->gap = gap;
     law->steered = sign * m->steered;
-    law->slack = role == SADMM_ROLE_LOWER || role == SADMM_ROLE_UPPER ? 2 * m->dt * fabs(m->turning) : 0;
+    law->slack = m->turns ? INFINITY
+               : role == SADMM_ROLE_LOWER || role == SADMM_ROLE_UPPER ? 2 * m->dt * fabs(m->turning) : 0;
+}
+
+/* Half a step resolves turning by up to this many rad. Beyond it positions that move by means of velocities gain energy, the
+ * more the more it is (docs/algorithm.md, section 10). */
+#define JOINT_MOST_TURN 0.05
+/* What rounding makes of speeds is no turning. */
+#define JOINT_NO_TURN 1e-9
+
+/* Does the row of coordinate k turn by more? turning: what its rate by the velocities at the start changes by in half a step,
+ * which is held against the speeds that turn: of its points around the bodies, and of one past the other where the axis does. */
+SADMM_INLINE bool joint_turns(const struct acting_joint *acting, int k, bool radial, double turning, double dt)
+{
+    const struct joint_geometry *g = &acting->start;
+    const vec3 va = v3_load(acting->side[0].velocity), vb = v3_load(acting->side[1].velocity),
+               turn_a = v3_load(acting->side[0].velocity + 3), turn_b = v3_load(acting->side[1].velocity + 3),
+               around_b = v3_cross(turn_b, g->arm_b);
+    vec3 arm = g->arm_a, around_a;
+    double past, axis, around;
+    if (k >= 3)
+        return fabs(turning) > JOINT_MOST_TURN * v3_norm(v3_sub(turn_b, turn_a)) +
+                                   JOINT_NO_TURN * (v3_norm(turn_a) + v3_norm(turn_b));
+    if (radial && k == 0) arm = v3_madd(arm, -g->value[0], g->axis[0]); /* to a's own point */
+    around_a = v3_cross(turn_a, arm);
+    around = v3_norm(around_a) + v3_norm(around_b);
+    past = v3_norm(v3_sub(v3_add(vb, around_b), v3_add(va, around_a)));
+    axis = dt / 2 * (radial && k == 0 ? past / max_of(g->value[0], JOINT_LEAST_LENGTH) : v3_norm(turn_a));
+    if (axis < JOINT_MOST_TURN) past *= axis / JOINT_MOST_TURN;
+    return fabs(turning) > JOINT_MOST_TURN * (around + past) + JOINT_NO_TURN * (v3_norm(va) + v3_norm(vb) + around);
 }
 
 SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, const struct sadmm_joint_memory *memory,
@@ -295,8 +326,10 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
     middle += steered, free += steered;
     m.steered = steered;
     m.turning = middle - m.before;
+    m.turns = joint_turns(acting, k, joint_is_radial(def->kind), m.turning, m.dt);
     m.free = free - m.turning;
-    m.turned = (memory->leads_stay ? 0 : m.turning) + steered; /* the solve's rates are of its bodies alone */
+    m.late = memory->leads_stay || m.turns;
+    m.turned = (m.late ? 0 : m.turning) + steered; /* the solve's rates are of its bodies alone */
     m.reach = 2 * m.dt * max_of(fabs(m.before), fabs(free));
     return m;
 }
@@ -320,7 +353,7 @@ SADMM_INLINE void joint_add_limits(struct joint_laws *laws, const struct joint_m
 SADMM_INLINE void joint_add_spring(struct joint_laws *laws, const struct joint_moving *m, int k, int role,
                                    double stiffness, double damping, double rest, double speed, double most)
 {
-    const double own = joint_late(stiffness, damping, m->response, m->dt), late = m->memory->leads_stay ? 1 : own;
+    const double own = joint_late(stiffness, damping, m->response, m->dt), late = m->late ? 1 : own;
     double gain, bias;
     joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late,
                  late + joint_lead(stiffness, damping, own, m->dt), &gain, &bias);
@@ -347,7 +380,7 @@ SADMM_INLINE void joint_add_table_spring(struct joint_laws *laws, const struct j
     const double stiffness = c->spring_stiffness, damping = c->spring_damping;
     const struct joint_table_way way = joint_way_of(m, k, c, table);
     const double own = joint_late(stiffness + way.steepest, damping, m->response, m->dt),
-                 late = m->memory->leads_stay ? 1 : own,
+                 late = m->late ? 1 : own,
                  lead = way.points > 0 ? 0 : joint_lead(stiffness + way.steepest, damping, own, m->dt);
     const struct joint_table_line line = joint_table_line_of(table, m->value, &way, own > 0);
     const double most = line.most.load + stiffness * (line.most.at - c->spring_rest),

@@ -75,6 +75,7 @@ SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, dou
     const double margin = source->slack + LEAD_SLOP * settings->slop;
     double lead = 0, speed = source->steered, way;
     int s, j;
+    if (source->slack == INFINITY) return true;
     if (!table && ((source->role != SADMM_ROLE_LOWER && source->role != SADMM_ROLE_UPPER) || !(lambda > 0)))
         return false;
     for (s = 0; s < 2; ++s) {
