@@ -16,6 +16,7 @@
 #include "core/base/contact_set.h"
 #include "core/math/step.h"
 #include "keys.h"
+#include "polytope_face.h"
 #include "proxy.h"
 
 /* One word from two counts (revisions, placings): a change of either always shows, of both together as well while the
@@ -109,14 +110,39 @@ SADMM_INLINE int32_t contact_find_feature(const struct sadmm_contact_point *poin
     return -1;
 }
 
-/* The impulse of the old pair's point of this feature, if there is one. ratio: step_ratio. */
-SADMM_INLINE void contact_carry(const struct sadmm_contact_pair *old, const struct sadmm_contact_point *old_points,
+/* The impulse of the old pair's point of this feature; false: there is none. ratio: step_ratio. */
+SADMM_INLINE bool contact_carry(const struct sadmm_contact_pair *old, const struct sadmm_contact_point *old_points,
                                 int32_t guess, const double normal[3], double friction, double ratio,
                                 struct sadmm_contact_point *point)
 {
     const struct sadmm_contact_point *from = old_points + old->first;
     const int32_t k = contact_find_feature(from, old->count, point->feature, guess);
     if (k >= 0) impulse_carry(old->normal, from[k].impulse, normal, friction, ratio, point->impulse);
+    return k >= 0;
+}
+
+/* Difference of unit normals below which two triangles are of one plane: rounding of single precision. */
+#define CONTACT_SAME_PLANE 1e-4
+
+/* The same of a point that slides over a mesh: the triangle that it was over in the last step may be another one of
+ * the same plane. Only points of the body are the same on both (mesh_leaves_out). [first, last): the old pairs of the
+ * two shapes. */
+SADMM_INLINE void contact_carry_across(const struct sadmm_contact_pair *pairs, int64_t first, int64_t last,
+                                       const struct sadmm_contact_point *old_points, uint32_t revision, int32_t guess,
+                                       const double normal[3], double friction, double ratio,
+                                       struct sadmm_contact_point *point)
+{
+    const uint32_t kind = point->feature >> AXIS_KIND_SHIFT;
+    int64_t i;
+    if (kind != FEATURE_VERTEX_A && kind != FEATURE_NEAREST) return;
+    for (i = first; i < last; ++i) {
+        double apart2 = 0;
+        int k;
+        for (k = 0; k < 3; ++k) apart2 += (pairs[i].normal[k] - normal[k]) * (pairs[i].normal[k] - normal[k]);
+        if (pairs[i].revision == revision && apart2 <= CONTACT_SAME_PLANE * CONTACT_SAME_PLANE &&
+            contact_carry(&pairs[i], old_points, guess, normal, friction, ratio, point))
+            return;
+    }
 }
 
 #endif

@@ -65,7 +65,8 @@ SADMM_INLINE void convex_mesh_give(const struct convex_triangle *p, uint32_t cac
             if (m->points[k].feature >> AXIS_KIND_SHIFT != FEATURE_NEAREST) m->points[kept++] = m->points[k];
         m->count = kept;
     }
-    mesh_give(&p->triangle, shared, m);
+    mesh_give(&p->triangle, shared ? MESH_AROUND : kind == CONVEX_MEMORY_FLAT_B ? MESH_IN_PLANE : MESH_ALONE,
+              4 * p->pair.slack, m);
 }
 
 /* Is a cap of the body along the face, so that points of its rim are the lowest? */
@@ -212,7 +213,9 @@ SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct 
      * at once where this is no face */
     if (!front || (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5)) {
         const real more = front ? MESH_SHALLOW : MANIFOLD_KEEP_EXTENT;
-        if (least < 4 * real_min(nearest->separation, 0) - more * pair->thin) m->count = 0;
+        if (m->count > 0 && least < 4 * real_min(nearest->separation, 0) - more * pair->thin &&
+            !(front && mesh_came_through_front(&p->mesh, &p->triangle, pair->t, m)))
+            m->count = 0;
     }
     convex_mesh_give(p, cache, axis.separation, m);
 }
@@ -227,7 +230,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     struct convex_memory memory;
     struct convex_axis axis;
     uint32_t found;
-    bool flat;
+    bool flat, shallow;
     convex_triangle_make(a, b, blocks, child, pose, &p);
     convex_recall(&p.pair, cache, &memory);
     if (!memory.known) memory.side = p.front.n;
@@ -241,8 +244,12 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     }
     if (p.front.separation > limit + p.pair.slack) return;
     /* of what is flat all around the face alone speaks, if only of what is over it */
-    flat = mesh_is_flat(&p.triangle) && p.front.separation >= -MESH_SHALLOW * p.pair.thin;
+    flat = mesh_is_flat(&p.triangle);
+    shallow = p.front.separation >= -MESH_SHALLOW * p.pair.thin;
     if (convex_lies_on(&p, flat || cache == of_front, limit, m) || flat) {
+        if (flat && m->count > 0 && !shallow && cache != of_front &&
+            !mesh_came_through_front(&p.mesh, &p.triangle, p.pair.t, m))
+            m->count = 0;
         m->cache = of_front;
         convex_mesh_give(&p, of_front, p.front.separation, m);
         return;

@@ -20,6 +20,7 @@
 
 #include "manifold_hull.h"
 #include "mesh_triangle.h"
+#include "mesh_walk.h"
 
 /* Up to this share of the thinner extent a body is pushed out by the face that it is over, whatever else would be
  * nearer: a body that slides on to the next triangle of a plane is over it by a sliver, at first. */
@@ -82,29 +83,47 @@ SADMM_INLINE real manifold_least(const struct manifold *m)
     return least;
 }
 
-/* A point that says nothing that others do not. shared: other triangles have the same normal. */
-SADMM_INLINE bool mesh_leaves_out(const struct mesh_triangle *t, uint32_t feature, bool shared)
+/* Which other triangles have the normal of a manifold: none that is known, those beside it in its plane, all around. */
+enum mesh_share { MESH_ALONE, MESH_IN_PLANE, MESH_AROUND };
+
+/* Is x beyond a flat edge, by more than the tolerance? Then it is over another triangle of the same plane. */
+SADMM_INLINE bool mesh_is_beyond_flat(const struct mesh_triangle *t, vec3 x, real tolerance)
 {
-    const uint32_t number = feature & AXIS_EDGE_MASK;
-    switch (feature >> AXIS_KIND_SHIFT) {
+    int k;
+    for (k = 0; k < 3; ++k) {
+        const vec3 from = mesh_corner(t, k), d = v3_sub(mesh_corner(t, mesh_next_corner(k)), from);
+        if (mesh_marked(t->marks, MESH_EDGE_FLAT, k) &&
+            v3_dot(v3_cross(t->normal, d), v3_sub(x, from)) < -tolerance * v3_norm(d))
+            return true;
+    }
+    return false;
+}
+
+/* A point that says nothing that others do not. slack: rounding of positions. */
+SADMM_INLINE bool mesh_leaves_out(const struct mesh_triangle *t, const struct manifold_point *point,
+                                  enum mesh_share share, real slack)
+{
+    const uint32_t number = point->feature & AXIS_EDGE_MASK;
+    switch (point->feature >> AXIS_KIND_SHIFT) {
+    case FEATURE_VERTEX_A: return share == MESH_IN_PLANE && mesh_is_beyond_flat(t, point->position, slack);
     case FEATURE_VERTEX_B:
         return mesh_marked(t->marks, MESH_CORNER_FLAT, (int)number - 1) ||
-               (shared && !mesh_marked(t->marks, MESH_CORNER_OWN, (int)number - 1));
+               (share == MESH_IN_PLANE && mesh_marked(t->marks, MESH_CORNER_LATER, (int)number - 1)) ||
+               (share == MESH_AROUND && !mesh_marked(t->marks, MESH_CORNER_OWN, (int)number - 1));
     case FEATURE_CROSSING:
         return mesh_marked(t->marks, MESH_EDGE_FLAT, (int)number) ||
-               (shared && !mesh_marked(t->marks, MESH_EDGE_OWN, (int)number));
+               (share == MESH_AROUND && !mesh_marked(t->marks, MESH_EDGE_OWN, (int)number));
     default: return false;
     }
 }
 
-/* The points that are this triangle's to give, in the frame of the mesh. shared: other triangles have the same
- * normal. */
-SADMM_INLINE void mesh_give(const struct mesh_triangle *t, bool shared, struct manifold *m)
+/* The points that are this triangle's to give, in the frame of the mesh. */
+SADMM_INLINE void mesh_give(const struct mesh_triangle *t, enum mesh_share share, real slack, struct manifold *m)
 {
     int k, kept = 0;
     for (k = 0; k < m->count; ++k) {
         struct manifold_point point = m->points[k];
-        if (mesh_leaves_out(t, point.feature, shared)) continue;
+        if (mesh_leaves_out(t, &point, share, slack)) continue;
         point.position = v3_add(point.position, t->origin);
         m->points[kept++] = point;
     }
@@ -116,7 +135,8 @@ SADMM_INLINE void mesh_finish(const struct mesh_pair *p, int kind, struct manifo
 {
     const bool sphere = p->pair.a.vertices == 1;
     if (sphere && m->count > 0 && !mesh_owns(&p->triangle, v3_neg(m->normal))) m->count = 0;
-    mesh_give(&p->triangle, kind == AXIS_FACE_A, m);
+    mesh_give(&p->triangle, kind == AXIS_FACE_A ? MESH_AROUND : kind == AXIS_FACE_B ? MESH_IN_PLANE : MESH_ALONE,
+              4 * p->pair.slack, m);
 }
 
 /* Does the body lie on the triangle: is the lowest point of it over the face? known: it did in the last step, or else
@@ -154,10 +174,138 @@ SADMM_INLINE bool mesh_has_vertex_over(const struct mesh_pair *p, real limit)
     return any_within(a->x, a->y, a->z, hull_stride(a->vertices), &planes);
 }
 
+/* Is x over the face, or beside it by no more than the tolerance? */
+SADMM_INLINE bool mesh_is_over(const struct mesh_triangle *t, vec3 x, real tolerance)
+{
+    int k;
+    for (k = 0; k < 3; ++k) {
+        const vec3 from = mesh_corner(t, k), d = v3_sub(mesh_corner(t, mesh_next_corner(k)), from);
+        if (v3_dot(v3_cross(t->normal, d), v3_sub(x, from)) < -tolerance * v3_norm(d)) return false;
+    }
+    return true;
+}
+
+/* The ends of a capsule, or a sphere, that are over the face: steep ones as well, for what stands on one end may fall
+ * onto the other within the step. */
+SADMM_INLINE void mesh_ends_over(const struct mesh_pair *p, real limit, struct manifold *m)
+{
+    const struct polytope_pair *pair = &p->pair;
+    const vec3 n = p->triangle.normal;
+    const real beside = pair->a.vertices == 1 ? 4 * pair->slack : MANIFOLD_SNAP / 2 * pair->thin;
+    int k;
+    m->normal = p->front.n;
+    for (k = 0; k < pair->a.vertices; ++k) {
+        const vec3 x = pair_point_a(pair, k);
+        const real gap = v3_dot(n, x) - pair->a.radius;
+        if (gap > limit + pair->slack || !mesh_is_over(&p->triangle, x, beside)) continue;
+        manifold_add(m, v3_madd(x, -pair->a.radius - gap / 2, n), gap, polytope_feature(FEATURE_VERTEX_A, 0, k) + 1);
+    }
+}
+
+/* The points along the face's normal of what is over it; the lowest corner of a body need not be one of the face that
+ * points there. */
+SADMM_INLINE void mesh_on_front(const struct mesh_pair *p, real limit, struct manifold *m)
+{
+    const struct polytope_pair *pair = &p->pair;
+    const vec3 n = p->triangle.normal;
+    vec3 x;
+    int v;
+    if (pair->a.faces == 0) {
+        mesh_ends_over(p, limit, m);
+        return;
+    }
+    facing_manifold(pair, p->front.n, p->front.separation, limit, m);
+    v = polytope_support(&pair->a, v3_neg(m3_tmul(pair->R, n)), 0);
+    x = pair_point_a(pair, v);
+    if (!mesh_is_over(&p->triangle, x, 4 * pair->slack)) return;
+    hull_add_nearest(pair->thin, v3_madd(x, -pair->a.radius, n), v3_madd(x, -v3_dot(n, x), n),
+                     polytope_feature(FEATURE_VERTEX_A, 0, v) + 1, m);
+}
+
+/* ---- deep in the surface ----------------------------------------------------------------------------------------- */
+
+/* The share of the way `from` - `to` at which it comes into the surface through the triangle; above 1: it does not. */
+SADMM_INLINE real mesh_way_in(const struct mesh_triangle *t, vec3 from, vec3 to)
+{
+    const real high = v3_dot(t->normal, v3_sub(from, t->origin)), low = v3_dot(t->normal, v3_sub(to, t->origin));
+    const real share = high / (high - low);
+    if (!(high >= 0 && low < 0)) return 2;
+    return mesh_is_over(t, v3_sub(v3_madd(from, share, v3_sub(to, from)), t->origin),
+                        16 * SADMM_EPSILON * (v3_norm(to) + v3_norm(from)))
+               ? share
+               : 2;
+}
+
+/* Is a body with its middle at `from` at `to`, inside of the surface, because it came through what looks along n? The
+ * surface is asked where the way there first goes in: of what the body is deep in that is where it came from, whatever
+ * triangles are near. */
+SADMM_RARE bool mesh_came_through(const struct mesh *m, vec3 from, vec3 to, vec3 n)
+{
+    struct sadmm_box3 box;
+    struct mesh_walk walk;
+    struct mesh_triangle t;
+    real first = 2, along = -1;
+    int32_t triangle;
+    int k;
+    const real a[3] = {from.x, from.y, from.z}, b[3] = {to.x, to.y, to.z};
+    for (k = 0; k < 3; ++k) {
+        const double rounding = 16 * (double)SADMM_EPSILON * (fabs((double)a[k]) + fabs((double)b[k]));
+        box.lo[k] = smaller_of((double)a[k], (double)b[k]) - rounding;
+        box.hi[k] = (double)a[k] + (double)b[k] - smaller_of((double)a[k], (double)b[k]) + rounding;
+    }
+    mesh_walk_begin(m, &box, &walk);
+    for (triangle = mesh_walk_next(m, &walk); triangle >= 0; triangle = mesh_walk_next(m, &walk)) {
+        real share, same;
+        mesh_triangle_of(m, triangle, &t);
+        share = mesh_way_in(&t, from, to);
+        if (share > 1) continue;
+        same = v3_dot(t.normal, n);
+        /* through an edge, as far as rounding can tell: either side */
+        if (share < first - 64 * SADMM_EPSILON) along = same;
+        else if (share <= first + 64 * SADMM_EPSILON) along = real_max(along, same);
+        else continue;
+        first = real_min(first, share);
+    }
+    return along >= MANIFOLD_COS_SAME;
+}
+
+/* Is the deepest point of m, along the face's normal, where the body came through it? In the frame of the triangle. */
+SADMM_INLINE bool mesh_came_through_front(const struct mesh *mesh, const struct mesh_triangle *t, vec3 middle,
+                                          const struct manifold *m)
+{
+    int k, deepest = 0;
+    vec3 x;
+    for (k = 1; k < m->count; ++k)
+        if (m->points[k].separation < m->points[deepest].separation) deepest = k;
+    x = v3_madd(m->points[deepest].position, -m->points[deepest].separation / 2, m->normal);
+    return mesh_came_through(mesh, v3_add(middle, t->origin), v3_add(x, t->origin), t->normal);
+}
+
+/* A point inside of the body, as near to its middle as its corners tell. */
+SADMM_INLINE vec3 mesh_middle_of(const struct polytope_pair *pair)
+{
+    vec3 sum = v3(0, 0, 0);
+    int k;
+    for (k = 0; k < pair->a.vertices; ++k) sum = v3_add(sum, polytope_vertex(&pair->a, k));
+    return v3_add(m3_mul(pair->R, v3_scale(sum, (real)1 / (real)pair->a.vertices)), pair->t);
+}
+
 /* The last step's axis. False: there is none. */
 SADMM_INLINE bool mesh_recall(const struct mesh_pair *p, uint32_t cache, struct polytope_axis *kept)
 {
     return axis_recall(&p->pair, cache, kept) && !(kept->kind == AXIS_FACE_B && kept->b == MESH_BACK);
+}
+
+/* Where all around is in the triangle's plane the face says all that there is to say. known: it did in the last step. */
+SADMM_INLINE void mesh_by_face(const struct mesh_pair *p, bool known, real limit, struct manifold *m)
+{
+    const bool shallow = p->front.separation >= -MESH_SHALLOW * p->pair.thin;
+    mesh_on_front(p, limit, m);
+    if (m->count > 0 && !shallow && !known &&
+        !mesh_came_through_front(&p->mesh, &p->triangle, mesh_middle_of(&p->pair), m))
+        m->count = 0;
+    m->cache = axis_memory(&p->front);
+    mesh_finish(p, AXIS_FACE_B, m);
 }
 
 /* What needs no search: true, and the manifold is there, or there is none. Else as hull_by_memory. */
@@ -168,7 +316,10 @@ SADMM_INLINE bool mesh_by_memory(const struct mesh_pair *p, real limit, uint32_t
     *known = mesh_recall(p, cache, kept);
     *start = *known ? kept->n : p->front.n;
     if (p->front.separation > limit + pair->slack || (*known && kept->separation > limit + pair->slack)) return true;
-    if (mesh_is_flat(&p->triangle) && !mesh_has_vertex_over(p, limit)) return true;
+    if (mesh_is_flat(&p->triangle)) {
+        if (mesh_has_vertex_over(p, limit)) mesh_by_face(p, *known && kept->kind == AXIS_FACE_B, limit, m);
+        return true;
+    }
     if (pair->a.faces == 0 || (*known && kept->kind == AXIS_EDGES)) return false;
     if (*known && kept->kind == AXIS_FACE_A) {
         facing_manifold(pair, kept->n, kept->separation, limit, m);
@@ -188,33 +339,6 @@ SADMM_INLINE bool mesh_by_memory(const struct mesh_pair *p, real limit, uint32_t
     m->count = 0;
     m->cache = 0;
     return false;
-}
-
-/* Is x over the face, or beside it by no more than the tolerance? */
-SADMM_INLINE bool mesh_is_over(const struct mesh_triangle *t, vec3 x, real tolerance)
-{
-    int k;
-    for (k = 0; k < 3; ++k) {
-        const vec3 from = mesh_corner(t, k), d = v3_sub(mesh_corner(t, mesh_next_corner(k)), from);
-        if (v3_dot(v3_cross(t->normal, d), v3_sub(x, from)) < -tolerance * v3_norm(d)) return false;
-    }
-    return true;
-}
-
-/* The ends of a capsule, or a sphere, that are over the face: steep ones as well, for what stands on one end may fall
- * onto the other within the step. */
-SADMM_INLINE void mesh_ends_over(const struct mesh_pair *p, real limit, struct manifold *m)
-{
-    const struct polytope_pair *pair = &p->pair;
-    const vec3 n = p->triangle.normal;
-    int k;
-    m->normal = p->front.n;
-    for (k = 0; k < pair->a.vertices; ++k) {
-        const vec3 x = pair_point_a(pair, k);
-        const real gap = v3_dot(n, x) - pair->a.radius;
-        if (gap > limit + pair->slack || !mesh_is_over(&p->triangle, x, MANIFOLD_SNAP / 2 * pair->thin)) continue;
-        manifold_add(m, v3_madd(x, -pair->a.radius - gap / 2, n), gap, polytope_feature(FEATURE_VERTEX_A, 0, k) + 1);
-    }
 }
 
 /* The directions that an edge pushes along, if it stands out: they go down to both sides of it. */
@@ -300,10 +424,12 @@ SADMM_RARE void mesh_by_surface(const struct mesh_pair *p, const struct polytope
         pa = v3_madd(pa, pair->a.radius, axis.n);
         hull_add_nearest(pair->thin, pa, pb, polytope_feature(FEATURE_CROSSING, axis.a, axis.b), m);
     }
-    /* much deeper by it than by a way out that has not much to do with it: that is for other triangles to say */
+    /* much deeper by it than by a way out that has not much to do with it: that is for other triangles to say, unless
+     * the body came through here */
     least = manifold_least(m);
-    if (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5 &&
-        least < 4 * real_min(nearest->separation, 0) - MESH_SHALLOW * pair->thin)
+    if (m->count > 0 && !kept_front && v3_dot(axis.n, nearest->n) < (real)0.5 &&
+        least < 4 * real_min(nearest->separation, 0) - MESH_SHALLOW * pair->thin &&
+        !(axis.kind == AXIS_FACE_B && mesh_came_through_front(&p->mesh, &p->triangle, mesh_middle_of(pair), m)))
         m->count = 0;
     mesh_finish(p, axis.kind, m);
 }

@@ -105,6 +105,34 @@ static int32_t beside_height(const struct mesh *m, int32_t triangle, int k)
     return column + 1 < cells ? triangle + 3 : -1;
 }
 
+/* The triangle beyond edge k, if it lies in the plane of `triangle`, else -1. */
+static int32_t beside_in_plane(const struct mesh *m, const int32_t *beside, int32_t triangle, int k)
+{
+    struct mesh_triangle t;
+    const int32_t other = beside ? beside[3 * triangle + k] : beside_height(m, triangle, k);
+    if (other < 0) return -1;
+    mesh_triangle_of(m, triangle, &t);
+    return is_in_plane(m, &t, k, t.opposite[k]) ? other : -1;
+}
+
+/* From triangle to triangle around a vertex, in one plane, beginning across edge k: is one of them before `first`? */
+static bool is_one_before(const struct mesh *m, const int32_t *beside, int32_t first, int k, int32_t vertex)
+{
+    int32_t from = first, at = beside_in_plane(m, beside, first, k);
+    while (at > first) {
+        int32_t corner[3], opposite[3], next = -1;
+        mesh_corners(m, at, corner, opposite);
+        for (int i = 0; i < 3; ++i) {
+            const int32_t other = beside ? beside[3 * at + i] : beside_height(m, at, i);
+            if ((corner[i] == vertex || corner[mesh_next_corner(i)] == vertex) && other != from)
+                next = beside_in_plane(m, beside, at, i);
+        }
+        from = at;
+        at = next;
+    }
+    return at >= 0 && at < first;
+}
+
 /* The marks of every triangle of a block that has all else. beside: 3 a triangle; NULL: a heightfield. False: out of
  * memory. */
 static bool mark_triangles(const struct mesh *m, const int32_t *beside, uint16_t *marks)
@@ -128,6 +156,9 @@ static bool mark_triangles(const struct mesh *m, const int32_t *beside, uint16_t
                 if (other < 0 || other > triangle) all |= 1u << (MESH_EDGE_OWN + k);
                 if (is_flat_corner(m, &t, k, at_end)) all |= 1u << (MESH_CORNER_FLAT + k);
                 if (!owned[t.corner[k]]) all |= 1u << (MESH_CORNER_OWN + k);
+                if (is_one_before(m, beside, triangle, k, t.corner[k]) ||
+                    is_one_before(m, beside, triangle, k > 0 ? k - 1 : 2, t.corner[k]))
+                    all |= 1u << (MESH_CORNER_LATER + k);
                 owned[t.corner[k]] = true;
             }
             marks[triangle] = (uint16_t)all;

@@ -48,8 +48,15 @@ enum { MESH_HEADER_DOUBLES = 8 };
 /* Marks of a triangle: bit k of each of these for its edge from corner k to the next one, or for corner k.
  *   flat    what is on both sides of the edge, or all around the corner, lies in the triangle's plane: points there say
  *           nothing that points elsewhere do not
- *   own     of the triangles that have the edge, or the corner, this one is the first */
-enum { MESH_EDGE_FLAT = 0, MESH_EDGE_OWN = 3, MESH_CORNER_FLAT = 6, MESH_CORNER_OWN = 9 };
+ *   own     of the triangles that have the edge, or the corner, this one is the first
+ *   later   of the triangles around the corner that lie in this one's plane, side by side, another one is the first */
+enum {
+    MESH_EDGE_FLAT = 0,
+    MESH_EDGE_OWN = 3,
+    MESH_CORNER_FLAT = 6,
+    MESH_CORNER_OWN = 9,
+    MESH_CORNER_LATER = 12
+};
 
 /* A node's subtree is all nodes up to `next`. */
 struct mesh_node {

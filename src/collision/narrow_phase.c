@@ -6,12 +6,19 @@
 #define SADMM_SMOOTH_ELSEWHERE SADMM_COLLISION_KERNEL(smooth_manifold)
 #include "pair_manifold.h"
 
+/* The old pairs of the same two shapes that a triangle's points may go on from: [first, last); of other pairs none. */
+struct old_pairs {
+    int64_t first, last;
+};
+static const struct old_pairs no_pairs = {0, 0};
+
 /* Write the manifold as a pair with its points; there is capacity. `before`: the pair that it goes on from, or NULL.
  * ratio: step_ratio of both sets. */
 SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
                               uint32_t b, uint32_t child, const struct manifold *m,
                               const struct sadmm_contact_set *old, double ratio,
-                              const struct sadmm_contact_pair *before, struct sadmm_contact_set *out)
+                              const struct sadmm_contact_pair *before, struct old_pairs beside,
+                              struct sadmm_contact_set *out)
 {
     const struct sadmm_proxy *pa = &c->proxies[a], *pb = &c->proxies[b];
     struct sadmm_contact_pair *pair = &out->pairs[out->pair_count++];
@@ -29,7 +36,10 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count];
         contact_emit_point(pa, pb, &motion, &m->points[i], point);
-        if (before) contact_carry(before, old->points, i, rolling.normal, friction, ratio, point);
+        const bool carried = before && contact_carry(before, old->points, i, rolling.normal, friction, ratio, point);
+        if (!carried && beside.first < beside.last)
+            contact_carry_across(old->pairs, beside.first, beside.last, old->points, pair->revision, i, rolling.normal,
+                                 friction, ratio, point);
         const double radius = contact_radius(pa, pb, m->count, normal, point);
         if ((rolling.before || radius > 0) &&
             migrate_point(pa, pb, &rolling, last, i, radius, point, &out->migrations[out->point_count]))
@@ -93,7 +103,8 @@ SADMM_ALWAYS_INLINE const struct sadmm_contact_pair *find_before(struct narrow_p
 
 /* Write the manifold of a pair, if it has points; false when out of memory. */
 SADMM_ALWAYS_INLINE bool keep(struct narrow_phase *n, uint32_t a, uint32_t b, uint32_t child,
-                              const struct manifold *m, const struct sadmm_contact_pair *before)
+                              const struct manifold *m, const struct sadmm_contact_pair *before,
+                              struct old_pairs beside)
 {
     if (m->count == 0) return true;
     if (!has_capacity(n->out) && !add_capacity(n->out)) return false;
@@ -101,15 +112,28 @@ SADMM_ALWAYS_INLINE bool keep(struct narrow_phase *n, uint32_t a, uint32_t b, ui
                             n->old->points, m->count) &&
         !has_migrations(n->out))
         return false;
-    emit(n->candidates, n->input, a, b, child, m, n->old, n->ratio, before, n->out);
+    emit(n->candidates, n->input, a, b, child, m, n->old, n->ratio, before, beside, n->out);
     return true;
 }
 
 /* Of a triangle: the other one is part of find_children alone. */
 __attribute__((noinline)) static bool keep_triangle(struct narrow_phase *n, uint32_t a, uint32_t b, uint32_t triangle,
-                                                    const struct manifold *m, const struct sadmm_contact_pair *before)
+                                                    const struct manifold *m, const struct sadmm_contact_pair *before,
+                                                    struct old_pairs beside)
 {
-    return keep(n, a, b, triangle, m, before);
+    return keep(n, a, b, triangle, m, before, beside);
+}
+
+/* The old pairs of two shapes. They are asked for in the order of sets. */
+static struct old_pairs find_beside(struct narrow_phase *n, uint64_t shapes)
+{
+    const struct sadmm_contact_pair *pairs = n->old->pairs;
+    const int64_t count = (int64_t)n->old->pair_count;
+    struct old_pairs beside;
+    while ((int64_t)n->next < count && contact_is_before(&pairs[n->next], shapes, 0)) ++n->next;
+    beside.first = beside.last = (int64_t)n->next;
+    while (beside.last < count && contact_shapes(&pairs[beside.last]) == shapes) ++beside.last;
+    return beside;
 }
 
 /* When a pair with a mesh that moves on first touches any triangle. */
@@ -141,6 +165,7 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
         const double first = first_touch(n, &mesh, &box, pa, pb, &start);
         mesh_start_at(pa, pb, first, input->margin, input->gravity, input->dt, &start);
     }
+    const struct old_pairs beside = find_beside(n, ordered_key(a, b));
     m.ahead = start.ahead;
     mesh_walk_begin(&mesh, &box, &walk);
     for (int32_t triangle = mesh_walk_next(&mesh, &walk); triangle >= 0; triangle = mesh_walk_next(&mesh, &walk)) {
@@ -149,7 +174,7 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
         m.cache = 0;
         triangle_manifold(&pa->geometry, &pb->geometry, input->hulls, (uint32_t)triangle, &start.pose,
                           (real)start.limit, before ? contact_memory(before, pa, pb) : 0, &m);
-        if (!keep_triangle(n, a, b, (uint32_t)triangle, &m, before)) return false;
+        if (!keep_triangle(n, a, b, (uint32_t)triangle, &m, before, beside)) return false;
     }
     return true;
 }
@@ -168,7 +193,7 @@ static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
         const struct pair_start start = pair_start_of(pa, pb, input->margin, input->gravity, input->dt);
         find_manifold(pa, pb, input->hulls, child, input->margin, input->gravity, input->dt, &start,
                       before ? contact_memory(before, pa, pb) : 0, &m);
-        if (!keep(n, a, b, child, &m, before)) return false;
+        if (!keep(n, a, b, child, &m, before, no_pairs)) return false;
     }
     return true;
 }
