@@ -35,6 +35,7 @@ void sadmm_candidates_free(struct sadmm_candidates *c)
     sadmm_free(c->list.keys);
     sadmm_free(c->found.keys);
     sadmm_free(c->merged.keys);
+    sadmm_seams_free(&c->seams);
     memset(c, 0, sizeof *c);
 }
 
@@ -219,6 +220,7 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     c->changed_count = c->plane_count = 0;
     for (size_t slot = 0; slot < slots; ++slot) {
         const bool plane = c->state[slot] & SLOT_PLANE;
+        if (c->state[slot] & SLOT_SEAMS) c->seams_valid = false;
         if (c->state[slot] & SLOT_REFUSED) {
             c->broad_phase_valid = c->list_valid = false;
             return sadmm_collision_check_shape(input, slot, error);
@@ -231,6 +233,11 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
         plane_changed = plane_changed || plane;
         c->changed[c->changed_count++] = (uint32_t)slot;
     }
+    if (!sadmm_seams_find(&c->seams, input, !c->seams_valid)) {
+        c->seams_valid = false;
+        return sadmm_fail_memory(error, "neighbours of shapes");
+    }
+    c->seams_valid = true;
     if (c->changed_count == 0 && c->list_valid && !renew) return SADMM_OK;
 
     one_by_one =

@@ -13,6 +13,7 @@
 #include "broad_phase.h"
 #include "collision.h"
 #include "proxy.h"
+#include "seams.h"
 #include "swept_box.h"
 
 /* What decides whether a shape's entry in the broad phase is still the same. Planes have no entry. */
@@ -20,6 +21,8 @@ struct sadmm_seen {
     uint32_t revision;
     int32_t body, group;
     bool alive, moves;
+    bool still;      /* on a body that does not move; */
+    uint32_t placed; /* where that is */
 };
 
 /* What became of a slot. */
@@ -27,7 +30,8 @@ enum {
     SLOT_PRESENT = 1,
     SLOT_LEFT = 2, /* its box left the larger one, or the entry changed */
     SLOT_PLANE = 4,
-    SLOT_REFUSED = 8 /* sadmm_collision_check_shape says why */
+    SLOT_REFUSED = 8, /* sadmm_collision_check_shape says why */
+    SLOT_SEAMS = 16   /* its neighbours may be others (seams.h) */
 };
 
 struct sadmm_collision_kernels;
@@ -59,6 +63,9 @@ struct sadmm_candidates {
     /* (slot of a << 32) | slot of b, sorted; a: lower (type, slot) */
     struct sadmm_pair_list list;
     struct sadmm_pair_list found, merged;
+
+    struct sadmm_seams seams;
+    bool seams_valid;
 };
 
 sadmm_status sadmm_candidates_init(struct sadmm_candidates *c, const struct sadmm_broad_phase_kind *kind,

@@ -5,6 +5,7 @@
 #include "mesh_walk.h"
 #define SADMM_SMOOTH_ELSEWHERE SADMM_COLLISION_KERNEL(smooth_manifold)
 #include "pair_manifold.h"
+#include "seam.h"
 
 /* The old pairs of the same two shapes that a triangle's points may go on from: [first, last); of other pairs none. */
 struct old_pairs {
@@ -84,6 +85,7 @@ struct narrow_phase {
     const struct sadmm_contact_set *old;
     size_t next; /* pairs of `old` before it come before everything that is left */
     double ratio; /* of the steps' lengths */
+    struct seam_view seams;
     struct sadmm_contact_set *out;
 };
 
@@ -107,6 +109,7 @@ SADMM_ALWAYS_INLINE bool keep(struct narrow_phase *n, uint32_t a, uint32_t b, ui
                               struct old_pairs beside)
 {
     if (m->count == 0) return true;
+    if (n->seams.first && seam_hides(&n->seams, n->candidates->proxies, n->input->hulls, a, b, child, m)) return true;
     if (!has_capacity(n->out) && !add_capacity(n->out)) return false;
     if (contact_may_migrate(&n->candidates->proxies[a], &n->candidates->proxies[b], before,
                             n->old->points, m->count) &&
@@ -219,7 +222,7 @@ bool SADMM_COLLISION_KERNEL(narrow_phase)(const struct sadmm_candidates *c, cons
                                           struct sadmm_contact_set *out)
 {
     struct narrow_phase n = {.candidates = c, .input = input, .old = old, .out = out,
-                             .ratio = step_ratio(input->dt, old->dt)};
+                             .ratio = step_ratio(input->dt, old->dt), .seams = sadmm_seams_view(&c->seams)};
     if (begin < end)
         n.next = (size_t)contact_lower_bound(old->pairs, 0, (int64_t)old->pair_count, c->list.keys[begin], 0);
 

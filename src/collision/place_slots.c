@@ -76,12 +76,12 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     const struct sadmm_collision_body *body;
     const struct sadmm_geometry *geometry;
     struct sadmm_error refusal;
-    unsigned char kind;
+    unsigned char kind, seams;
     bool plane, same;
 
     if (!shape || !sadmm_shape_collides(shape)) {
         const bool was_plane = seen->alive && !entry->present;
-        c->state[slot] = (unsigned char)((seen->alive ? SLOT_LEFT : 0) | (was_plane ? SLOT_PLANE : 0));
+        c->state[slot] = (unsigned char)((seen->alive ? SLOT_LEFT | SLOT_SEAMS : 0) | (was_plane ? SLOT_PLANE : 0));
         entry->present = false;
         *seen = now;
         return;
@@ -92,15 +92,21 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     now.group = body->environment;
     now.alive = true;
     now.moves = body->system_body >= 0;
+    now.still = body->system_body == -1;
+    now.placed = now.still ? body->placed : 0;
     same = seen->alive && seen->revision == now.revision && seen->body == now.body && seen->group == now.group &&
-           seen->moves == now.moves && !renew;
+           seen->moves == now.moves;
+    seams = same && seen->still == now.still && seen->placed == now.placed ? 0 : SLOT_SEAMS;
+    same = same && !renew;
+    seen->still = now.still;
+    seen->placed = now.placed;
     if (!same && sadmm_collision_check_shape(input, slot, &refusal) != SADMM_OK) {
         c->state[slot] = SLOT_REFUSED;
         return;
     }
     geometry = &input->geometries[shape->geometry];
     plane = geometry->type == SADMM_SHAPE_PLANE;
-    kind = plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT;
+    kind = (unsigned char)((plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT) | seams);
     proxy_place(shape, geometry, body, turn, input->dt, input->margin, input->gravity, &c->proxies[slot],
                 &c->boxes[slot].box);
     c->boxes[slot].of_plane = plane;

@@ -144,6 +144,38 @@ static int32_t group_bits(const struct sadmm_collision_input *input)
     return bits;
 }
 
+/* Which shapes do not move, and where they are. */
+static uint64_t hash_of_stills(const struct sadmm_collision_input *input)
+{
+    uint64_t hash = 0;
+    for (size_t slot = 0; slot < input->shape_count; ++slot) {
+        const struct sadmm_shape &shape = input->shapes[slot];
+        if (!sadmm_shape_collides(&shape) || input->bodies[shape.body].system_body != -1) continue;
+        hash = (hash ^ slot) * UINT64_C(0x9E3779B97F4A7C15) + (hash >> 29);
+        hash = (hash ^ input->bodies[shape.body].placed) * UINT64_C(0x9E3779B97F4A7C15) + (hash >> 29);
+        hash = (hash ^ (uint32_t)input->bodies[shape.body].environment) * UINT64_C(0x9E3779B97F4A7C15) + (hash >> 29);
+    }
+    return hash;
+}
+
+static sadmm_status find_seams(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input, bool changed,
+                               struct sadmm_error *error)
+{
+    const uint64_t stills = hash_of_stills(input);
+    if (!sadmm_seams_find(&c->seams, input, changed || stills != c->stills)) {
+        c->seams.slot_count = SIZE_MAX; /* of no input */
+        return sadmm_fail_memory(error, "neighbours of shapes");
+    }
+    c->stills = stills;
+    const size_t count = c->seams.neighbour_count;
+    TRY(upload_input(c, SEAMS, c->seams.first, count > 0 ? input->shape_count + 1 : 0, sizeof *c->seams.first, false,
+                     error));
+    TRY(upload_input(c, SEAM_NEIGHBOURS, c->seams.neighbours, count, sizeof *c->seams.neighbours, false, error));
+    c->view.seams.first = count > 0 ? in<uint32_t>(c, SEAMS) : nullptr;
+    c->view.seams.neighbours = in<struct seam_neighbour>(c, SEAM_NEIGHBOURS);
+    return SADMM_OK;
+}
+
 sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
                                    const struct sadmm_collision_body *bodies, struct sadmm_error *error)
 {
@@ -152,7 +184,8 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
         input->disabled_body_pair_count > (size_t)INT32_MAX || input->friction_pair_count > (size_t)INT32_MAX)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu shapes, %zu bodies: at most %d and %d can be indexed",
                           input->shape_count, input->body_count, (int)(INT32_MAX / 2), (int)INT32_MAX);
-    if (shapes_changed(c, input)) {
+    const bool changed = shapes_changed(c, input);
+    if (changed) {
         c->input_bytes[0] = SIZE_MAX;
         TRY(measure_candidates(c, input, error));
         TRY(list_shapes(c, input, error));
@@ -166,6 +199,7 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
     }
     if (!bodies) TRY(upload_input(c, BODIES, input->bodies, input->body_count, sizeof *input->bodies, true, error));
     TRY(list_planes(c, input, error));
+    TRY(find_seams(c, input, changed, error));
     TRY(upload_input(c, DISABLED_PAIRS, input->disabled_body_pairs, input->disabled_body_pair_count,
                      sizeof *input->disabled_body_pairs, false, error));
     TRY(upload_input(c, FRICTION_PAIRS, input->friction_pairs, input->friction_pair_count,

@@ -215,8 +215,38 @@ emit_few_kernel(const __grid_constant__ collision_view v)
     if (has_point) store_wide(emit_point(v, dt, lane, start, source, before), point_place(v, lane, before));
 }
 
+/* ---- points that slide over a mesh: a kernel of its own where there are any ------------------------------------- */
+
+/* Goes the point on from the old pair of its own triangle? */
+static __device__ bool goes_on(const collision_view &v, int32_t match, int32_t lane, uint32_t feature)
+{
+    if (match < 0) return false;
+    const struct sadmm_contact_pair &old = v.before.pairs[match];
+    return contact_find_feature(v.before.points + old.first, old.count, feature, lane) >= 0;
+}
+
+static __global__ void __launch_bounds__(COLLISION_THREADS) carry_kernel(const __grid_constant__ collision_view v)
+{
+    follow_if(v.early);
+    const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
+    const int32_t lane = (int32_t)(thread % POINT_LANES);
+    if (i >= usable_candidates(v) || lane >= v.sizes[i] || v.after.counts->points > v.point_capacity) return;
+    const struct candidate own = candidate_of(v, v.candidates[i]);
+    if (v.proxies[own.b].geometry.type != SADMM_SHAPE_MESH) return;
+    const struct sadmm_contact_pair &pair = v.after.pairs[v.pair_of[i]];
+    struct sadmm_contact_point *point = &v.after.points[pair.first + lane];
+    if (goes_on(v, v.matches[i], lane, point->feature)) return;
+    const uint64_t shapes = ordered_key(own.a, own.b);
+    const int64_t count = v.before.counts->pairs, first = contact_lower_bound(v.before.pairs, 0, count, shapes, 0);
+    int64_t last = first;
+    while (last < count && contact_shapes(&v.before.pairs[last]) == shapes) ++last;
+    contact_carry_across(v.before.pairs, first, last, v.before.points, pair.revision, lane, pair.normal, pair.friction,
+                         step_ratio(step_of(v).dt, v.before.counts->dt), point);
+}
+
 void COLLISION(matching_kernels)(struct collision_kernels *kernels)
 {
     kernels->emit = {emit_kernel, COLLISION_THREADS, sizeof(struct emit_pieces), "contacts"};
+    kernels->carry = {carry_kernel, COLLISION_THREADS, 0, "impulses from triangle to triangle"};
     kernels->emit_few = {emit_few_kernel, EMIT_CANDIDATES * POINT_LANES, sizeof(struct emit_sums), "contacts"};
 }

@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 
+#include "collision/seams.h"
 #include "core/base/memory.h"
 #include "view.h"
 
@@ -22,10 +23,11 @@ enum buffer_name {
     PAIRS_3, POINTS_3, MIGRATIONS_3, PAIR_KEYS_3, COUNTS_3,
     TOUCHING,
     SHAPES, GEOMETRIES, HULLS, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
+    SEAMS, SEAM_NEIGHBOURS,
     /* pinned: first what was uploaded to the last buffers above, in their order */
     PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_HULLS, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS,
-    PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_PAIRS, PINNED_POINTS, PINNED_MIGRATIONS,
-    PINNED_PAIR_KEYS, PINNED_COUNTS, PINNED_TOUCHING,
+    PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_SEAMS, PINNED_SEAM_NEIGHBOURS,
+    PINNED_PAIRS, PINNED_POINTS, PINNED_MIGRATIONS, PINNED_PAIR_KEYS, PINNED_COUNTS, PINNED_TOUCHING,
     BUFFERS
 };
 enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
@@ -40,9 +42,11 @@ static const char *const buffer_names[BUFFERS] = {
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "touching pairs",
     "shapes", "geometries", "hulls", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
+    "neighbours by shape", "neighbours",
     "staged shapes", "staged geometries", "staged hulls", "staged bodies", "staged list of shapes", "staged planes",
     "staged disabled pairs",
-    "staged friction pairs", "staged friction values", "staged contact pairs", "staged contact points", "staged migrations",
+    "staged friction pairs", "staged friction values", "staged neighbours by shape", "staged neighbours",
+    "staged contact pairs", "staged contact points", "staged migrations",
     "staged contact keys", "staged contact counts", "staged touching pairs",
 };
 
@@ -97,6 +101,9 @@ struct sadmm_cuda_collision {
     int64_t candidate_capacity, point_capacity;
     int temp_leaves, temp_candidates; /* what TEMP is large enough for */
     struct sadmm_cuda_collision_stats stats;
+
+    struct sadmm_seams seams;
+    uint64_t stills;            /* hash of the shapes that do not move, and where they are, that `seams` is of */
 
     /* host arrays, made when shapes change */
     uint32_t *present;

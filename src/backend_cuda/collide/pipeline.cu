@@ -41,6 +41,7 @@ extern "C" sadmm_status COLLISION(create)(int device, struct sadmm_cuda_collisio
     COLLISION(narrow_meshes_kernels)(&c->kernels);
     COLLISION(mesh_kernels)(&c->kernels);
     COLLISION(narrow_smooth_kernels)(&c->kernels);
+    COLLISION(seam_kernels)(&c->kernels);
     COLLISION(matching_kernels)(&c->kernels);
     *out = c;
     return SADMM_OK;
@@ -58,6 +59,7 @@ extern "C" void COLLISION(destroy)(struct sadmm_cuda_collision *c)
     sadmm_free(c->present);
     sadmm_free(c->planes);
     sadmm_free(c->radii);
+    sadmm_seams_free(&c->seams);
     sadmm_free(c);
 }
 

@@ -191,17 +191,26 @@ static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_er
     return launch(c, one ? with->listed : first ? with->listed_first : with->listed_again, v->candidate_capacity, error);
 }
 
-static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+static sadmm_status emit_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
     const int64_t lanes = (int64_t)v->candidate_capacity * POINT_LANES;
     size_t bytes = c->buffers[TEMP].capacity;
-    TRY(narrow_phase(c, error));
     if (ranked(c)) return launch(c, c->kernels.emit_few, lanes, error);
     c->kernel = "scan of the contacts";
     CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_capacity + 1, c->stream),
               c->kernel);
     return launch(c, c->kernels.emit, lanes, error);
+}
+
+static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    const struct collision_view *v = &c->view;
+    TRY(narrow_phase(c, error));
+    if (v->seams.first) TRY(launch(c, c->kernels.seams, v->candidate_capacity, error));
+    TRY(emit_contacts(c, error));
+    if (v->mesh_count == 0) return SADMM_OK;
+    return launch(c, c->kernels.carry, (int64_t)v->candidate_capacity * POINT_LANES, error);
 }
 
 static int many_placed(const struct sadmm_cuda_collision *c) { return c->view.leaf_count >= c->by_warp_from; }

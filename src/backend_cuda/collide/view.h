@@ -8,8 +8,10 @@
  *   sort     candidates by (slot of a, slot of b, child), the host's order
  *   narrow   the last step's pair (a guess or a search), manifold by candidate     a thread a candidate
  *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
+ *   seams    where shapes have neighbours: manifolds that their union does not have  the same
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
+ *   carry    where there are meshes: impulses from triangle to triangle            the same
  *
  * In a step of several sub-steps the first one looks for candidates of the whole step (collision_reach); the others go
  * from `place`, which sees to it that these are enough, to `narrow` at once, and know the pair that a candidate goes on
@@ -46,6 +48,7 @@
 #include "backend_cuda/device/wide.h"
 #include "collision/contact_emit.h"
 #include "collision/gjk.h"
+#include "collision/seam.h"
 #include "pipeline.h"
 
 enum {
@@ -163,6 +166,7 @@ struct collision_view {
     const uint64_t *planes;                        /* (group + 1) << 32 | slot, sorted */
     const uint64_t *disabled_pairs, *friction_pairs;
     const double *friction_values;
+    struct seam_view seams;                        /* neighbours of shapes; first is NULL: there are none */
     int32_t leaf_count, plane_count, disabled_count, friction_count;
     int32_t mesh_count;                            /* shapes */
     int32_t shared_planes;                         /* the first ones: of group -1 */
@@ -297,7 +301,7 @@ struct narrow_kernels {
 struct collision_kernels {
     struct collision_launch place[2], place_first[2], place_again[2]; /* of few shapes, of many (by_warp_from) */
     struct collision_launch grid, build, refit, clear, walk, tiles, small_tiles, rank,
-        narrow, narrow_first, narrow_again, expand, expand_first, emit, emit_few;
+        narrow, narrow_first, narrow_again, expand, expand_first, seams, emit, emit_few, carry;
     struct narrow_kernels with_hulls, with_meshes, with_smooth; /* in the place of `narrow` where there are any */
     int expand_warps; /* expand is launched for */
 };
@@ -308,6 +312,7 @@ void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_meshes_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_smooth_kernels)(struct collision_kernels *kernels);
 void COLLISION(mesh_kernels)(struct collision_kernels *kernels);
+void COLLISION(seam_kernels)(struct collision_kernels *kernels);
 void COLLISION(matching_kernels)(struct collision_kernels *kernels);
 
 #endif

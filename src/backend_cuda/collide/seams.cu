@@ -1,0 +1,36 @@
+/* Manifolds that the union of neighbouring shapes does not have are left out (collision/seam.h): a kernel of its own
+ * after the narrow phase, launched where shapes have neighbours, so that other worlds' kernels need nothing for it. */
+#include "narrow.h"
+
+static __device__ struct manifold load_manifold(const collision_view &v, int64_t i)
+{
+    const struct found_manifold &from = v.manifolds[i];
+    const found_head head = load_wide(&from.head);
+    struct manifold m;
+    m.normal = head.normal;
+    m.ahead = head.ahead;
+    m.cache = head.cache;
+    m.count = head.count;
+    for (int k = 0; k < head.count; ++k) {
+        const found_point point = load_wide(&from.points[k]);
+        m.points[k] = {point.position, point.separation, 0};
+    }
+    return m;
+}
+
+static __global__ void __launch_bounds__(NARROW_THREADS) seam_kernel(const __grid_constant__ collision_view v)
+{
+    wait_if(v.early);
+    const int64_t i = collision_thread(NARROW_THREADS);
+    if (i >= usable_candidates(v) || v.sizes[i] == 0) return;
+    const struct candidate own = candidate_of(v, v.candidates[i]);
+    const uint32_t *first = v.seams.first;
+    if (first[own.a] == first[own.a + 1] && first[own.b] == first[own.b + 1]) return;
+    const struct manifold m = load_manifold(v, i);
+    if (seam_hides(&v.seams, v.proxies, v.hulls, own.a, own.b, own.child, &m)) v.sizes[i] = 0;
+}
+
+void COLLISION(seam_kernels)(struct collision_kernels *kernels)
+{
+    kernels->seams = {seam_kernel, NARROW_THREADS, 0, "seams"};
+}
