@@ -27,12 +27,12 @@
 
 /* Pieces are flush within this share of the thinner shape's extent: as even as what lies on them may lie
  * (MANIFOLD_FLAT). */
-#define SEAM_FLUSH MANIFOLD_FLAT
+#define SEAM_FLUSH  MANIFOLD_FLAT
 /* How far beside a point its surface is looked at, as a share of the thinner extent. */
 #define SEAM_BESIDE 0.05
 /* What faces along a direction: slopes, and turns of the direction by which its surface is looked for. */
-#define SEAM_SLOPE 2e-3
-#define SEAM_TURN 1e-3
+#define SEAM_SLOPE  2e-3
+#define SEAM_TURN   1e-3
 enum { SEAM_DIRECTIONS = 8 };
 
 /* A shape that may have points of another one: its box in that one's frame, rounded outwards, with what is flush.
@@ -96,8 +96,7 @@ SADMM_INLINE vec3 seam_support(const struct sadmm_geometry *g, const double *hul
     switch ((sadmm_shape_type)g->type) {
     case SADMM_SHAPE_SPHERE: return v3_scale(u, size.x);
     case SADMM_SHAPE_CAPSULE: return v3_madd(v3(0, 0, u.z < 0 ? -size.y : size.y), size.x, u);
-    case SADMM_SHAPE_BOX:
-        return v3(u.x < 0 ? -size.x : size.x, u.y < 0 ? -size.y : size.y, u.z < 0 ? -size.z : size.z);
+    case SADMM_SHAPE_BOX: return v3(u.x < 0 ? -size.x : size.x, u.y < 0 ? -size.y : size.y, u.z < 0 ? -size.z : size.z);
     default: break;
     }
     convex_of(g, hulls, &c);
@@ -112,8 +111,7 @@ SADMM_INLINE real seam_hull_outside(const struct sadmm_geometry *g, const double
     real most = -SADMM_REAL_MAX;
     int f;
     polytope_at(hulls, g->hull, &p);
-    for (f = 0; f < p.faces; ++f)
-        most = real_max(most, v3_dot(polytope_normal(&p, f), x) - polytope_offset(&p, f));
+    for (f = 0; f < p.faces; ++f) most = real_max(most, v3_dot(polytope_normal(&p, f), x) - polytope_offset(&p, f));
     return most - p.radius;
 }
 
@@ -133,8 +131,7 @@ SADMM_INLINE real seam_outside(const struct sadmm_geometry *g, const double *hul
         return real_max(-x.z - size.y, (2 * size.y * round + size.x * (x.z - size.y)) /
                                            real_sqrt(size.x * size.x + 4 * size.y * size.y));
     case SADMM_SHAPE_ELLIPSOID:
-        return (v3_norm(v3(x.x / size.x, x.y / size.y, x.z / size.z)) - 1) *
-               real_min(size.x, real_min(size.y, size.z));
+        return (v3_norm(v3(x.x / size.x, x.y / size.y, x.z / size.z)) - 1) * real_min(size.x, real_min(size.y, size.z));
     case SADMM_SHAPE_HULL: return seam_hull_outside(g, hulls, x);
     case SADMM_SHAPE_MESH:
     case SADMM_SHAPE_TYPE_COUNT: break;

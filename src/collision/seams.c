@@ -110,8 +110,7 @@ static int64_t list_entries(struct sadmm_seams *seams, const struct sadmm_collis
             ++count;
         }
         if (count == 0) return 0;
-        if (pass == 0 &&
-            !sadmm_grow(&seams->entries, &seams->entry_capacity, 0, count, sizeof *seams->entries))
+        if (pass == 0 && !sadmm_grow(&seams->entries, &seams->entry_capacity, 0, count, sizeof *seams->entries))
             return -1;
     }
     qsort(seams->entries, count, sizeof *seams->entries, compare_entries);
