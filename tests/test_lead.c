@@ -80,13 +80,16 @@ START_TEST(points)
         /* what rolls stays as deep as it is, by the mean of an end where it opens as fast as it closed */
         {-0.003, 1, 0.1, {0, 0.1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, true},
         {-0.003, 1, 0.1, {0, 0.11}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, true},
+        /* of 0.2 m 5 % would be 10 mm more than there is room for; of an arm of 0.1 m it is 5 mm */
+        {0.1925, 0, 0, {0, 20}, TOUCH_JOLT, {0, TOUCH_CARRIED}, false},
     };
     const double size[2] = {fabs(cases[_i].lead[0]), fabs(cases[_i].lead[1])};
+    static const double arm[2] = {0.1, 0.1};
     struct lead_touch touch = {0, {0, 0}};
     static const double gravity[3] = {0, 0, -20}, force[3] = {0, 0, 8}; /* 1 kg: 0.01 x 2 m/s a step by itself */
     const double at_rest = lead_rest_speed(gravity, 0.5, force, 1, 0.01), rest[2] = {at_rest, at_rest};
     const double moves[2] = {0.0019, 0.0021};
-    const struct lead_gap gap = {cases[_i].gap, cases[_i].speed, cases[_i].rolls};
+    const struct lead_gap gap = {cases[_i].gap, cases[_i].speed, {arm[0], arm[1]}, cases[_i].rolls};
     lead_add_point(&touch, gap, cases[_i].push, cases[_i].lead, size, moves, rest, 0.01, 1e-5);
     ck_assert_int_eq(touch.island, cases[_i].island);
     for (int s = 0; s < 2; ++s) {
@@ -95,7 +98,7 @@ START_TEST(points)
     }
 }
 END_TEST
-enum { POINTS = 12 };
+enum { POINTS = 13 };
 
 int main(void)
 {

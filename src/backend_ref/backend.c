@@ -91,7 +91,10 @@ static void touch_point(struct sadmm_context *c, const struct sadmm_contact_pair
                                   c->settings->dt);
         touch.island |= forces_touch(rigid);
     }
-    lead_add_point(&touch, (struct lead_gap){contacts->points[k].gap, speed, contacts->points[k].migrates != 0},
+    const struct sadmm_contact_point *point = &contacts->points[k];
+    const struct lead_gap gap = {
+        point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates != 0};
+    lead_add_point(&touch, gap,
                    constraint->lambda[0], lead, size, moves, rest,
                    c->settings->dt, c->settings->slop);
     for (int s = 0; s < 2; ++s) {

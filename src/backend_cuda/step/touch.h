@@ -231,7 +231,8 @@ static __device__ __forceinline__ int add_ways(const cuda_view &v, const pair_en
                              lead_along(at.normal, sides[0].velocity, at.arm_a);
         if (point->migrates) rolls = TOUCH_ROLLS;
         if (lead_is_still(size, dt, slop)) continue;
-        const struct lead_gap gap = {point->gap, speed, point->migrates != 0};
+        const struct lead_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)},
+                                     point->migrates != 0};
         lead_add_way(&touch, gap, leads, size, dt, slop);
     }
     const int all = touch.island | touch.body[0] | touch.body[1] | rolls;

@@ -92,7 +92,8 @@ SADMM_INLINE double lead_speed(const double before[6], const double v[6], const 
 
 /* Taking leads back may close a contact by this share of what they move it by in all, since the normal part of a lead
  * grows with the square of the speed where a body rolls, or of the slop, which is what a solve that was cut short
- * jitters by. */
+ * jitters by. Of what goes by more than its point's arm in a step it is this share of the arm: a bullet would be taken
+ * through a plate. */
 #define LEAD_SHARE 0.05
 #define LEAD_SLOP 0.1
 /* A body that is carried and moves its points by less than this share of what it would gain in a step by itself rests.
@@ -133,9 +134,10 @@ SADMM_INLINE bool lead_is_still(const double size[2], double dt, double slop)
     return dt * (size[0] + size[1]) <= LEAD_SLOP * slop / 2;
 }
 
-/* A contact as the step moves it: its gap at the start, m, and the speed at which it opens, m/s. */
+/* A contact as the step moves it: its gap at the start, m, the speed at which it opens, m/s, and the lengths of its
+ * arms on a and b (size3), m. */
 struct lead_gap {
-    double start, speed;
+    double start, speed, arm[2];
     bool rolls; /* it may stay as deep as it is (model/rolling.h) */
 };
 
@@ -144,9 +146,10 @@ struct lead_gap {
 SADMM_INLINE void lead_add_way(struct lead_touch *touch, struct lead_gap gap, const double lead[2],
                                const double size[2], double dt, double slop)
 {
-    const double end = gap.start + dt * gap.speed, deep = gap.rolls && gap.start < 0 ? -gap.start : 0,
-                 room = (end > -deep ? end + deep : 0) +
-                        max_of(LEAD_SHARE * dt * (size[0] + size[1]), LEAD_SLOP * slop);
+    const double way = (dt * size[0] < gap.arm[0] ? dt * size[0] : gap.arm[0]) +
+                             (dt * size[1] < gap.arm[1] ? dt * size[1] : gap.arm[1]),
+                 end = gap.start + dt * gap.speed, deep = gap.rolls && gap.start < 0 ? -gap.start : 0,
+                 room = (end > -deep ? end + deep : 0) + max_of(LEAD_SHARE * way, LEAD_SLOP * slop);
     if (dt * (lead[0] + lead[1]) > room) touch->island |= TOUCH_JOLT;
     SADMM_UNROLL
     for (int s = 0; s < 2; ++s)
