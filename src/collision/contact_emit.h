@@ -96,4 +96,17 @@ SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct s
     point->migrates = 0;
 }
 
+/* The same of a pair that was not found halfway, from its shapes as they are placed; normal: set, in the world. */
+SADMM_RARE void contact_emit_turned(const struct sadmm_proxy *a, const struct sadmm_proxy *b, vec3 manifold_normal,
+                                    double ahead, double dt, const struct manifold_point *from, double normal[3],
+                                    struct sadmm_contact_point *point)
+{
+    struct sadmm_proxy turned[2];
+    const struct sadmm_proxy *pa = proxy_at(a, ahead, dt, &turned[0]), *pb = proxy_at(b, ahead, dt, &turned[1]);
+    struct pair_motion motion;
+    rotate_to_world(pb->R, manifold_normal, normal);
+    pair_motion_of(pa, pb, normal, ahead, dt, &motion);
+    contact_emit_point(pa, pb, &motion, from, point);
+}
+
 #endif

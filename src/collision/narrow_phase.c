@@ -21,7 +21,9 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
                               const struct sadmm_contact_pair *before, struct old_pairs beside,
                               struct sadmm_contact_set *out)
 {
-    const struct sadmm_proxy *pa = &c->proxies[a], *pb = &c->proxies[b];
+    struct sadmm_proxy turned[2];
+    const struct sadmm_proxy *pa = proxy_at(&c->proxies[a], m->ahead, input->dt, &turned[0]),
+                             *pb = proxy_at(&c->proxies[b], m->ahead, input->dt, &turned[1]);
     struct sadmm_contact_pair *pair = &out->pairs[out->pair_count++];
     const double friction = contact_friction(input->friction_pairs, input->friction_values,
                                              (int64_t)input->friction_pair_count, a, b, pa, pb);
@@ -32,7 +34,8 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
 
     rotate_to_world(pb->R, m->normal, normal);
     pair_motion_of(pa, pb, normal, m->ahead, input->dt, &motion);
-    migration_begin(pa, pb, before, last, ratio, m->count, normal, &rolling);
+    const bool midway = is_midway(m->ahead, input->dt); /* what is found elsewhere has no half step left */
+    migration_begin(pa, pb, midway ? before : NULL, last, ratio, m->count, normal, &rolling);
     contact_emit_pair(a, b, child, pa, pb, m, rolling.normal, friction, (int32_t)out->point_count, pair);
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count];
@@ -41,7 +44,7 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
         if (!carried && beside.first < beside.last)
             contact_carry_across(old->pairs, beside.first, beside.last, old->points, pair->revision, i, rolling.normal,
                                  friction, ratio, point);
-        const double radius = contact_radius(pa, pb, m->count, normal, point);
+        const double radius = midway ? contact_radius(pa, pb, m->count, normal, point) : 0;
         if ((rolling.before || radius > 0) &&
             migrate_point(pa, pb, &rolling, last, i, radius, point, &out->migrations[out->point_count]))
             ++out->migrating;
@@ -140,14 +143,15 @@ static struct old_pairs find_beside(struct narrow_phase *n, uint64_t shapes)
 }
 
 /* When a pair with a mesh that moves on first touches any triangle. */
-static double first_touch(const struct narrow_phase *n, const struct mesh *mesh, const struct sadmm_box3 *box,
-                          const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct pair_start *start)
+static double touch_any(const struct narrow_phase *n, const struct mesh *mesh, const struct sadmm_box3 *box,
+                          const struct sadmm_proxy *a, const struct sadmm_proxy *b)
 {
     double first = HUGE_VAL;
     struct mesh_walk walk;
     mesh_walk_begin(mesh, box, &walk);
     for (int32_t triangle = mesh_walk_next(mesh, &walk); triangle >= 0; triangle = mesh_walk_next(mesh, &walk))
-        first = smaller_of(mesh_first_touch(a, b, n->input->hulls, (uint32_t)triangle, n->input->dt, start), first);
+        first = smaller_of(mesh_first_touch(a, b, n->input->hulls, (uint32_t)triangle, n->input->gravity, n->input->dt),
+                           first);
     return first;
 }
 
@@ -165,18 +169,21 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
     mesh_at(input->hulls, pb->geometry.hull, &mesh);
     mesh_reach(pa, pb, &n->candidates->boxes[a].box, input->margin, input->gravity, input->dt, input->dt, &box);
     if (start.moves_on) {
-        const double first = first_touch(n, &mesh, &box, pa, pb, &start);
+        const double first = touch_any(n, &mesh, &box, pa, pb);
         mesh_start_at(pa, pb, first, input->margin, input->gravity, input->dt, &start);
     }
     const struct old_pairs beside = find_beside(n, ordered_key(a, b));
-    m.ahead = start.ahead;
     mesh_walk_begin(&mesh, &box, &walk);
     for (int32_t triangle = mesh_walk_next(&mesh, &walk); triangle >= 0; triangle = mesh_walk_next(&mesh, &walk)) {
         const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), (uint32_t)triangle, pa, pb);
+        const uint32_t cache = before ? contact_memory(before, pa, pb) : 0;
         m.count = 0;
         m.cache = 0;
         triangle_manifold(&pa->geometry, &pb->geometry, input->hulls, (uint32_t)triangle, &start.pose,
-                          (real)start.limit, before ? contact_memory(before, pa, pb) : 0, &m);
+                          (real)start.limit, cache, &m);
+        m.ahead = start.ahead;
+        if (pair_asks_balls(pa, pb, input->hulls, (uint32_t)triangle, &start, input->gravity, input->dt, &m))
+            inner_balls_add(pa, pb, input->hulls, (uint32_t)triangle, cache != 0, input->gravity, input->dt, &m);
         if (!keep_triangle(n, a, b, (uint32_t)triangle, &m, before, beside)) return false;
     }
     return true;

@@ -5,6 +5,7 @@
 #include "advance.h"
 #include "collision_table.h"
 #include "geometry.h"
+#include "inner_ball.h"
 #include "manifold.h"
 #include "manifold_box.h"
 #include "manifold_box_round.h"
@@ -54,13 +55,21 @@ SADMM_INLINE struct pair_pose pair_pose(bool a_is_plane, const double Ra[9], con
     return pose_at(a_is_plane, Ra, d, Rb);
 }
 
-/* Of two shapes, `ahead` of the step's start (midway.h). */
-SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead)
+/* Of two shapes as they are placed, moved on by `ahead` seconds (midway.h). */
+SADMM_INLINE struct pair_pose placed_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead)
 {
     double d[3];
     int i;
     for (i = 0; i < 3; ++i) d[i] = a->x[i] - b->x[i] - way_ahead(a, b, ahead, i);
     return pose_at(a->geometry.type == SADMM_SHAPE_PLANE, a->R, d, b->R);
+}
+
+/* Of two shapes `ahead` seconds into the step. */
+SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
+                                           double dt)
+{
+    struct sadmm_proxy turned[2];
+    return placed_pose(proxy_at(a, ahead, dt, &turned[0]), proxy_at(b, ahead, dt, &turned[1]), ahead);
 }
 
 SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
@@ -105,50 +114,6 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
     }
 }
 
-/* What is known of two shapes in a step before their manifold is asked for. */
-struct pair_start {
-    struct pair_pose pose;
-    double ahead, limit;
-    bool moves_on; /* the pair is one of those in advance.h */
-};
-
-SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double margin,
-                                             double gravity, double dt)
-{
-    const double speed = relative_speed(a->velocity, b->velocity);
-    struct pair_start start;
-    start.ahead = proxy_ahead(a, b, speed, dt);
-    start.limit = proxy_limit(a, b, speed, margin, gravity, dt);
-    start.moves_on = advance_needed(start.ahead, dt);
-    start.pose = proxies_pose(a, b, start.ahead);
-    return start;
-}
-
-/* The manifold of two shapes in a step: where they are halfway through it (midway.h), or where a pair that is faster
- * than that first touches (advance.h). What passes by is near, or no contact. start: pair_start_of the two. */
-SADMM_HOST_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                uint32_t child, double margin, double gravity, double dt, const struct pair_start *start,
-                                uint32_t cache, struct manifold *m)
-{
-    double ahead = start->ahead, limit = start->limit;
-    struct pair_pose pose = start->pose;
-    struct advance state = {0, false};
-    bool moves_on = start->moves_on;
-    for (;;) {
-        const bool last = !moves_on;
-        pair_manifold(&a->geometry, &b->geometry, hulls, child, &pose, last ? (real)limit : SADMM_REAL_MAX,
-                      last ? cache : 0, m);
-        if (last) break;
-        const struct pair_pose here = pose; /* pair_manifold's own stays in registers */
-        moves_on = advance_pair(a, b, &here, m, dt, &state, &ahead);
-        if (state.missed) limit = proxy_limit(a, b, 0, margin, gravity, dt);
-        pose = proxies_pose(a, b, ahead);
-    }
-    m->ahead = ahead;
-}
-
-/* ---- meshes: their triangles have one pose in common -------------------------------------------------------------- */
-
 /* Of a triangle of the mesh b. */
 SADMM_INLINE void triangle_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
                                     const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
@@ -163,21 +128,76 @@ SADMM_INLINE void triangle_manifold(const struct sadmm_geometry *a, const struct
     mesh_manifold(a, b, blocks, child, pose, limit, cache, m);
 }
 
-/* When a pair that moves on first touches the triangle, s; HUGE_VAL: not within the step. */
-SADMM_RARE double mesh_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *blocks,
-                                   uint32_t child, double dt, const struct pair_start *start)
+/* Of the ball of a body (inner_ball.h) and the other shape of a pair, at any distance. */
+SADMM_INLINE void ball_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
+                                uint32_t child, const struct pair_pose *pose, struct manifold *m)
 {
-    struct advance state = {0, false};
-    double ahead = start->ahead;
-    struct pair_pose pose = start->pose;
-    struct manifold m;
-    for (;;) {
-        m.count = 0;
-        triangle_manifold(&a->geometry, &b->geometry, blocks, child, &pose, SADMM_REAL_MAX, 0, &m);
-        if (!advance_pair(a, b, &pose, &m, dt, &state, &ahead)) break;
-        pose = proxies_pose(a, b, ahead);
-    }
-    return state.missed ? HUGE_VAL : ahead;
+    const real far = SADMM_REAL_MAX / 4; /* some search for nearest points alone where there is no limit */
+    if (hulls && b->type == SADMM_SHAPE_MESH) mesh_manifold(a, b, hulls, child, pose, far, 0, m);
+    else pair_manifold(a, b, hulls, child, pose, far, 0, m);
+}
+
+/* What is known of two shapes in a step before their manifold is asked for. */
+struct pair_start {
+    struct pair_pose pose;
+    double ahead, limit;
+    bool moves_on; /* the pair is one of those in advance.h */
+};
+
+SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double margin,
+                                             double gravity, double dt)
+{
+    const double speed = relative_speed(a->velocity, b->velocity);
+    struct pair_start start;
+    start.ahead = proxy_ahead(a, b, speed, dt);
+    start.limit = proxy_limit(a, b, speed, margin, gravity, dt);
+    start.moves_on = advance_needed(a, b, start.ahead, dt);
+    start.pose = placed_pose(a, b, start.ahead);
+    return start;
+}
+
+/* Of a pair that moves on: where it first touches; what passes by is near, or no contact. */
+SADMM_INLINE void pair_start_at(const struct sadmm_proxy *a, const struct sadmm_proxy *b, struct first_touch first,
+                                double margin, double gravity, double dt, struct pair_start *start)
+{
+    start->ahead = first.ahead;
+    if (first.missed) start->limit = proxy_near_limit(a, b, margin, gravity, dt);
+    start->pose = proxies_pose(a, b, start->ahead, dt);
+}
+
+/* Is the pair to have contacts of the balls in its bodies? m: its manifold without. */
+SADMM_INLINE bool pair_asks_balls(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                                  uint32_t child, const struct pair_start *start, double gravity, double dt,
+                                  const struct manifold *m)
+{
+    return start->moves_on || inner_is_asked(a, b, gravity, dt, m) ||
+           (hulls && b->geometry.type == SADMM_SHAPE_MESH && inner_is_behind(a, b, hulls, child, &start->pose));
+}
+
+/* The manifold of two shapes in a step: where they are halfway through it (midway.h), or where a pair that is faster
+ * than that first touches (advance.h). start: pair_start_of the two. */
+SADMM_HOST_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                                     uint32_t child, double margin, double gravity, double dt,
+                                     const struct pair_start *midway, uint32_t cache, struct manifold *m)
+{
+    struct pair_start start = *midway;
+    if (start.moves_on)
+        pair_start_at(a, b, pair_first_touch(a, b, hulls, child, gravity, dt), margin, gravity, dt, &start);
+    const struct pair_pose pose = start.pose; /* pair_manifold's own stays in registers */
+    pair_manifold(&a->geometry, &b->geometry, hulls, child, &pose, (real)start.limit, cache, m);
+    m->ahead = start.ahead;
+    if (start.moves_on || inner_is_asked(a, b, gravity, dt, m))
+        inner_balls_add(a, b, hulls, child, cache != 0, gravity, dt, m);
+}
+
+/* ---- meshes: their triangles have one pose in common -------------------------------------------------------------- */
+
+/* When a pair that moves on first touches the triangle, s; HUGE_VAL: not within the step. */
+SADMM_INLINE double mesh_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *blocks,
+                                     uint32_t child, double gravity, double dt)
+{
+    const struct first_touch first = pair_first_touch(a, b, blocks, child, gravity, dt);
+    return first.missed ? HUGE_VAL : first.ahead;
 }
 
 /* From where the manifolds of all triangles are found: where a pair that moves on touches the first of them. `first`:
@@ -185,10 +205,8 @@ SADMM_RARE double mesh_first_touch(const struct sadmm_proxy *a, const struct sad
 SADMM_INLINE void mesh_start_at(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double first, double margin,
                                 double gravity, double dt, struct pair_start *start)
 {
-    if (first < HUGE_VAL) start->ahead = first;
-    else start->limit = proxy_limit(a, b, 0, margin, gravity, dt);
-    start->pose = proxies_pose(a, b, start->ahead);
-    start->moves_on = false;
+    const struct first_touch touch = {first < HUGE_VAL ? first : start->ahead, !(first < HUGE_VAL)};
+    pair_start_at(a, b, touch, margin, gravity, dt, start);
 }
 
 #endif

@@ -90,6 +90,28 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     if (geometry->type != SADMM_SHAPE_PLANE) proxy_box(p, dt, margin, gravity, box);
 }
 
+/* Is a pair that was found there to be turned to it? Halfway is where shapes are placed. */
+SADMM_INLINE bool is_midway(double ahead, double dt) { return ahead == 0.5 * dt; }
+
+/* A shape of a pair that was found `ahead` seconds into the step: where it is placed, or turned on in `turned`. */
+SADMM_INLINE const struct sadmm_proxy *proxy_at(const struct sadmm_proxy *p, double ahead, double dt,
+                                                struct sadmm_proxy *turned)
+{
+    double Q[9];
+    int i, k;
+    if (is_midway(ahead, dt) || (p->angular[0] == 0 && p->angular[1] == 0 && p->angular[2] == 0)) return p;
+    turn_between(p->angular, p->ahead, ahead, Q);
+    *turned = *p;
+    for (i = 0; i < 3; ++i) {
+        for (k = 0; k < 3; ++k)
+            turned->R[3 * i + k] = Q[3 * i] * p->R[k] + Q[3 * i + 1] * p->R[3 + k] + Q[3 * i + 2] * p->R[6 + k];
+        turned->arm[i] = Q[3 * i] * p->arm[0] + Q[3 * i + 1] * p->arm[1] + Q[3 * i + 2] * p->arm[2];
+        turned->x[i] = p->com[i] + turned->arm[i];
+    }
+    turned->ahead = ahead;
+    return turned;
+}
+
 SADMM_INLINE void rotate_to_world(const double R[9], vec3 v, double out[3])
 {
     int k;
@@ -103,7 +125,14 @@ SADMM_INLINE double proxy_plane_reach(const struct sadmm_proxy *p, double margin
     return shape_reach(margin, p->thin, 0, gravity);
 }
 
-/* pair_limit of two shapes. speed: relative_speed; 0 where they come near without touching. */
+/* Up to which distance two shapes that come near without touching make contacts. */
+SADMM_INLINE double proxy_near_limit(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double margin,
+                                     double gravity, double dt)
+{
+    return pair_limit(margin, a->thin, b->thin, 0, 0, 0, a->fall, b->fall, fall_of(gravity, dt), dt);
+}
+
+/* pair_limit of two shapes. speed: relative_speed. */
 SADMM_INLINE double proxy_limit(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double speed, double margin,
                                 double gravity, double dt)
 {

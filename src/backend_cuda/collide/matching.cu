@@ -93,15 +93,19 @@ static __device__ __forceinline__ struct sadmm_contact_point emit_point(const co
     const double friction =
         contact_friction(v.friction_pairs, v.friction_values, v.friction_count, own.a, own.b, pa, pb);
     double normal[3];
-    rotate_to_world(pb->R, source.head.normal, normal);
-
     struct sadmm_contact_point point;
-    struct pair_motion motion;
-    pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
-    contact_emit_point(pa, pb, &motion, &source.point, &point);
     const struct sadmm_contact_pair *before = start.match >= 0 ? &source.old : nullptr;
-    if (contact_may_migrate(pa, pb, before, v.before.points, source.head.count))
-        migrate(v, pa, pb, before, step_ratio(dt.now, dt.before), source.head.count, lane, first + lane, normal, &point);
+    if (is_midway(source.head.ahead, dt.now)) {
+        struct pair_motion motion;
+        rotate_to_world(pb->R, source.head.normal, normal);
+        pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
+        contact_emit_point(pa, pb, &motion, &source.point, &point);
+        if (contact_may_migrate(pa, pb, before, v.before.points, source.head.count))
+            migrate(v, pa, pb, before, step_ratio(dt.now, dt.before), source.head.count, lane, first + lane, normal,
+                    &point);
+    } else {
+        contact_emit_turned(pa, pb, source.head.normal, source.head.ahead, dt.now, &source.point, normal, &point);
+    }
     if (before)
         contact_carry(&source.old, wide_at(v.before.points, 0), lane, normal, friction,
                       step_ratio(dt.now, dt.before), &point);

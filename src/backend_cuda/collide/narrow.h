@@ -159,7 +159,8 @@ static __device__ constexpr bool with_smooth(int how) { return how >= NARROW_ALL
 
 /* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. walk: what has
  * been done of it; GJK_FAR: nothing. */
-static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+static __device__ bool hulls_at_once(const collision_view &v, const struct collision_step &step,
+                                     const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                      const struct pair_start &start, uint32_t cache, struct gjk_walk *walk,
                                      struct manifold *m)
 {
@@ -168,31 +169,36 @@ static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm
     m->ahead = start.ahead;
     m->count = 0;
     m->cache = 0;
-    if (a->geometry.type != SADMM_SHAPE_PLANE)
-        return hull_manifold_at_once(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk,
-                                     m);
-    hull_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
-    return true;
+    if (a->geometry.type == SADMM_SHAPE_PLANE)
+        hull_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
+    else if (!hull_manifold_at_once(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk, m))
+        return false;
+    walk->end = GJK_FAR;
+    return !pair_asks_balls(a, b, v.hulls, 0, &start, step.gravity, step.dt, m);
 }
 
 /* From there. */
-static __device__ void hulls_from(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+static __device__ void hulls_from(const collision_view &v, const struct collision_step &step,
+                                  const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                   const struct pair_start &start, uint32_t cache, const struct gjk_walk *walk,
                                   struct manifold *m)
 {
     m->ahead = start.ahead;
     hull_manifold_from(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk, m);
+    if (pair_asks_balls(a, b, v.hulls, 0, &start, step.gravity, step.dt, m))
+        inner_balls_add(a, b, v.hulls, 0, cache != 0, step.gravity, step.dt, m);
 }
 
 /* The same of a pair with a smooth body: on planes, by formula. */
 #ifdef SADMM_WITHOUT_SMOOTH
-static __device__ bool smooth_at_once(const collision_view &, const struct sadmm_proxy *, const struct sadmm_proxy *,
-                                      const struct pair_start &, struct manifold *)
+static __device__ bool smooth_at_once(const collision_view &, const struct collision_step &, const struct sadmm_proxy *,
+                                      const struct sadmm_proxy *, const struct pair_start &, struct manifold *)
 {
     return false;
 }
 #else
-static __device__ bool smooth_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+static __device__ bool smooth_at_once(const collision_view &v, const struct collision_step &step,
+                                      const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                       const struct pair_start &start, struct manifold *m)
 {
     if (start.moves_on || a->geometry.type != SADMM_SHAPE_PLANE) return false;
@@ -200,13 +206,14 @@ static __device__ bool smooth_at_once(const collision_view &v, const struct sadm
     m->count = 0;
     m->cache = 0;
     convex_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
-    return true;
+    return !pair_asks_balls(a, b, v.hulls, 0, &start, step.gravity, step.dt, m);
 }
 #endif
 
 /* The manifold with a triangle, as find_triangles makes it on the host; false: it is to be listed. */
 template <int HOW>
-static __device__ bool narrow_triangle(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+static __device__ bool narrow_triangle(const collision_view &v, const struct collision_step &step,
+                                       const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                        const struct pair_start &start, uint32_t child, uint32_t cache,
                                        struct gjk_walk *walk, struct manifold *m)
 {
@@ -215,14 +222,19 @@ static __device__ bool narrow_triangle(const collision_view &v, const struct sad
     m->cache = 0;
     if (is_at_once(HOW)) {
         walk->end = GJK_FAR;
-        if (with_smooth(HOW) && geometry_is_smooth(&a->geometry)) return false;
-        return mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache,
-                                     walk, m);
+        if (start.moves_on || (with_smooth(HOW) && geometry_is_smooth(&a->geometry))) return false;
+        if (!mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache,
+                                   walk, m))
+            return false;
+        walk->end = GJK_FAR;
+        return !pair_asks_balls(a, b, v.hulls, child, &start, step.gravity, step.dt, m);
     }
     if (walk->end != GJK_FAR)
         mesh_manifold_from(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, walk, m);
     else
         triangle_manifold(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
+    if (pair_asks_balls(a, b, v.hulls, child, &start, step.gravity, step.dt, m))
+        inner_balls_add(a, b, v.hulls, child, cache != 0, step.gravity, step.dt, m);
     return true;
 }
 
@@ -273,13 +285,13 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     if (!contact_goes_on(&old, own.child, &a, &b)) before = -1;
     struct manifold m;
     if (on_mesh) {
-        if (!narrow_triangle<HOW>(v, pa, pb, start, own.child, before >= 0 ? cache : 0, walk, &m)) return false;
+        if (!narrow_triangle<HOW>(v, step, pa, pb, start, own.child, before >= 0 ? cache : 0, walk, &m)) return false;
     } else if (is_at_once(HOW) && b.geometry.type == SADMM_SHAPE_HULL) {
-        if (!hulls_at_once(v, pa, pb, start, before >= 0 ? cache : 0, walk, &m)) return false;
+        if (!hulls_at_once(v, step, pa, pb, start, before >= 0 ? cache : 0, walk, &m)) return false;
     } else if (is_listed(HOW) && b.geometry.type == SADMM_SHAPE_HULL && walk->end != GJK_FAR) {
-        hulls_from(v, pa, pb, start, before >= 0 ? cache : 0, walk, &m);
+        hulls_from(v, step, pa, pb, start, before >= 0 ? cache : 0, walk, &m);
     } else if (with_smooth(HOW) && is_at_once(HOW) && geometry_is_smooth(&b.geometry)) {
-        if (!smooth_at_once(v, pa, pb, start, &m)) return false;
+        if (!smooth_at_once(v, step, pa, pb, start, &m)) return false;
     } else {
         find_manifold(pa, pb, is_listed(HOW) ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt, &start,
                       before >= 0 ? cache : 0, &m);

@@ -1,0 +1,340 @@
+/* What a body cannot turn away from: the ball about its centre of mass that its shape holds.
+ *
+ * A contact is linear in the velocities. Its point may stay outside by turning alone, with the centre of mass going on
+ * into the other body: right for small turns, but what is small is turned by radians within a step when it is hit, and
+ * ends up on the other side of what is thin. The ball about the centre of mass is part of the body however it turns, so
+ * where a pair is fast it has a contact of its own: along the manifold's normal if that is much the same, or else in
+ * the manifold's place, together with the deepest point of the shape.
+ *
+ * A manifold that is deep says by least depth, if the pair remembers nothing that holds, which way is out. If that is
+ * not where the ball is, which is outside, it is where the ball is.
+ */
+#ifndef SADMM_COLLISION_INNER_BALL_H
+#define SADMM_COLLISION_INNER_BALL_H
+
+#include "advance.h"
+
+/* Cosine with the manifold's normal from which the ball's contact is one more point of it. */
+#define INNER_BALL_ALONG      ((real)0.7)
+/* What goes by more than this many radii of its ball in a step has the ball's contact alone: how a hit would make it
+ * turn within the step has nothing to do with one contact that is linear, and a share of its speed that iterations leave
+ * would take it through. The ball's contact by itself is solved at once. */
+#define INNER_BALL_ALONE      4.0
+/* Bodies whose surface turns by less than this share of their thickness in a step do not sink by turning. */
+#define INNER_TURNS           0.02
+/* Features of the two bodies' balls, and of a deepest point; no other has them. */
+#define INNER_BALL_FEATURE    0xfffffff0u
+#define INNER_DEEPEST_FEATURE 0xfffffff4u
+
+/* Is p's body one that the other's does not move much? Its mass goes by its inertia and size. */
+SADMM_INLINE bool inner_is_heavy(const struct sadmm_proxy *p, const struct sadmm_proxy *other)
+{
+    const double size = proxy_size(p), other_size = proxy_size(other);
+    return other->system_body >= 0 && p->inertia * (other_size * other_size) > 4 * other->inertia * (size * size);
+}
+
+/* The centre of mass of p's body in p's frame. */
+SADMM_INLINE vec3 inner_centre(const struct sadmm_proxy *p)
+{
+    double x[3];
+    int i;
+    for (i = 0; i < 3; ++i) x[i] = -(p->R[i] * p->arm[0] + p->R[3 + i] * p->arm[1] + p->R[6 + i] * p->arm[2]);
+    return v3_load(x);
+}
+
+/* The ball of p's body in this shape, as a shape of that body. False: there is none, or the shape is it. */
+SADMM_INLINE bool inner_ball_of(const struct sadmm_proxy *p, const double *hulls, struct sadmm_proxy *ball)
+{
+    double radius;
+    int i;
+    if (p->system_body < 0 || is_own_ball(p)) return false;
+    radius = (double)geometry_inner_radius(&p->geometry, hulls, inner_centre(p));
+    if (!(radius > 0)) return false;
+    *ball = *p;
+    ball->geometry.type = SADMM_SHAPE_SPHERE;
+    ball->geometry.children = 1;
+    ball->geometry.size[0] = radius;
+    ball->spin = 0;
+    for (i = 0; i < 3; ++i) {
+        ball->arm[i] = 0;
+        ball->x[i] = p->com[i];
+    }
+    return true;
+}
+
+/* pair_manifold.h */
+SADMM_INLINE void ball_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
+                                uint32_t child, const struct pair_pose *pose, struct manifold *m);
+
+/* Where a ball meets the other shape, in the frame of the pair's b, `ahead` seconds into the step. */
+struct inner_ball {
+    vec3 centre, normal; /* the pair's: from a to b */
+    vec3 on_other;       /* nearest of the other shape's surface */
+    real radius, separation;
+    double ahead;
+    bool hits; /* within the step */
+    bool of_b;
+};
+
+/* a, b: the pair. ball, its proxy: of b where of_b. child: of a mesh. ahead: when, if it does not hit. False: nothing
+ * is near. */
+SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                   const struct sadmm_proxy *ball, bool of_b, const double *hulls, uint32_t child,
+                                   double gravity, double dt, double ahead, struct inner_ball *found)
+{
+    const bool swapped = of_b && a->geometry.type != SADMM_SHAPE_PLANE;
+    const struct sadmm_proxy *first = swapped || !of_b ? ball : a, *second = swapped ? a : of_b ? ball : b;
+    const struct first_touch touch = pair_first_touch(first, second, hulls, child, gravity, dt);
+    const double at = touch.missed ? ahead : touch.ahead;
+    const struct pair_pose pose = proxies_pose(first, second, at, dt), own = proxies_pose(a, b, at, dt);
+    const struct manifold_point *point;
+    struct sadmm_proxy turned;
+    struct manifold m;
+    mat3 R;
+    int k;
+    found->hits = !touch.missed;
+    found->ahead = at;
+    found->of_b = of_b;
+    found->radius = (real)ball->geometry.size[0];
+    m.count = 0;
+    m.cache = 0;
+    ball_manifold(&first->geometry, &second->geometry, hulls, child, &pose, &m);
+    if (m.count == 0) return false;
+    point = &m.points[0];
+    found->separation = point->separation;
+    for (k = 0; k < 3; ++k) R.r[k] = r3_vec3(own.R[k]);
+    if (!of_b) {
+        found->centre = r3_vec3(pose.t);
+        found->normal = m.normal;
+        found->on_other = v3_madd(point->position, point->separation / 2, m.normal);
+        return true;
+    }
+    found->centre = inner_centre(proxy_at(b, at, dt, &turned));
+    if (!swapped) {
+        found->normal = m.normal;
+        found->on_other = v3_add(found->centre, v3_madd(point->position, -point->separation / 2, m.normal));
+    } else {
+        const vec3 on_a = v3_madd(point->position, point->separation / 2, m.normal);
+        found->normal = v3_neg(m3_mul(R, m.normal));
+        found->on_other = v3_add(m3_mul(R, on_a), r3_vec3(own.t));
+    }
+    return true;
+}
+
+/* One more point, in place of the one farthest apart where there is no room. */
+SADMM_INLINE void inner_add(struct manifold *m, vec3 position, real separation, uint32_t feature)
+{
+    int k, most = 0;
+    if (m->count < SADMM_MANIFOLD_POINTS) {
+        manifold_add(m, position, separation, feature);
+        return;
+    }
+    for (k = 1; k < m->count; ++k)
+        if (m->points[k].separation > m->points[most].separation) most = k;
+    m->points[most].position = position;
+    m->points[most].separation = separation;
+    m->points[most].feature = feature;
+}
+
+/* The ball's point along n against a plane of the other shape, n . x = offset, with the ball's centre at x. On the ball,
+ * not midway: accelerations may have it found at a distance that would be a long arm. */
+SADMM_INLINE void inner_add_ball(const struct inner_ball *ball, vec3 centre, real offset, struct manifold *m)
+{
+    const real side = ball->of_b ? -1 : 1, along = v3_dot(m->normal, centre),
+               separation = side * (offset - along) - ball->radius;
+    inner_add(m, v3_madd(centre, side * ball->radius, m->normal), separation,
+              INNER_BALL_FEATURE + (uint32_t)ball->of_b);
+}
+
+/* The contact along the ball's own normal: the ball's point, and the deepest one of its shape. */
+SADMM_INLINE void inner_instead(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                                double dt, const struct inner_ball *ball, struct manifold *m)
+{
+    const vec3 n = ball->normal;
+    const struct pair_pose pose = proxies_pose(a, b, ball->ahead, dt);
+    const real offset = v3_dot(n, ball->on_other);
+    vec3 x;
+    real separation;
+    mat3 R;
+    int k;
+    for (k = 0; k < 3; ++k) R.r[k] = r3_vec3(pose.R[k]);
+    m->normal = n;
+    m->count = 0;
+    m->cache = 0;
+    m->ahead = ball->ahead;
+    if (ball->of_b) {
+        x = geometry_farthest(&b->geometry, hulls, v3_neg(n));
+        separation = v3_dot(n, x) - offset;
+    } else {
+        x = v3_add(m3_mul(R, geometry_farthest(&a->geometry, hulls, m3_tmul(R, n))), r3_vec3(pose.t));
+        separation = offset - v3_dot(n, x);
+    }
+    manifold_add(m, x, separation, INNER_DEEPEST_FEATURE + (uint32_t)ball->of_b);
+    inner_add_ball(ball, ball->centre, offset, m);
+}
+
+/* Points that hold the centre up by themselves: it is over a triangle, or a line, of some that are no farther apart than
+ * the ball. x: their places across the normal, from the ball's centre. */
+SADMM_INLINE bool inner_over_line(const real p[2], const real q[2], real beside)
+{
+    const real d[2] = {q[0] - p[0], q[1] - p[1]}, length2 = d[0] * d[0] + d[1] * d[1],
+               along = -(p[0] * d[0] + p[1] * d[1]), across = d[0] * p[1] - d[1] * p[0];
+    return along >= 0 && along <= length2 && across * across <= beside * beside * length2;
+}
+SADMM_INLINE bool inner_over_triangle(const real p[2], const real q[2], const real r[2])
+{
+    const real a = p[0] * q[1] - p[1] * q[0], b = q[0] * r[1] - q[1] * r[0], c = r[0] * p[1] - r[1] * p[0];
+    return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
+}
+SADMM_INLINE bool inner_is_held(const struct manifold *m, vec3 centre, real separation, real radius)
+{
+    const real beside = (real)0.1 * radius;
+    real x[SADMM_MANIFOLD_POINTS][2];
+    vec3 e1, e2;
+    int i, j, k, count = 0;
+    v3_tangents(m->normal, &e1, &e2);
+    for (k = 0; k < m->count; ++k) {
+        const vec3 d = v3_sub(m->points[k].position, centre);
+        if (m->points[k].separation > separation + beside) continue;
+        x[count][0] = v3_dot(e1, d);
+        x[count++][1] = v3_dot(e2, d);
+    }
+    for (i = 0; i < count; ++i)
+        for (j = 0; j < i; ++j) {
+            if (inner_over_line(x[i], x[j], beside)) return true;
+            for (k = 0; k < j; ++k)
+                if (inner_over_triangle(x[i], x[j], x[k])) return true;
+        }
+    return false;
+}
+
+/* Along the manifold's normal, against the outermost of its points on the other shape, unless they hold it. */
+SADMM_INLINE void inner_along(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct sadmm_proxy *proxy,
+                              double dt, const struct inner_ball *ball, struct manifold *m)
+{
+    const real side = ball->of_b ? -1 : 1;
+    const struct pair_pose pose = proxies_pose(ball->of_b ? a : proxy, b, m->ahead, dt);
+    const vec3 centre = ball->of_b ? ball->centre : r3_vec3(pose.t);
+    real offset = 0;
+    int k;
+    for (k = 0; k < m->count; ++k) {
+        const real at = v3_dot(m->normal, m->points[k].position) + side * m->points[k].separation / 2;
+        if (k == 0 || side * at < side * offset) offset = at;
+    }
+    if (!inner_is_held(m, centre, side * (offset - v3_dot(m->normal, centre)) - ball->radius, ball->radius))
+        inner_add_ball(ball, centre, offset, m);
+}
+
+/* Is the pair's memory of the side it came from as good as none: a body turns by more than it is
+ * turned ahead at most? */
+SADMM_INLINE bool inner_forgets(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt)
+{
+    return turning_rate(a->angular) * dt > MIDWAY_TURN || turning_rate(b->angular) * dt > MIDWAY_TURN;
+}
+
+/* Is a manifold so deep that which way is out is a question? */
+SADMM_INLINE bool inner_is_deep(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct manifold *m)
+{
+    const double deep = -0.5 * smaller_of(a->thin, b->thin);
+    int k;
+    for (k = 0; k < m->count; ++k)
+        if ((double)m->points[k].separation < deep) return true;
+    return false;
+}
+
+/* Of one body's ball. */
+SADMM_INLINE void inner_ball_add(const struct sadmm_proxy *a, const struct sadmm_proxy *b, bool of_b,
+                                 const double *hulls, uint32_t child, bool remembers, double gravity, double dt,
+                                 struct manifold *m)
+{
+    struct sadmm_proxy proxy;
+    struct inner_ball ball;
+    real along;
+    if (inner_is_heavy(of_b ? b : a, of_b ? a : b) || !inner_ball_of(of_b ? b : a, hulls, &proxy) ||
+        !inner_ball_meets(a, b, &proxy, of_b, hulls, child, gravity, dt, m->ahead, &ball))
+        return;
+    along = v3_dot(ball.normal, m->normal);
+    if (ball.hits && relative_speed(a->velocity, b->velocity) * dt > INNER_BALL_ALONE * (double)ball.radius) {
+        inner_instead(a, b, hulls, dt, &ball, m);
+        m->points[0] = m->points[1];
+        m->count = 1;
+    } else if (m->count == 0) {
+        if (ball.hits) inner_instead(a, b, hulls, dt, &ball, m);
+    } else if (along > INNER_BALL_ALONG) {
+        if (ball.hits) inner_along(a, b, &proxy, dt, &ball, m);
+    } else if ((ball.hits && 2 * ball.separation > -ball.radius) ||
+               (along < -INNER_BALL_ALONG && !remembers && ball.separation > -ball.radius &&
+                (double)ball.separation < geometry_radius(&(of_b ? b : a)->geometry) && inner_is_deep(a, b, m))) {
+        inner_instead(a, b, hulls, dt, &ball, m);
+    }
+}
+
+/* Onto the surface of the body that its impulses turn, or the one that is easier to turn: midway to what accelerations
+ * are yet to close may be a long arm. */
+SADMM_INLINE void inner_on_surface(const struct sadmm_proxy *a, const struct sadmm_proxy *b, struct manifold *m)
+{
+    const bool on_b = a->system_body < 0 || (b->system_body >= 0 && b->inertia < a->inertia);
+    int k;
+    for (k = 0; k < m->count; ++k)
+        if (m->points[k].separation > 0 && m->points[k].feature < INNER_BALL_FEATURE)
+            m->points[k].position =
+                v3_madd(m->points[k].position, (on_b ? (real)0.5 : (real)-0.5) * m->points[k].separation, m->normal);
+}
+
+SADMM_INLINE void inner_balls_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                                 uint32_t child, bool remembers, double gravity, double dt, struct manifold *m)
+{
+    remembers &= !inner_forgets(a, b, dt);
+    inner_ball_add(a, b, false, hulls, child, remembers, gravity, dt, m);
+    inner_ball_add(a, b, true, hulls, child, remembers, gravity, dt, m);
+    inner_on_surface(a, b, m);
+}
+SADMM_RARE void inner_balls_pooled(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                                   uint32_t child, bool remembers, double gravity, double dt, struct manifold *m)
+{
+    inner_balls_of(a, b, hulls, child, remembers, gravity, dt, m);
+}
+SADMM_RARE void inner_balls_plain(const struct sadmm_proxy *a, const struct sadmm_proxy *b, bool remembers,
+                                  double gravity, double dt, struct manifold *m)
+{
+    inner_balls_of(a, b, NULL, 0, remembers, gravity, dt, m);
+}
+
+/* To the manifold of a pair. remembers: its cache is of the last step; hulls: NULL as of pair_first_touch. */
+SADMM_INLINE void inner_balls_add(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                                  uint32_t child, bool remembers, double gravity, double dt, struct manifold *m)
+{
+    if (hulls) inner_balls_pooled(a, b, hulls, child, remembers, gravity, dt, m);
+    else inner_balls_plain(a, b, remembers, gravity, dt, m);
+}
+
+/* Is the centre of mass of a's body behind the triangle of a mesh b, over it? Other triangles may be what the body
+ * touches, or would, if it were not so deep. pose: of a in b's frame. */
+SADMM_INLINE bool inner_is_behind(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                                  uint32_t child, const struct pair_pose *pose)
+{
+    struct mesh_triangle t;
+    struct mesh mesh;
+    double x[3];
+    vec3 centre;
+    real height;
+    int k;
+    if (a->system_body < 0 || is_own_ball(a) || !(a->spin > INNER_TURNS * a->thin)) return false;
+    for (k = 0; k < 3; ++k) x[k] = b->R[k] * a->arm[0] + b->R[3 + k] * a->arm[1] + b->R[6 + k] * a->arm[2];
+    mesh_at(hulls, b->geometry.hull, &mesh);
+    mesh_triangle_of(&mesh, (int32_t)child, &t);
+    centre = v3_sub(v3_sub(r3_vec3(pose->t), v3_load(x)), t.origin);
+    height = v3_dot(t.normal, centre);
+    return height < 0 && height > -(real)geometry_radius(&a->geometry) && mesh_is_over(&t, centre, 0);
+}
+
+/* Is one asked for? Of a manifold that is deep, of bodies that turn, and where accelerations alone may turn the pair
+ * anywhere within the step. */
+SADMM_INLINE bool inner_is_asked(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double gravity, double dt,
+                                 const struct manifold *m)
+{
+    return fall_of(gravity, dt) + a->fall + b->fall > 2 * MIDWAY_TRAVEL * smaller_of(a->thin, b->thin) ||
+           (inner_is_deep(a, b, m) && inner_forgets(a, b, dt));
+}
+
+#endif
