@@ -56,7 +56,7 @@ SADMM_INLINE struct pair_pose pair_pose(bool a_is_plane, const double Ra[9], con
 }
 
 /* Of two shapes as they are placed, moved on by `ahead` seconds (midway.h). */
-SADMM_INLINE struct pair_pose placed_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead)
+SADMM_INLINE struct pair_pose turned_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead)
 {
     double d[3];
     int i;
@@ -69,7 +69,7 @@ SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const st
                                            double dt)
 {
     struct sadmm_proxy turned[2];
-    return placed_pose(proxy_at(a, ahead, dt, &turned[0]), proxy_at(b, ahead, dt, &turned[1]), ahead);
+    return turned_pose(proxy_at(a, ahead, dt, &turned[0]), proxy_at(b, ahead, dt, &turned[1]), ahead);
 }
 
 SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
@@ -152,7 +152,7 @@ SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const 
     start.ahead = proxy_ahead(a, b, speed, dt);
     start.limit = proxy_limit(a, b, speed, margin, gravity, dt);
     start.moves_on = advance_needed(a, b, start.ahead, dt);
-    start.pose = placed_pose(a, b, start.ahead);
+    start.pose = turned_pose(a, b, start.ahead);
     return start;
 }
 
