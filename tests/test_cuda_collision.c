@@ -99,10 +99,10 @@ static struct sadmm_collision_input world_input(const sadmm_world *world, struct
         .margin = world->def.contact_margin,
         .threads = 1,
         .disabled_body_pairs = world->disabled_pairs.keys,
-        .disabled_body_pair_count = world->disabled_pairs.count,
+        .disabled_body_pair_count = sadmm_pair_table_count(&world->disabled_pairs),
         .friction_pairs = world->friction_pairs.keys,
         .friction_values = world->friction_pairs.values,
-        .friction_pair_count = world->friction_pairs.count,
+        .friction_pair_count = sadmm_pair_table_count(&world->friction_pairs),
     };
     int32_t dynamic = 0;
     for (size_t slot = 0; slot < world->body_slots; ++slot) {
