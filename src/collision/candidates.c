@@ -234,7 +234,7 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
         c->changed[c->changed_count++] = (uint32_t)slot;
     }
     if (!sadmm_seams_find(&c->seams, input, !c->seams_valid)) {
-        c->seams_valid = false;
+        c->seams_valid = c->broad_phase_valid = c->list_valid = false; /* what has left its box is not listed yet */
         return sadmm_fail_memory(error, "neighbours of shapes");
     }
     c->seams_valid = true;
