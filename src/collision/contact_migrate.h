@@ -70,10 +70,13 @@ SADMM_INLINE double proxy_curvature_radius(const struct sadmm_proxy *p, const do
     return geometry_curvature_radius(&p->geometry, n, at);
 }
 
+/* What touches along more than a line does not roll. */
+enum { ROLLING_POINTS = 2 };
+
 /* May the contact of these have a radius? */
 SADMM_INLINE bool contact_is_curved(const struct sadmm_proxy *a, const struct sadmm_proxy *b, int32_t count)
 {
-    return count <= 2 && (geometry_is_curved(&a->geometry) || geometry_is_curved(&b->geometry));
+    return count <= ROLLING_POINTS && (geometry_is_curved(&a->geometry) || geometry_is_curved(&b->geometry));
 }
 
 /* Of the two surfaces relative to each other; 0: neither is curved, they touch along more than a line, or no body has its
@@ -107,7 +110,7 @@ SADMM_INLINE bool contact_rolls(const struct sadmm_proxy *a, const struct sadmm_
     const double deep = ROLLING_DEPTH * smaller_of(a->thin, b->thin);
     bool presses = false;
     int32_t k;
-    if (!((a->mean != 0) & (b->mean != 0) & (before->count == count))) return false;
+    if (!((a->mean != 0) & (b->mean != 0) & (before->count == count) & (count <= ROLLING_POINTS))) return false;
     for (k = before->first; k < before->first + count; ++k) {
         if (points[k].gap < -deep) return false;
         presses = presses || sadmm_normal_impulse(before, &points[k]) > 0;
