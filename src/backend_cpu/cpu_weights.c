@@ -150,6 +150,20 @@ static void ease_gaps(struct sadmm_context *c, size_t index)
     }
 }
 
+/* weight_most of a pair. */
+static double most_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+{
+    const int32_t bodies[2] = {pair->body_a, pair->body_b};
+    double mass[2] = {0, 0};
+    int constraints[2] = {0, 0};
+    for (int side = 0; side < 2; ++side) {
+        if (bodies[side] < 0) continue;
+        constraints[side] = c->offsets[bodies[side] + 1] - c->offsets[bodies[side]];
+        mass[side] = cpu_body_mass(c, bodies[side]);
+    }
+    return weight_most(constraints, mass, pair->count);
+}
+
 static void weigh_pair_block(struct sadmm_context *c, size_t index)
 {
     struct pair_block *block = &c->pair_blocks[index];
@@ -162,7 +176,8 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index)
         double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
         double load = sums[l] / pair->count;
         double response = c->pair_response[index * (size_t)LANES + (size_t)l];
-        *B = island->rescale > 0 ? *B * island->rescale : weight_of_pair(&island->weights, load, response);
+        *B = island->rescale > 0 ? *B * island->rescale
+                                 : weight_of_pair(&island->weights, load, most_of(c, pair), response);
         block->inv_s[l] = (real)(pair->body_a >= 0 && pair->body_b >= 0 ? *B / 2 : *B);
     }
 }

@@ -201,6 +201,31 @@ static void update_weight_scales(struct sadmm_context *c)
     }
 }
 
+/* Constraints of a body: pairs, and those given by rows. */
+static int constraints_of(const struct sadmm_context *c, int32_t body)
+{
+    const struct sadmm_contact_set *contacts = c->system->contacts;
+    int count = 0;
+    for (size_t p = 0; p < contacts->pair_count; ++p)
+        count += contacts->pairs[p].body_a == body || contacts->pairs[p].body_b == body;
+    for (size_t k = contacts->point_count; k < c->constraint_count; ++k)
+        count += c->constraints[k].side[0].body == body || c->constraints[k].side[1].body == body;
+    return count;
+}
+
+static double most_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+{
+    const int32_t bodies[2] = {pair->body_a, pair->body_b};
+    double mass[2] = {0, 0};
+    int constraints[2] = {0, 0};
+    for (int side = 0; side < 2; ++side) {
+        if (bodies[side] < 0) continue;
+        constraints[side] = constraints_of(c, bodies[side]);
+        mass[side] = mass_of(&c->bodies[bodies[side]]);
+    }
+    return weight_most(constraints, mass, pair->count);
+}
+
 /* The points of a pair share one weight: mean load, mean response. */
 static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair)
 {
@@ -214,7 +239,7 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
     const struct ref_body *island = island_of(c, &c->constraints[pair->first]);
     double B = island->rescale > 0
                    ? c->constraints[pair->first].B[0] * island->rescale
-                   : weight_of_pair(&island->weights, load / pair->count, pair_response(c, pair));
+                   : weight_of_pair(&island->weights, load / pair->count, most_of(c, pair), pair_response(c, pair));
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         struct ref_constraint *constraint = &c->constraints[k];
         memset(constraint->B, 0, sizeof constraint->B);

@@ -32,17 +32,37 @@ struct eight_sides {
     solver_real number[2][LANES];  /* numbers lane and lane + LANES of arm_sums */
 };
 
+/* weight_most of a pair. */
+static __device__ __forceinline__ double most_of(const model_view &model, const body_view &bodies,
+                                                 const graph_view &graph, const contact_view &contacts,
+                                                 const pair_bodies &pair, int32_t p)
+{
+    const int32_t joined[2] = {pair.body_a, pair.body_b};
+    double mass[2] = {0, 0};
+    int constraints[2] = {0, 0};
+#pragma unroll
+    for (int side = 0; side < 2; ++side) {
+        if (!is_dynamic(model, joined[side])) continue;
+        const int32_t slot = graph.slot_of[joined[side]];
+        constraints[side] = graph.offsets[slot + 1] - graph.offsets[slot];
+        mass[side] = mass_of(bodies, (size_t)joined[side]);
+    }
+    return weight_most(constraints, mass, (int)contacts.difference[p].w);
+}
+
 /* B of the pair of the lane's side. Both of its sides work it out; the one at its first dynamic body keeps it. */
 static __device__ __forceinline__ double weigh_side(const model_view &model, const body_view &bodies,
-                                                    const contact_view &contacts, const weight_view &weights,
-                                                    const eight_sides &sides, const cuda_island &island, bool first)
+                                                    const graph_view &graph, const contact_view &contacts,
+                                                    const weight_view &weights, const eight_sides &sides,
+                                                    const cuda_island &island, bool first)
 {
     const int32_t p = sides.code / 2;
     const double load = (double)sides.load, response = (double)sides.response;
     const bool a = is_dynamic(model, sides.bodies.body_a), both = a && is_dynamic(model, sides.bodies.body_b);
     const double scale = island.rescale,
                  taken = scale > 0 ? weights.weight[p]
-                                   : weight_of_pair(&island.weights, load, response),
+                                   : weight_of_pair(&island.weights, load,
+                                                    most_of(model, bodies, graph, contacts, sides.bodies, p), response),
                  B = scale > 0 ? taken * scale : taken;
     if (sides.code & 1 && a) return B;
     contacts.inv_s[p] = (solver_real)(both ? B / 2 : B);
@@ -119,8 +139,9 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
     for (int32_t begin = t.begin;;) {
         const bool rows = !CLOSED && sides.code >= 0 && sides.code >= 2 * v.contacts.pair_capacity;
-        const double B =
-            sides.code < 0 || rows ? 0 : weigh_side(v.model, v.bodies, v.contacts, v.weights, sides, island, first);
+        const double B = sides.code < 0 || rows
+                             ? 0
+                             : weigh_side(v.model, v.bodies, v.graph, v.contacts, v.weights, sides, island, first);
         if (rows) add_weighted_rows(v.rows, sides.code / 2 - v.contacts.pair_capacity, sides.code & 1, C);
         else if (!three && sides.code >= 0) add_normals(v.contacts, sides.code, B, C);
 #pragma unroll

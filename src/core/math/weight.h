@@ -182,12 +182,25 @@ SADMM_INLINE double weight_gap_error(double error, double share, double slop)
 
 /* ---- B ----------------------------------------------------------------------------------------------------------- */
 
-/* B of a pair, kg. load: the mean size of its impulses, N s. phi / w does not sink with the weight scale: it is for
- * contacts whose load is not known. */
-SADMM_INLINE double weight_of_pair(const struct weight_island *island, double load, double response)
+/* The most that a point of a pair carries, kg, by how many constraints each of its bodies has (0: it is not dynamic) and
+ * their masses. On a body that nothing else touches nothing rests: its pair carries no more than it, times what V may be
+ * divided by. V is the island's, and says nothing of a light body that hits a heavy one: by that it would have the
+ * weight of what is heavy, and pass on its momentum slower than there are iterations. */
+SADMM_INLINE double weight_most(const int constraints[2], const double mass[2], int points)
+{
+    double most = HUGE_VAL;
+    int side;
+    for (side = 0; side < 2; ++side)
+        if (constraints[side] == 1) most = min_of(most, WEIGHT_STIFFEST * mass[side] / points);
+    return most;
+}
+
+/* B of a pair, kg. load: the mean size of its impulses, N s; most: weight_most. phi / w does not sink with the weight
+ * scale: it is for contacts whose load is not known. */
+SADMM_INLINE double weight_of_pair(const struct weight_island *island, double load, double most, double response)
 {
     const double scale = island->scale;
-    return scale * weight_mass(load, island->speed, island->mass) +
+    return scale * weight_mass(load, island->speed, min_of(island->mass, most)) +
            max_of(scale, 1.0) * WEIGHT_FLOOR_CONTACT / response;
 }
 
