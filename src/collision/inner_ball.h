@@ -63,7 +63,7 @@ SADMM_INLINE bool inner_ball_of(const struct sadmm_proxy *p, const double *hulls
 }
 
 /* pair_manifold.h */
-SADMM_INLINE void ball_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
+SADMM_CALLED void ball_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
                                 uint32_t child, const struct pair_pose *pose, struct manifold *m);
 
 /* Where a ball meets the other shape, in the frame of the pair's b, `ahead` seconds into the step. */

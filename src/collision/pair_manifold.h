@@ -129,7 +129,7 @@ SADMM_INLINE void triangle_manifold(const struct sadmm_geometry *a, const struct
 }
 
 /* Of the ball of a body (inner_ball.h) and the other shape of a pair, at any distance. */
-SADMM_INLINE void ball_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
+SADMM_CALLED void ball_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
                                 uint32_t child, const struct pair_pose *pose, struct manifold *m)
 {
     const real far = SADMM_REAL_MAX / 4; /* some search for nearest points alone where there is no limit */
