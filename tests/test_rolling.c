@@ -26,7 +26,7 @@ static sadmm_world *new_world(int solver, double dt)
 }
 
 /* No force does work on a ball that rolls, or slides without friction. At 5 ms a hundredth of the energy may be gone
- * after 5 s, by an error of third order: a quarter at half the step is what second order leaves. */
+ * after 5 s; at half the step less than a quarter of that, which is what an error of second order leaves. */
 START_TEST(rocking_keeps_its_energy)
 {
     const double steps[] = {0.005, 0.0025};

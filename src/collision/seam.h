@@ -19,7 +19,7 @@
 #ifndef SADMM_COLLISION_SEAM_H
 #define SADMM_COLLISION_SEAM_H
 
-#include "convex.h"
+#include "farthest.h"
 #include "manifold.h"
 #include "mesh_triangle.h"
 #include "mesh_walk.h"
@@ -86,23 +86,6 @@ SADMM_INLINE vec3 seam_between(const struct sadmm_proxy *p, const struct sadmm_p
 }
 
 /* ---- what a shape has, and how far it reaches: own frame ---------------------------------------------------------- */
-
-/* The point of a convex shape farthest along u (unit). */
-SADMM_INLINE vec3 seam_support(const struct sadmm_geometry *g, const double *hulls, vec3 u)
-{
-    const vec3 size = v3_load(g->size);
-    struct convex c;
-    vec3 x;
-    switch ((sadmm_shape_type)g->type) {
-    case SADMM_SHAPE_SPHERE: return v3_scale(u, size.x);
-    case SADMM_SHAPE_CAPSULE: return v3_madd(v3(0, 0, u.z < 0 ? -size.y : size.y), size.x, u);
-    case SADMM_SHAPE_BOX: return v3(u.x < 0 ? -size.x : size.x, u.y < 0 ? -size.y : size.y, u.z < 0 ? -size.z : size.z);
-    default: break;
-    }
-    convex_of(g, hulls, &c);
-    x = convex_point(&c, convex_piece(&c, u, 0), u);
-    return v3_madd(x, c.p.radius, u);
-}
 
 /* How far x is outside of a hull's faces at least. */
 SADMM_INLINE real seam_hull_outside(const struct sadmm_geometry *g, const double *hulls, vec3 x)
@@ -178,7 +161,7 @@ SADMM_INLINE bool seam_shape_hides(const struct sadmm_geometry *g, const double 
     if (seam_outside(g, hulls, x) > flush) return false;
     if (g->type == SADMM_SHAPE_PLANE)
         return u.z <= 0 || u.x * u.x + u.y * u.y > (real)(SEAM_SLOPE * SEAM_SLOPE) || -x.z > 2 * flush;
-    return v3_dot(u, v3_sub(seam_support(g, hulls, u), x)) > 2 * flush;
+    return v3_dot(u, v3_sub(geometry_farthest(g, hulls, u), x)) > 2 * flush;
 }
 
 /* ---- a contact ---------------------------------------------------------------------------------------------------- */
@@ -214,7 +197,7 @@ SADMM_INLINE vec3 seam_farthest(const struct seam_piece *piece, vec3 u)
     struct mesh mesh;
     struct mesh_triangle t;
     int k, best = 0;
-    if (piece->own->geometry.type != SADMM_SHAPE_MESH) return seam_support(&piece->own->geometry, piece->hulls, u);
+    if (piece->own->geometry.type != SADMM_SHAPE_MESH) return geometry_farthest(&piece->own->geometry, piece->hulls, u);
     mesh_at(piece->hulls, piece->own->geometry.hull, &mesh);
     mesh_triangle_of(&mesh, piece->triangle, &t);
     for (k = 1; k < 3; ++k)

@@ -95,7 +95,7 @@ SADMM_INLINE double lead_speed(const double before[6], const double v[6], const 
  * jitters by. Of what goes by more than its point's arm in a step it is this share of the arm: a bullet would be taken
  * through a plate. */
 #define LEAD_SHARE 0.05
-#define LEAD_SLOP 0.1
+#define LEAD_SLOP  0.1
 /* A body that is carried and moves its points by less than this share of what it would gain in a step by itself rests.
  * Contacts that are solved in part are springs, on which it sways; a mean of two velocities would let that grow, for it
  * does not show the contacts what they corrected by. */
@@ -147,7 +147,7 @@ SADMM_INLINE void lead_add_way(struct lead_touch *touch, struct lead_gap gap, co
                                const double size[2], double dt, double slop)
 {
     const double way = (dt * size[0] < gap.arm[0] ? dt * size[0] : gap.arm[0]) +
-                             (dt * size[1] < gap.arm[1] ? dt * size[1] : gap.arm[1]),
+                       (dt * size[1] < gap.arm[1] ? dt * size[1] : gap.arm[1]),
                  end = gap.start + dt * gap.speed, deep = gap.rolls && gap.start < 0 ? -gap.start : 0,
                  room = (end > -deep ? end + deep : 0) + max_of(LEAD_SHARE * way, LEAD_SLOP * slop);
     if (dt * (lead[0] + lead[1]) > room) touch->island |= TOUCH_JOLT;

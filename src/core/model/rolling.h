@@ -18,6 +18,7 @@
 #include "core/math/rolling.h"
 #include "system.h"
 
+/* (omega dt)^2, half a radian a step: from there to 1 frictionless rocking is no longer stable by itself. */
 #define ROLLING_STIFF 0.25
 
 /* Does rocking have to be taken out of the body? */
