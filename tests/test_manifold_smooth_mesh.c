@@ -62,6 +62,23 @@ static struct manifold touch_triangle(const struct beside *b, int32_t triangle, 
     return m;
 }
 
+/* Where the shape and the triangle are nearest, whatever the surface around. */
+static struct manifold nearest_on_triangle(const struct beside *b, int32_t triangle)
+{
+    const struct pair_pose pose = pair_of_pose(&b->t);
+    struct convex_triangle p;
+    struct convex_axis axis;
+    struct manifold m;
+    uint32_t found;
+    memset(&m, 0, sizeof m);
+    convex_triangle_make(&b->t.g[0], &b->surface, b->t.pool->numbers, (uint32_t)triangle, &pose, &p);
+    ck_assert(convex_search(&p.pair, p.front.n, false, SADMM_REAL_MAX, &axis, &found));
+    m.normal = axis.n;
+    hull_add_nearest(p.pair.thin, axis.pa, axis.pb, polytope_feature(FEATURE_NEAREST, 0, 0), &m);
+    m.points[0].position = v3_add(m.points[0].position, p.triangle.origin);
+    return m;
+}
+
 /* The triangle as shape 1. */
 static void take_triangle(struct beside *b, int32_t triangle)
 {
@@ -84,7 +101,7 @@ static double distance_of(struct beside *b, bool *at_end)
         take_triangle(b, k);
         const double(*x)[3] = (const double(*)[3])b->t.h[1].x;
         if (test_point_triangle(b->t.x[0], x[0], x[1], x[2]) > reach) continue;
-        const struct manifold m = touch_triangle(b, k, SADMM_REAL_MAX, 0);
+        const struct manifold m = nearest_on_triangle(b, k);
         ck_assert_int_eq(m.count, 1);
         normal_in_world(&b->t, m.normal, n);
         const double here = m.points[0].separation, apart = apart_along(&b->t, n);

@@ -178,7 +178,7 @@ SADMM_INLINE double turning_speed(const struct sadmm_proxy *p, const double norm
 }
 
 /* Pose of a in b's frame (pair_manifold.h). */
-SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
+SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
                                            double dt);
 
 struct first_touch {

@@ -250,23 +250,25 @@ SADMM_INLINE void inner_ball_add(const struct sadmm_proxy *a, const struct sadmm
     struct sadmm_proxy proxy;
     struct inner_ball ball;
     real along;
+    bool alone;
     if (inner_is_heavy(of_b ? b : a, of_b ? a : b) || !inner_ball_of(of_b ? b : a, hulls, &proxy) ||
         !inner_ball_meets(a, b, &proxy, of_b, hulls, child, gravity, dt, m->ahead, &ball))
         return;
     along = v3_dot(ball.normal, m->normal);
-    if (ball.hits && relative_speed(a->velocity, b->velocity) * dt > INNER_BALL_ALONE * (double)ball.radius) {
-        inner_instead(a, b, hulls, dt, &ball, m);
-        m->points[0] = m->points[1];
-        m->count = 1;
-    } else if (m->count == 0) {
-        if (ball.hits) inner_instead(a, b, hulls, dt, &ball, m);
-    } else if (along > INNER_BALL_ALONG) {
+    alone = ball.hits && relative_speed(a->velocity, b->velocity) * dt > INNER_BALL_ALONE * (double)ball.radius;
+    if (!alone && m->count > 0 && along > INNER_BALL_ALONG) {
         if (ball.hits) inner_along(a, b, &proxy, dt, &ball, m);
-    } else if ((ball.hits && 2 * ball.separation > -ball.radius) ||
-               (along < -INNER_BALL_ALONG && !remembers && ball.separation > -ball.radius &&
-                (double)ball.separation < geometry_radius(&(of_b ? b : a)->geometry) && inner_is_deep(a, b, m))) {
-        inner_instead(a, b, hulls, dt, &ball, m);
+        return;
     }
+    if (alone || (m->count == 0 && ball.hits) ||
+        (m->count > 0 &&
+         ((ball.hits && 2 * ball.separation > -ball.radius) ||
+          (along < -INNER_BALL_ALONG && !remembers && ball.separation > -ball.radius &&
+           (double)ball.separation < geometry_radius(&(of_b ? b : a)->geometry) && inner_is_deep(a, b, m)))))
+        inner_instead(a, b, hulls, dt, &ball, m);
+    if (!alone) return;
+    m->points[0] = m->points[1];
+    m->count = 1;
 }
 
 /* Onto the surface of the body that its impulses turn, or the one that is easier to turn: midway to what accelerations
@@ -284,9 +286,9 @@ SADMM_INLINE void inner_on_surface(const struct sadmm_proxy *a, const struct sad
 SADMM_INLINE void inner_balls_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
                                  uint32_t child, bool remembers, double gravity, double dt, struct manifold *m)
 {
+    int of_b; /* a loop: compilers are not to make it twice */
     remembers &= !inner_forgets(a, b, dt);
-    inner_ball_add(a, b, false, hulls, child, remembers, gravity, dt, m);
-    inner_ball_add(a, b, true, hulls, child, remembers, gravity, dt, m);
+    for (of_b = 0; of_b < 2; ++of_b) inner_ball_add(a, b, of_b, hulls, child, remembers, gravity, dt, m);
     inner_on_surface(a, b, m);
 }
 SADMM_RARE void inner_balls_pooled(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,

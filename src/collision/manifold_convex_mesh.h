@@ -220,7 +220,6 @@ SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct 
     convex_mesh_give(p, cache, axis.separation, m);
 }
 
-/* limit SADMM_REAL_MAX: the nearest points, whatever the surface around (advance.h). */
 SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
                                      const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
                                      uint32_t cache, struct manifold *m)
@@ -234,14 +233,6 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     convex_triangle_make(a, b, blocks, child, pose, &p);
     convex_recall(&p.pair, cache, &memory);
     if (!memory.known) memory.side = p.front.n;
-    if (!(limit < SADMM_REAL_MAX)) {
-        if (!convex_search(&p.pair, memory.side, false, limit, &axis, &found)) return;
-        m->count = 0;
-        m->normal = axis.n;
-        hull_add_nearest(p.pair.thin, axis.pa, axis.pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
-        m->points[0].position = v3_add(m->points[0].position, p.triangle.origin);
-        return;
-    }
     if (p.front.separation > limit + p.pair.slack) return;
     /* of what is flat all around the face alone speaks, if only of what is over it */
     flat = mesh_is_flat(&p.triangle);

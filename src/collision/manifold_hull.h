@@ -345,24 +345,8 @@ SADMM_INLINE void hull_by_nearest(const struct polytope_pair *pair, const struct
     hull_add_nearest(pair->thin, pa, pb, feature, m); /* the face along the normal need not have the deepest corner */
 }
 
-SADMM_RARE void hull_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
-                              const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
-{
-    struct polytope_pair pair;
-    struct polytope_axis kept, nearest;
-    vec3 pa, pb, start;
-    uint32_t feature;
-    bool known;
-
-    polytope_pair_make(a, b, hulls, pose, &pair);
-    if (hull_by_memory(&pair, limit, cache, &kept, &known, &start, m)) return;
-    if (hull_edges_are_proven(&pair, &kept, &pa, &pb, &feature)) nearest = kept;
-    else if (!hull_nearest(&pair, start, limit, &nearest, &pa, &pb, &feature)) return;
-    hull_by_nearest(&pair, &kept, known, &nearest, pa, pb, feature, limit, m);
-}
-
-/* The same in two parts, for devices, where the threads of a warp wait for each other. What is little work comes first:
- * what goes on as it was, and what is too far apart. False: the rest has to be done, from where `walk` has ended. */
+/* In two parts, for devices, where the threads of a warp wait for each other. What is little work comes first: what goes
+ * on as it was, and what is too far apart. False: the rest has to be done, from where `walk` has ended. */
 SADMM_RARE bool hull_manifold_at_once(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
                                       const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
                                       struct gjk_walk *walk, struct manifold *m)
@@ -396,6 +380,29 @@ SADMM_RARE void hull_manifold_from(const struct sadmm_geometry *a, const struct 
     if (hull_edges_are_proven(&pair, &kept, &pa, &pb, &feature)) nearest = kept;
     else if (!hull_nearest_from(&pair, walk, limit, &nearest, &pa, &pb, &feature)) return;
     hull_by_nearest(&pair, &kept, known, &nearest, pa, pb, feature, limit, m);
+}
+
+/* The whole. */
+SADMM_RARE void hull_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
+                              const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
+{
+#ifdef __CUDACC__ /* its compiler takes minutes for another copy of the two */
+    struct gjk_walk walk;
+    if (!hull_manifold_at_once(a, b, hulls, pose, limit, cache, &walk, m))
+        hull_manifold_from(a, b, hulls, pose, limit, cache, &walk, m);
+#else
+    struct polytope_pair pair;
+    struct polytope_axis kept, nearest;
+    vec3 pa, pb, start;
+    uint32_t feature;
+    bool known;
+
+    polytope_pair_make(a, b, hulls, pose, &pair);
+    if (hull_by_memory(&pair, limit, cache, &kept, &known, &start, m)) return;
+    if (hull_edges_are_proven(&pair, &kept, &pa, &pb, &feature)) nearest = kept;
+    else if (!hull_nearest(&pair, start, limit, &nearest, &pa, &pb, &feature)) return;
+    hull_by_nearest(&pair, &kept, known, &nearest, pa, pb, feature, limit, m);
+#endif
 }
 
 /* A vertex over the plane, or the lowest point of the ball around it. */

@@ -297,7 +297,7 @@ SADMM_INLINE bool mesh_recall(const struct mesh_pair *p, uint32_t cache, struct 
 }
 
 /* Where all around is in the triangle's plane the face says all that there is to say. known: it did in the last step. */
-SADMM_INLINE void mesh_by_face(const struct mesh_pair *p, bool known, real limit, struct manifold *m)
+SADMM_CALLED void mesh_by_face(const struct mesh_pair *p, bool known, real limit, struct manifold *m)
 {
     const bool shallow = p->front.separation >= -MESH_SHALLOW * p->pair.thin;
     mesh_on_front(p, limit, m);
@@ -313,6 +313,8 @@ SADMM_INLINE bool mesh_by_memory(const struct mesh_pair *p, real limit, uint32_t
                                  bool *known, vec3 *start, struct manifold *m)
 {
     const struct polytope_pair *pair = &p->pair;
+    const struct polytope_axis *face;
+    bool of_a;
     *known = mesh_recall(p, cache, kept);
     *start = *known ? kept->n : p->front.n;
     if (p->front.separation > limit + pair->slack || (*known && kept->separation > limit + pair->slack)) return true;
@@ -321,20 +323,14 @@ SADMM_INLINE bool mesh_by_memory(const struct mesh_pair *p, real limit, uint32_t
         return true;
     }
     if (pair->a.faces == 0 || (*known && kept->kind == AXIS_EDGES)) return false;
-    if (*known && kept->kind == AXIS_FACE_A) {
-        facing_manifold(pair, kept->n, kept->separation, limit, m);
-        if (hull_is_proven(pair, kept, m) && mesh_allows(&p->mesh, &p->triangle, v3_neg(kept->n))) {
-            m->cache = cache;
-            mesh_finish(p, AXIS_FACE_A, m);
-            return true;
-        }
-    } else {
-        facing_manifold(pair, p->front.n, p->front.separation, limit, m);
-        if (mesh_lies_on(pair, &p->front, *known, m)) {
-            m->cache = axis_memory(&p->front);
-            mesh_finish(p, AXIS_FACE_B, m);
-            return true;
-        }
+    of_a = *known && kept->kind == AXIS_FACE_A;
+    face = of_a ? kept : &p->front;
+    facing_manifold(pair, face->n, face->separation, limit, m);
+    if (of_a ? hull_is_proven(pair, kept, m) && mesh_allows(&p->mesh, &p->triangle, v3_neg(kept->n))
+             : mesh_lies_on(pair, &p->front, *known, m)) {
+        m->cache = of_a ? cache : axis_memory(&p->front);
+        mesh_finish(p, face->kind, m);
+        return true;
     }
     m->count = 0;
     m->cache = 0;
@@ -464,33 +460,7 @@ SADMM_INLINE void mesh_by_nearest(const struct mesh_pair *p, const struct polyto
     mesh_finish(p, axis.kind, m);
 }
 
-/* limit SADMM_REAL_MAX: the nearest points, whatever the surface around (advance.h). */
-SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
-                              uint32_t child, const struct pair_pose *pose, real limit, uint32_t cache,
-                              struct manifold *m)
-{
-    struct mesh_pair p;
-    struct polytope_axis kept, nearest;
-    vec3 pa, pb, start;
-    uint32_t feature;
-    bool known = false;
-    const bool of_any_distance = !(limit < SADMM_REAL_MAX);
-
-    mesh_pair_make(a, b, blocks, child, pose, &p);
-    start = p.front.n;
-    kept = p.front; /* until something is known */
-    if (!of_any_distance && mesh_by_memory(&p, limit, cache, &kept, &known, &start, m)) return;
-    if (!hull_nearest(&p.pair, start, limit, &nearest, &pa, &pb, &feature)) return;
-    if (of_any_distance) {
-        m->normal = nearest.n;
-        hull_add_nearest(p.pair.thin, pa, pb, feature, m);
-        m->points[0].position = v3_add(m->points[0].position, p.triangle.origin);
-        return;
-    }
-    mesh_by_nearest(&p, &kept, known, &nearest, pa, pb, feature, limit, m);
-}
-
-/* The same in two parts (hull_manifold_at_once). */
+/* In two parts (hull_manifold_at_once). */
 SADMM_RARE bool mesh_manifold_at_once(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
                                       const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
                                       uint32_t cache, struct gjk_walk *walk, struct manifold *m)
@@ -519,6 +489,29 @@ SADMM_RARE void mesh_manifold_from(const struct sadmm_geometry *a, const struct 
     known = mesh_recall(&p, cache, &kept);
     if (hull_nearest_from(&p.pair, walk, limit, &nearest, &pa, &pb, &feature))
         mesh_by_nearest(&p, &kept, known, &nearest, pa, pb, feature, limit, m);
+}
+
+/* The whole. */
+SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
+                              uint32_t child, const struct pair_pose *pose, real limit, uint32_t cache,
+                              struct manifold *m)
+{
+#ifdef __CUDACC__ /* as hull_manifold */
+    struct gjk_walk walk;
+    if (!mesh_manifold_at_once(a, b, blocks, child, pose, limit, cache, &walk, m))
+        mesh_manifold_from(a, b, blocks, child, pose, limit, cache, &walk, m);
+#else
+    struct mesh_pair p;
+    struct polytope_axis kept, nearest;
+    vec3 pa, pb, start;
+    uint32_t feature;
+    bool known;
+    mesh_pair_make(a, b, blocks, child, pose, &p);
+    kept = p.front; /* until something is known */
+    if (mesh_by_memory(&p, limit, cache, &kept, &known, &start, m)) return;
+    if (hull_nearest(&p.pair, start, limit, &nearest, &pa, &pb, &feature))
+        mesh_by_nearest(&p, &kept, known, &nearest, pa, pb, feature, limit, m);
+#endif
 }
 
 #endif

@@ -65,7 +65,7 @@ SADMM_INLINE struct pair_pose turned_pose(const struct sadmm_proxy *a, const str
 }
 
 /* Of two shapes `ahead` seconds into the step. */
-SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
+SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
                                            double dt)
 {
     struct sadmm_proxy turned[2];
@@ -128,13 +128,24 @@ SADMM_INLINE void triangle_manifold(const struct sadmm_geometry *a, const struct
     mesh_manifold(a, b, blocks, child, pose, limit, cache, m);
 }
 
-/* Of the ball of a body (inner_ball.h) and the other shape of a pair, at any distance. */
-SADMM_CALLED void ball_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
-                                uint32_t child, const struct pair_pose *pose, struct manifold *m)
+/* Of the ball of a body (inner_ball.h) and the other shape of a pair, at any distance. The ball is a, or b where a is a
+ * plane. */
+SADMM_CALLED void ball_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
+                                const double *hulls, uint32_t child, const struct pair_pose *pose, struct manifold *m)
 {
-    const real far = SADMM_REAL_MAX / 4; /* some search for nearest points alone where there is no limit */
-    if (hulls && b->type == SADMM_SHAPE_MESH) mesh_manifold(a, b, hulls, child, pose, far, 0, m);
-    else pair_manifold(a, b, hulls, child, pose, far, 0, m);
+    const real far = SADMM_REAL_MAX / 4, radius = (real)shape_a->size[0];
+    const vec3 b = v3_load(shape_b->size);
+    if (shape_b->type == SADMM_SHAPE_SPHERE && shape_a->type == SADMM_SHAPE_PLANE)
+        manifold_plane_sphere(b.x, pose, far, m);
+    else if (shape_b->type == SADMM_SHAPE_SPHERE) manifold_sphere_sphere(radius, b.x, pose, far, m);
+    else if (shape_b->type == SADMM_SHAPE_CAPSULE) manifold_sphere_capsule(radius, b.x, b.y, pose, far, m);
+    else if (shape_b->type == SADMM_SHAPE_BOX) manifold_sphere_box(radius, b, pose, far, 0, m);
+    else if (!hulls) return;
+    else if (shape_b->type == SADMM_SHAPE_HULL) hull_manifold(shape_a, shape_b, hulls, pose, far, 0, m);
+    else if (shape_b->type == SADMM_SHAPE_MESH) mesh_manifold(shape_a, shape_b, hulls, child, pose, far, 0, m);
+#ifndef SADMM_WITHOUT_SMOOTH
+    else SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, child, pose, far, 0, m);
+#endif
 }
 
 /* What is known of two shapes in a step before their manifold is asked for. */

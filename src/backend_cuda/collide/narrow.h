@@ -145,7 +145,7 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
 /* What a kernel does for a candidate. */
 enum narrow_how {
     NARROW_PLAIN,         /* there are no hulls or meshes */
-    NARROW_AT_ONCE,       /* of hulls what is little work; the others are listed */
+    NARROW_AT_ONCE,       /* of worlds with hulls what is little work; the others are listed */
     NARROW_LISTED,        /* those */
     NARROW_MESHES_AT_ONCE, /* the same of worlds with meshes: further code, which would slow down the others */
     NARROW_MESHES_LISTED,
@@ -187,6 +187,18 @@ static __device__ void hulls_from(const collision_view &v, const struct collisio
     hull_manifold_from(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk, m);
     if (pair_asks_balls(a, b, v.hulls, 0, &start, step.gravity, step.dt, m))
         inner_balls_add(a, b, v.hulls, 0, cache != 0, step.gravity, step.dt, m);
+}
+
+/* The same of pairs without hulls, meshes and smooth bodies. */
+static __device__ __forceinline__ bool plain_at_once(const struct collision_step &step, const struct sadmm_proxy *a,
+                                                     const struct sadmm_proxy *b, const struct pair_start &start,
+                                                     uint32_t cache, struct manifold *m)
+{
+    if (start.moves_on) return false;
+    const struct pair_pose pose = start.pose; /* as in find_manifold */
+    pair_manifold(&a->geometry, &b->geometry, nullptr, 0, &pose, (real)start.limit, cache, m);
+    m->ahead = start.ahead;
+    return !pair_asks_balls(a, b, nullptr, 0, &start, step.gravity, step.dt, m);
 }
 
 /* The same of a pair with a smooth body: on planes, by formula. */
@@ -292,6 +304,8 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
         hulls_from(v, step, pa, pb, start, before >= 0 ? cache : 0, walk, &m);
     } else if (with_smooth(HOW) && is_at_once(HOW) && geometry_is_smooth(&b.geometry)) {
         if (!smooth_at_once(v, step, pa, pb, start, &m)) return false;
+    } else if (is_at_once(HOW)) {
+        if (!plain_at_once(step, pa, pb, start, before >= 0 ? cache : 0, &m)) return false;
     } else {
         find_manifold(pa, pb, is_listed(HOW) ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt, &start,
                       before >= 0 ? cache : 0, &m);
