@@ -267,14 +267,27 @@ SADMM_INLINE void joint_add_law(struct joint_laws *laws, const struct joint_movi
                : role == SADMM_ROLE_LOWER || role == SADMM_ROLE_UPPER ? 2 * m->dt * fabs(m->turning) : 0;
 }
 
-/* Half a step resolves turning by up to this many rad. Beyond it positions that move by means of velocities gain energy, the
- * more the more it is (docs/algorithm.md, section 10). */
+/* Half a step resolves turning by up to this many rad. Beyond it positions that move by means of velocities gain energy:
+ * what turns by an angle t in half a step and has a share s of its speed in points that are off its axis gains some
+ * 12 (s t^2)^2 of it a step (docs/algorithm.md, section 10). */
 #define JOINT_MOST_TURN 0.05
 /* What rounding makes of speeds is no turning. */
 #define JOINT_NO_TURN 1e-9
 
-/* Does the row of coordinate k turn by more? turning: what its rate by the velocities at the start changes by in half a step,
- * which is held against the speeds that turn: of its points around the bodies, and of one past the other where the axis does. */
+/* The square of how fast a body's mass turns about its centre: twice the energy, by its mass. */
+SADMM_INLINE double joint_spin2(const struct joint_side *side)
+{
+    vec3 w;
+    if (side->system_body < 0) return 0;
+    w = m3_tmul(q_matrix(q_load(side->rigid->orientation)), v3_load(side->velocity + 3));
+    return (w.x * w.x * side->rigid->inertia[0] + w.y * w.y * side->rigid->inertia[1] +
+            w.z * w.z * side->rigid->inertia[2]) /
+           side->rigid->mass;
+}
+
+/* Does the row of coordinate k turn by more? turning: what its rate by the velocities at the start changes by in half a
+ * step. It is held against the speeds that turn: of its points around the bodies and of the bodies about their centres,
+ * and of one point past the other where the axis does. A top turns fast, and its point hardly. */
 SADMM_INLINE bool joint_turns(const struct acting_joint *acting, int k, bool radial, double turning, double dt)
 {
     const struct joint_geometry *g = &acting->start;
@@ -282,17 +295,20 @@ SADMM_INLINE bool joint_turns(const struct acting_joint *acting, int k, bool rad
                turn_a = v3_load(acting->side[0].velocity + 3), turn_b = v3_load(acting->side[1].velocity + 3),
                around_b = v3_cross(turn_b, g->arm_b);
     vec3 arm = g->arm_a, around_a;
-    double past, axis, around;
+    double past, axis, around, turn;
     if (k >= 3)
         return fabs(turning) > JOINT_MOST_TURN * v3_norm(v3_sub(turn_b, turn_a)) +
                                    JOINT_NO_TURN * (v3_norm(turn_a) + v3_norm(turn_b));
     if (radial && k == 0) arm = v3_madd(arm, -g->value[0], g->axis[0]); /* to a's own point */
     around_a = v3_cross(turn_a, arm);
-    around = v3_norm(around_a) + v3_norm(around_b);
+    around = sqrt(v3_norm2(around_a) + joint_spin2(&acting->side[0])) +
+             sqrt(v3_norm2(around_b) + joint_spin2(&acting->side[1]));
     past = v3_norm(v3_sub(v3_add(vb, around_b), v3_add(va, around_a)));
     axis = dt / 2 * (radial && k == 0 ? past / max_of(g->value[0], JOINT_LEAST_LENGTH) : v3_norm(turn_a));
+    turn = max_of(axis, dt / 2 * max_of(v3_norm(turn_a), v3_norm(turn_b)));
     if (axis < JOINT_MOST_TURN) past *= axis / JOINT_MOST_TURN;
-    return fabs(turning) > JOINT_MOST_TURN * (around + past) + JOINT_NO_TURN * (v3_norm(va) + v3_norm(vb) + around);
+    return (fabs(turning) - JOINT_NO_TURN * (v3_norm(va) + v3_norm(vb) + around)) * turn >
+           JOINT_MOST_TURN * JOINT_MOST_TURN * (around + past);
 }
 
 SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, const struct sadmm_joint_memory *memory,
