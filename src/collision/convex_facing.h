@@ -4,8 +4,9 @@
  *
  * A disc's rim has no corners. Eight points of it stand for it, evenly spread from a direction that is not the disc's
  * own but the other body's: a side of the face, a plane's or a mesh's x axis, b's of two discs. So a disc that turns
- * about its axis keeps its points, and it stands as an octagon does: what it tips about is at most 1 - cos(pi / 8) =
- * 7.6 % of the radius inside of the rim. Where rims cross sides, lines and each other the points are exact.
+ * about its axis keeps its points. An octagon leaves out up to 1 - cos(pi / 8) = 7.6 % of the radius: where a centre of
+ * mass is as near to the rim, one of the eight is the rim's point nearest to it, and a body tips over the rim where it
+ * would in truth. Where rims cross sides, lines and each other the points are exact.
  */
 #ifndef SADMM_COLLISION_CONVEX_FACING_H
 #define SADMM_COLLISION_CONVEX_FACING_H
@@ -13,6 +14,10 @@
 #include "convex_pair.h"
 #include "polytope_face.h"
 
+/* From where to where a centre of mass decides about the points of a rim, in radii: from within the octagon to beyond
+ * the rim. */
+#define CONVEX_TIPS_FROM ((real)0.9)
+#define CONVEX_TIPS_TO   ((real)1.1)
 enum { CONVEX_RIM = 8, CONVEX_POINTS = 64, CONVEX_END = 16 /* features of ends: above those of a rim */ };
 
 enum convex_facing_kind { CONVEX_NOTHING, CONVEX_LINE, CONVEX_FACE, CONVEX_DISC };
@@ -230,9 +235,33 @@ SADMM_INLINE void convex_rim_axes(const struct convex_facing *disc, vec3 along, 
     }
 }
 
-/* What the points of a rim that faces `other` are spread from. */
-SADMM_INLINE vec3 convex_spread(const struct convex_pair *pair, const struct convex_facing *other)
+/* Is a centre of mass near the rim, so that which points stand for it decides whether the body tips? To it from the
+ * disc's centre; of two that are the outer one. 0: there is none. */
+SADMM_INLINE vec3 convex_tipping(const struct convex_facing *disc, const vec3 centre[2], const bool tips[2])
 {
+    real most2 = CONVEX_TIPS_FROM * CONVEX_TIPS_FROM * disc->radius * disc->radius;
+    vec3 way = v3(0, 0, 0);
+    int s;
+    for (s = 0; s < 2; ++s) {
+        vec3 d;
+        real d2;
+        if (!tips[s]) continue;
+        d = v3_sub(centre[s], disc->centre);
+        d = v3_madd(d, -v3_dot(d, disc->normal), disc->normal);
+        d2 = v3_norm2(d);
+        if (!(d2 > most2 && d2 < CONVEX_TIPS_TO * CONVEX_TIPS_TO * disc->radius * disc->radius)) continue;
+        most2 = d2;
+        way = d;
+    }
+    return way;
+}
+
+/* What the points of a rim that faces `other` are spread from. */
+SADMM_INLINE vec3 convex_spread(const struct convex_pair *pair, const struct convex_facing *disc,
+                                const struct convex_facing *other)
+{
+    const vec3 way = convex_tipping(disc, pair->centre, pair->tips);
+    if (v3_norm2(way) > 0) return way;
     if (v3_norm2(pair->spread) > 0) return pair->spread;
     return other->kind == CONVEX_DISC ? v3(1, 0, 0) : v3_sub(other->corner[1], other->corner[0]);
 }
@@ -243,7 +272,7 @@ SADMM_INLINE void convex_rim_over(struct convex_meeting *m, const struct convex_
 {
     vec3 e1, e2;
     int k;
-    convex_rim_axes(disc, convex_spread(m->pair, flat), &e1, &e2);
+    convex_rim_axes(disc, convex_spread(m->pair, disc, flat), &e1, &e2);
     for (k = 0; k < CONVEX_RIM; ++k) {
         const vec3 x = convex_rim(disc, e1, e2, k);
         if (convex_is_on(flat, convex_over(flat, m->n, x), m->tolerance))
@@ -551,9 +580,11 @@ SADMM_RARE real convex_facing_manifold(const struct convex_pair *pair, vec3 n, r
     /* axes that do not turn with a disc, as those of its rim */
     if (a.kind == CONVEX_DISC || b.kind == CONVEX_DISC) {
         struct convex_facing across;
-        const struct convex_facing *other = a.kind == CONVEX_DISC ? &b : &a;
+        const bool of_b = b.kind == CONVEX_DISC &&
+                          (a.kind != CONVEX_DISC || v3_norm2(convex_tipping(&b, pair->centre, pair->tips)) > 0);
         across.normal = n;
-        convex_rim_axes(&across, convex_spread(pair, other), &meeting.x1, &meeting.x2);
+        convex_rim_axes(&across, of_b ? convex_spread(pair, &b, &a) : convex_spread(pair, &a, &b), &meeting.x1,
+                        &meeting.x2);
     } else {
         v3_tangents(n, &meeting.x1, &meeting.x2);
     }

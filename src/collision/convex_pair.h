@@ -13,6 +13,8 @@ struct convex_pair {
     mat3 R; /* p_b = R p_a + t */
     vec3 t;
     vec3 shift;  /* of b, while it is held away from a */
+    vec3 centre[2]; /* of mass, as of pair_pose */
+    bool tips[2];
     vec3 spread; /* what points of rims are spread from (convex_facing.h); 0: a side of the other one's flat or line */
     uint32_t left_out; /* of b: bit k: corner k, 16 + k: side k: points there are not wanted (convex_facing.h) */
     real thin;   /* the thinner one's smallest extent */
@@ -22,11 +24,22 @@ struct convex_pair {
     real equal;  /* separations that differ by less are the same */
 };
 
+/* Centres of mass, in a frame whose origin is at `origin` of b's. */
+SADMM_INLINE void convex_pair_tips(const struct pair_pose *pose, vec3 origin, struct convex_pair *pair)
+{
+    int s;
+    for (s = 0; s < 2; ++s) {
+        pair->tips[s] = pose->tips[s];
+        if (pose->tips[s]) pair->centre[s] = v3_sub(r3_vec3(pose->centre[s]), origin);
+    }
+}
+
 /* What follows from the size. */
 SADMM_INLINE void convex_pair_finish(struct convex_pair *pair)
 {
     pair->shift = pair->spread = v3(0, 0, 0);
     pair->left_out = 0;
+    pair->tips[0] = pair->tips[1] = false;
     pair->slack = 8 * SADMM_EPSILON * pair->size;
     pair->equal = real_max(8 * pair->slack, (real)1e-11 * pair->size);
     pair->enough = sizeof(real) == 4 ? (real)1e-5 : (real)1e-8;
@@ -43,6 +56,7 @@ SADMM_INLINE void convex_pair_make(const struct sadmm_geometry *a, const struct 
     pair->thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
     pair->size = (real)(geometry_radius(a) + geometry_radius(b)) + v3_norm(pair->t);
     convex_pair_finish(pair);
+    convex_pair_tips(pose, v3(0, 0, 0), pair);
 }
 
 SADMM_INLINE real convex_radii(const struct convex_pair *pair) { return pair->a.p.radius + pair->b.p.radius; }

@@ -33,22 +33,13 @@ SADMM_INLINE bool inner_is_heavy(const struct sadmm_proxy *p, const struct sadmm
     return other->system_body >= 0 && p->inertia * (other_size * other_size) > 4 * other->inertia * (size * size);
 }
 
-/* The centre of mass of p's body in p's frame. */
-SADMM_INLINE vec3 inner_centre(const struct sadmm_proxy *p)
-{
-    double x[3];
-    int i;
-    for (i = 0; i < 3; ++i) x[i] = -(p->R[i] * p->arm[0] + p->R[3 + i] * p->arm[1] + p->R[6 + i] * p->arm[2]);
-    return v3_load(x);
-}
-
 /* The ball of p's body in this shape, as a shape of that body. False: there is none, or the shape is it. */
 SADMM_INLINE bool inner_ball_of(const struct sadmm_proxy *p, const double *hulls, struct sadmm_proxy *ball)
 {
     double radius;
     int i;
     if (p->system_body < 0 || is_own_ball(p)) return false;
-    radius = (double)geometry_inner_radius(&p->geometry, hulls, inner_centre(p));
+    radius = (double)geometry_inner_radius(&p->geometry, hulls, proxy_centre(p));
     if (!(radius > 0)) return false;
     *ball = *p;
     ball->geometry.type = SADMM_SHAPE_SPHERE;
@@ -109,7 +100,7 @@ SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sad
         found->on_other = v3_madd(point->position, point->separation / 2, m.normal);
         return true;
     }
-    found->centre = inner_centre(proxy_at(b, at, dt, &turned));
+    found->centre = proxy_centre(proxy_at(b, at, dt, &turned));
     if (!swapped) {
         found->normal = m.normal;
         found->on_other = v3_add(found->centre, v3_madd(point->position, -point->separation / 2, m.normal));

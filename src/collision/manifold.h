@@ -43,6 +43,8 @@ struct manifold {
 struct pair_pose {
     row3 R[3];
     row3 t;
+    row3 centre[2]; /* of mass, of the body of a and of b, in the frame of b, where `tips` says so: */
+    bool tips[2];   /* the body moves, and one of the two shapes has round rims (convex_facing.h) */
 };
 
 /* How clearly the cached axis must be beaten: this share of the depth, and of the thinner shape's extent. */

@@ -151,11 +151,14 @@ SADMM_RARE void convex_plane_manifold(const struct sadmm_geometry *b, const doub
         struct convex_facing disc;
         const vec3 x = convex_point(&c, flat, down);
         const real s = v3_dot(m->normal, x) + offset;
-        vec3 e1, e2;
+        const vec3 centre[2] = {v3(0, 0, 0), pose->tips[1] ? r3_vec3(pose->centre[1]) : v3(0, 0, 0)};
+        vec3 e1, e2, way = v3(0, 0, 0);
         disc.normal = convex_flat_normal(&c, flat);
         disc.centre = v3_scale(disc.normal, c.size.y);
         disc.radius = c.size.x;
-        convex_rim_axes(&disc, v3(r3_vec3(pose->R[0]).x, r3_vec3(pose->R[1]).x, r3_vec3(pose->R[2]).x), &e1, &e2);
+        if (pose->tips[1]) way = convex_tipping(&disc, centre, pose->tips);
+        if (!(v3_norm2(way) > 0)) way = v3(r3_vec3(pose->R[0]).x, r3_vec3(pose->R[1]).x, r3_vec3(pose->R[2]).x);
+        convex_rim_axes(&disc, way, &e1, &e2);
         for (k = 0; k < CONVEX_RIM; ++k)
             convex_plane_point(m, convex_rim(&disc, e1, e2, k), offset, limit, RIM_FEATURE + (uint32_t)k);
         if (s <= limit)

@@ -45,6 +45,7 @@ SADMM_INLINE void convex_triangle_make(const struct sadmm_geometry *a, const str
     pair->thin = place.thin;
     pair->size = place.size;
     convex_pair_finish(pair);
+    convex_pair_tips(pose, p->triangle.origin, pair);
     pair->spread = v3(1, 0, 0);
     for (k = 0; k < 3; ++k) /* before points are chosen: others are to be in their place */
         pair->left_out |= (uint32_t)mesh_marked(p->triangle.marks, MESH_CORNER_FLAT, k) << k |

@@ -38,6 +38,10 @@ SADMM_INLINE struct pair_pose pose_at(bool a_is_plane, const double Ra[9], const
     double foot[3];
     struct pair_pose pose;
     int i;
+    for (i = 0; i < 2; ++i) {
+        pose.centre[i] = r3_fill(0);
+        pose.tips[i] = false;
+    }
     for (i = 0; i < 3; ++i) foot[i] = a_is_plane ? height * Ra[3 * i + 2] : d[i];
     for (i = 0; i < 3; ++i)
         pose.R[i] = r3_round(
@@ -55,13 +59,31 @@ SADMM_INLINE struct pair_pose pair_pose(bool a_is_plane, const double Ra[9], con
     return pose_at(a_is_plane, Ra, d, Rb);
 }
 
+/* Where the centres of mass are that may tip over a rim. */
+SADMM_INLINE void pose_add_centres(const struct sadmm_proxy *a, const struct sadmm_proxy *b, struct pair_pose *pose)
+{
+    mat3 R;
+    int k;
+    if (!geometry_is_smooth(&a->geometry) && !geometry_is_smooth(&b->geometry)) return;
+    for (k = 0; k < 3; ++k) R.r[k] = r3_vec3(pose->R[k]);
+    pose->centre[0] = r3_of(v3_add(m3_mul(R, proxy_centre(a)), r3_vec3(pose->t)));
+    pose->centre[1] = r3_of(proxy_centre(b));
+    pose->tips[0] = a->system_body >= 0;
+    pose->tips[1] = b->system_body >= 0;
+}
+
 /* Of two shapes as they are placed, moved on by `ahead` seconds (midway.h). */
 SADMM_INLINE struct pair_pose turned_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead)
 {
+    struct pair_pose pose;
     double d[3];
     int i;
     for (i = 0; i < 3; ++i) d[i] = a->x[i] - b->x[i] - way_ahead(a, b, ahead, i);
-    return pose_at(a->geometry.type == SADMM_SHAPE_PLANE, a->R, d, b->R);
+    pose = pose_at(a->geometry.type == SADMM_SHAPE_PLANE, a->R, d, b->R);
+#ifndef SADMM_WITHOUT_SMOOTH
+    pose_add_centres(a, b, &pose);
+#endif
+    return pose;
 }
 
 /* Of two shapes `ahead` seconds into the step. */

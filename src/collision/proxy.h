@@ -25,6 +25,15 @@ struct sadmm_proxy {
     int32_t mean, reserved[3]; /* of the body; whole pieces of 16 bytes */
 };
 
+/* The centre of mass of p's body in p's frame. */
+SADMM_INLINE vec3 proxy_centre(const struct sadmm_proxy *p)
+{
+    double x[3];
+    int i;
+    for (i = 0; i < 3; ++i) x[i] = -(p->R[i] * p->arm[0] + p->R[3 + i] * p->arm[1] + p->R[6 + i] * p->arm[2]);
+    return v3_load(x);
+}
+
 /* How a shape is turned ahead. */
 struct proxy_turn {
     double rate, ahead; /* rad/s, s */
