@@ -6,6 +6,7 @@
 #include <check.h>
 #include <stdio.h>
 
+#include "fewer.h"
 #include "pair_of.h"
 
 static inline struct manifold touch_two(const struct pair_of *t, double limit, uint32_t cache)
@@ -138,12 +139,6 @@ static inline void turn_by(double R[9], const double axis[3], double angle)
 static inline void column_of(const double R[9], int j, double out[3])
 {
     for (int k = 0; k < 3; ++k) out[k] = R[3 * k + j];
-}
-
-/* Under sanitizers. */
-static inline int fewer(int count)
-{
-    return getenv("SADMM_TEST_SHORT") ? (count + 3) / 4 : count;
 }
 
 /* How many poses are tried, of hulls of at most so many corners, of sizes 10^-exponent to 10^exponent m. */

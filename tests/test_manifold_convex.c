@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 #include "convex_touches.h"
+#include "fewer.h"
 #include "run_suite.h"
 
 enum { ANYHOW, ALIGNED, FAR_OUT_OF_SCALE, WAYS };
@@ -40,12 +41,6 @@ static void random_pair(struct random *r, struct pair_of *t, int a, int b, int w
 
 /* Of a loop's number: a type for b, and how it is posed. */
 static int type_of(int i) { return SADMM_SHAPE_CYLINDER + i % 3; }
-
-/* Under sanitizers. */
-static int fewer(int count)
-{
-    return getenv("SADMM_TEST_SHORT") ? (count + 3) / 4 : count;
-}
 
 /* What a separation may be short of the best one by, as a share of the size: of directions that differ by a tenth of
  * this any may come first (`equal` of convex_pair.h), and rounding is far below. */

@@ -3,6 +3,7 @@
 #include <check.h>
 
 #include "collision/mesh_walk.h"
+#include "fewer.h"
 #include "hull_pool.h"
 #include "manifold_tools.h"
 #include "mesh_touches.h"
@@ -174,7 +175,7 @@ START_TEST(the_nearest_point_is_found)
     take_mesh(&b, mesh);
     take_shape(&b, _i % SHAPES, scale);
     const double thin = geometry_thickness(&b.shape);
-    for (int i = 0; i < 400 && within < 30; ++i) {
+    for (int i = 0; i < 400 && within < fewer(30); ++i) {
         place_over(&b, &r, random_in(&r, 0, 1.3 * limit));
         bool at_end = false;
         const double d = distance_of(&b, &at_end);
@@ -218,7 +219,7 @@ START_TEST(a_convex_mesh_is_its_hull)
     take_shape(&b, _i % SHAPES, 1);
     const double thin = geometry_thickness(&b.shape);
     const double back[3] = {-mesh->middle[0], -mesh->middle[1], -mesh->middle[2]};
-    for (int i = 0; i < 100; ++i) {
+    for (int i = 0; i < fewer(100); ++i) {
         static const double gaps[] = {-1e-3, -1e-5, -1e-8, 1e-8, 1e-5, 1e-3, 0.015};
         struct manifold m;
         int points;
@@ -260,7 +261,7 @@ START_TEST(nothing_jumps_along_a_path)
     take_shape(&b, _i % SHAPES, 1);
     uint32_t *memory = calloc((size_t)b.mesh.triangles, sizeof *memory);
     const double limit = 0.03, thin = geometry_thickness(&b.shape), reach = geometry_radius(&b.shape);
-    for (int path = 0; path < 3; ++path) {
+    for (int path = 0; path < fewer(3); ++path) {
         double last = HUGE_VAL, way[3], axis[3], angle = 2e-3;
         place_over(&b, &r, 0.2 * limit);
         bool at_end = false;

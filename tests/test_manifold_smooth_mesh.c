@@ -4,6 +4,7 @@
 #include <check.h>
 
 #include "convex_tools.h"
+#include "fewer.h"
 #include "mesh_touches.h"
 #include "run_suite.h"
 
@@ -157,7 +158,7 @@ START_TEST(the_nearest_point_is_found)
     int points, within = 0, exact = 0;
     take_shape(b, _i % SHAPES, _i % 2 ? 1 : 2);
     const double thin = geometry_thickness(&b->t.g[0]);
-    for (int i = 0; i < 300 && within < 25; ++i) {
+    for (int i = 0; i < 300 && within < fewer(25); ++i) {
         place_over(b, &r, random_in(&r, 0, 1.3 * limit));
         bool at_end = false;
         const double d = distance_of(b, &at_end);
@@ -247,7 +248,7 @@ START_TEST(a_convex_mesh_is_its_hull)
     memcpy(u.R[0], b->t.R[1], sizeof u.R[0]);
     for (int k = 0; k < 3; ++k) u.x[0][k] = -mesh->middle[k];
     const double thin = geometry_thickness(&b->t.g[0]);
-    for (int i = 0; i < 100; ++i) {
+    for (int i = 0; i < fewer(100); ++i) {
         static const double gaps[] = {-1e-3, -1e-5, -1e-8, 1e-8, 1e-5, 1e-3, 0.015};
         struct manifold m;
         int points;
@@ -302,7 +303,7 @@ START_TEST(flat_ground_is_a_plane)
     const struct sadmm_geometry plane = {.type = SADMM_SHAPE_PLANE, .children = 1};
     enum { MOST = 128 };
     ck_assert_int_le(b->mesh.triangles, MOST);
-    for (int i = 0; i < 600; ++i) {
+    for (int i = 0; i < fewer(600); ++i) {
         double stand[9], turn[9], tilt[9], down[3] = {0, 0, -1};
         struct manifold m[MOST], on_plane;
         take_shape(b, _i % SHAPES, 1);
