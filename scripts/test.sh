@@ -22,7 +22,7 @@ Installs what is missing (Debian and Ubuntu, as root or by sudo without a passwo
     minimal  by clang, no optional feature, no instruction set beyond the compiler's default, the whole suite without the
              emulated CUDA device
     cuda     when nvcc is found: the CUDA backend compiles; its tests run where there is a GPU, and are counted as skipped
-             where there is none. There the code is for one architecture and not optimised, since nothing runs it
+             where there is none. There it is compiled to PTX, and no further, since nothing runs it
 with --slow:
     fuzz     by clang: libFuzzer on each of tests/fuzz, a fixed number of inputs, the same ones every time
 and, when asked for by --only, on a machine with a GPU:
@@ -176,9 +176,9 @@ step_cuda() {
         return
     fi
     # It compiles and links, and its tests say what is missing; what all steps before this one test is left out.
-    local archs=90 rebuild=()
+    local archs=ptx90 rebuild=()
     $slow && archs=80,90
-    echo "no GPU here: compiled for sm_${archs/,/ and sm_}, and the tests of suite 'gpu' are skipped"
+    echo "no GPU here: compiled for $archs, and the tests of suite 'gpu' are skipped"
     configure "$project/build-cuda-compile" -Dwerror=true -Dcuda=enabled -Dgpu_archs="$archs" -Dcpu_isas=baseline \
         -Demulated_cuda=disabled -Dfcl=disabled -Dhdf5=disabled -Dsiconos=disabled -Dcli=disabled -Dbench=disabled \
         -Dtests=enabled || return 1
