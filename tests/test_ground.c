@@ -234,7 +234,7 @@ START_TEST(the_deepest_point_has_a_contact)
     const double shares[] = {0.001, 0.01, 0.05, 0.1, 0.2, 0.4, 0.7};
     const sadmm_shape_def shape = shape_of(form, 0.5);
     uint64_t seed = 5 + (uint64_t)_i;
-    for (int pose = 0; pose < fewer(3); ++pose) {
+    for (int pose = 0; pose < fewer(5); ++pose) {
         double orientation[4], position[3] = {0.3 * soup_number(&seed), 0.3 * soup_number(&seed), 0};
         q_store(q_normalize((quat){soup_number(&seed), soup_number(&seed), soup_number(&seed), soup_number(&seed)}),
                 orientation);

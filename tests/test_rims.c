@@ -19,7 +19,7 @@ static sadmm_world *open_world(sadmm_precision precision)
     sadmm_world_def def = sadmm_world_def_default();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = precision;
-    def.settings.iterations = 40; /* what is left of more is less than the margin */
+    def.settings.iterations = 40; /* the impulses' error is below the margin */
     def.settings.threads = 1;
     return create_world(&def);
 }

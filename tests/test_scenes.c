@@ -263,7 +263,8 @@ START_TEST(runs_repeat_bit_for_bit)
 {
     const sadmm_method method = (sadmm_method)(_i % SADMM_METHOD_COUNT);
     const char *spec = repeatable[_i / SADMM_METHOD_COUNT].spec;
-    const int steps = repeatable[_i / SADMM_METHOD_COUNT].steps, threads = 2 + _i % 2;
+    const int steps = repeatable[_i / SADMM_METHOD_COUNT].steps,
+              threads = 2 + (_i / SADMM_METHOD_COUNT + _i) % 2; /* each method with two and with three */
     const struct sadmm_scene scene = open_scene(spec);
     uint64_t before, unused;
     if (lacks_hulls(&scene)) return;

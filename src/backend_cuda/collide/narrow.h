@@ -189,7 +189,7 @@ static __device__ void hulls_from(const collision_view &v, const struct collisio
         inner_balls_add(a, b, v.hulls, 0, cache != 0, step.gravity, step.dt, m);
 }
 
-/* The same of pairs without hulls, meshes and smooth bodies. */
+/* As hulls_at_once, of a pair without hulls, meshes and smooth bodies. */
 static __device__ __forceinline__ bool plain_at_once(const struct collision_step &step, const struct sadmm_proxy *a,
                                                      const struct sadmm_proxy *b, const struct pair_start &start,
                                                      uint32_t cache, struct manifold *m)
@@ -201,7 +201,7 @@ static __device__ __forceinline__ bool plain_at_once(const struct collision_step
     return !pair_asks_balls(a, b, nullptr, 0, &start, step.gravity, step.dt, m);
 }
 
-/* The same of a pair with a smooth body: on planes, by formula. */
+/* As hulls_at_once, of a pair with a smooth body: on planes, by formula. */
 #ifdef SADMM_WITHOUT_SMOOTH
 static __device__ bool smooth_at_once(const collision_view &, const struct collision_step &, const struct sadmm_proxy *,
                                       const struct sadmm_proxy *, const struct pair_start &, struct manifold *)
