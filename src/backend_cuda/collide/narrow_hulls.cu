@@ -8,6 +8,5 @@ void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels)
     k->at_once = {at_once_kernel<NARROW_ONE, NARROW_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of hulls"};
     k->at_once_first = {at_once_kernel<NARROW_FIRST, NARROW_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of hulls"};
     k->at_once_again = {at_once_kernel<NARROW_AGAIN, NARROW_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of hulls"};
-    k->listed = k->listed_first = k->listed_again = {listed_kernel<NARROW_ANY, NARROW_LISTED>, NARROW_THREADS, 0,
-                                                     "narrow phase of listed pairs"};
+    k->listed = {listed_kernel<NARROW_ANY, NARROW_LISTED>, NARROW_THREADS, 0, "narrow phase of listed pairs"};
 }

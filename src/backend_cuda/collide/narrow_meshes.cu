@@ -10,6 +10,5 @@ void COLLISION(narrow_meshes_kernels)(struct collision_kernels *kernels)
                         "narrow phase of meshes"};
     k->at_once_again = {at_once_kernel<NARROW_AGAIN, NARROW_MESHES_AT_ONCE>, NARROW_THREADS, 0,
                         "narrow phase of meshes"};
-    k->listed = k->listed_first = k->listed_again = {listed_kernel<NARROW_ANY, NARROW_MESHES_LISTED>, NARROW_THREADS, 0,
-                                                     "narrow phase of listed pairs"};
+    k->listed = {listed_kernel<NARROW_ANY, NARROW_MESHES_LISTED>, NARROW_THREADS, 0, "narrow phase of listed pairs"};
 }

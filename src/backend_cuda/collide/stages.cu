@@ -188,7 +188,7 @@ static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_er
     if (v->mesh_count > 0)
         TRY(launch(c, one ? with->touch : first ? with->touch_first : with->touch_again, v->candidate_capacity, error));
     TRY(launch(c, one ? with->at_once : first ? with->at_once_first : with->at_once_again, candidates, error));
-    return launch(c, one ? with->listed : first ? with->listed_first : with->listed_again, v->candidate_capacity, error);
+    return launch(c, with->listed, v->candidate_capacity, error);
 }
 
 static sadmm_status emit_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)

@@ -293,7 +293,7 @@ struct collision_launch {
 
 /* The narrow phase where some pairs are much more work than others (narrow_listed.h). */
 struct narrow_kernels {
-    struct collision_launch at_once, at_once_first, at_once_again, listed, listed_first, listed_again;
+    struct collision_launch at_once, at_once_first, at_once_again, listed;
     struct collision_launch touch, touch_first, touch_again; /* with meshes (touch.h) */
 };
 
