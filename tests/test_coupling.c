@@ -242,22 +242,15 @@ START_TEST(the_user_holds_the_weight)
 }
 END_TEST
 
-/* Angular velocity in the body's frame. */
-static vec3 spin_of(const sadmm_body_state *state)
+static vec3 momentum_of(const sadmm_body_state *state, vec3 inertia)
 {
-    return m3_tmul(q_matrix(q_load(state->orientation)), v3_load(state->angular_velocity));
+    return rigid_angular_momentum(q_load(state->orientation), inertia, v3_load(state->angular_velocity));
 }
 
-/* Of all that turned the body in a step: I alpha, and in the frame of a body whose moments differ, as it is halfway
- * through the step, I alpha with the gyroscopic torque. */
+/* Of all that turned the body in a step: what its angular momentum in space has changed by. */
 static vec3 torque_of(const sadmm_body_state *before, const sadmm_body_state *after, vec3 inertia, double dt)
 {
-    const quat middle = rigid_turn(q_load(before->orientation), v3_load(before->angular_velocity), dt / 2);
-    vec3 change = v3_sub(v3_load(after->angular_velocity), v3_load(before->angular_velocity));
-    if (rigid_is_isotropic(inertia)) return v3_scale(change, inertia.x / dt);
-    change = v3_sub(spin_of(after), rigid_gyroscopic(inertia, spin_of(before), dt));
-    return m3_mul(q_matrix(middle),
-                  v3(inertia.x * change.x / dt, inertia.y * change.y / dt, inertia.z * change.z / dt));
+    return v3_scale(v3_sub(momentum_of(after, inertia), momentum_of(before, inertia)), 1 / dt);
 }
 
 /* From one step to the next, the body's wrench is m a, and the torque above, less weight and contacts; and what is felt

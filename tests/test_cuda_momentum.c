@@ -1,5 +1,6 @@
 /* Momentum that no contact may change on the device: in every tier, the same bits, as on the host. */
 #include "cuda_worlds.h"
+#include "fewer.h"
 #include "momentum_worlds.h"
 
 static const enum sadmm_cuda_tier tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_CLUSTER, SADMM_CUDA_TIER_GRID,
@@ -77,6 +78,32 @@ START_TEST(bodies_on_ice)
 }
 END_TEST
 
+/* Mechanisms that balls run into, in the plane and in space: in the queue and step by step by the host, to the same
+ * bits. */
+START_TEST(mechanisms)
+{
+    const int precision = _i / RUNS, run = _i % RUNS;
+    for (int k = 0; k < 2 * MECHANISM_PLACES; ++k) {
+        const enum mechanism_place place = (enum mechanism_place)(k / 2);
+        const bool space = k % 2;
+        uint64_t hash[2];
+        for (int host = 0; host < 2; ++host) {
+            sadmm_world *world = begin_world(precision, run, mechanism_has_weight(place));
+            use_device(world, precision, 0);
+            if (host) by_host(world);
+            add_mechanism(world, place, space, 0.5);
+            for (int step = 0; step < fewer(16); ++step)
+                expect_whole_momentum_kept(world, mechanism_keeps(place, space), place == MECHANISM_HANGS,
+                                           momentum_tolerance((sadmm_precision)precision),
+                                           host ? "by the host" : "on the device");
+            hash[host] = state_hash(world);
+            sadmm_world_destroy(world);
+        }
+        ck_assert_msg(hash[0] == hash[1], "place %d, space %d", (int)place, space);
+    }
+}
+END_TEST
+
 /* Stacks that are held, balls that roll, clusters in the air and one on the ground, side by side. */
 static void add_mixture(sadmm_world *world)
 {
@@ -128,6 +155,7 @@ int main(void)
     Suite *suite = suite_create("cuda_momentum");
     ADD_CASE(suite, clusters_in_flight, 0, RUNS * parts);
     ADD_CASE(suite, bodies_on_ice, 0, RUNS * parts);
+    ADD_CASE(suite, mechanisms, 0, RUNS * parts);
     ADD_CASE(suite, mixtures_agree, 0, RUNS * parts);
     return run_cuda_suite(suite);
 }

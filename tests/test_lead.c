@@ -34,21 +34,12 @@ START_TEST(kinds)
 END_TEST
 enum { KINDS = 14 };
 
-/* Bodies without an isotropic inertia are led along their axis of rotation alone: what they turn by leaves that axis
- * where it is in their own frame. */
-START_TEST(axes)
+START_TEST(half_of_the_change)
 {
-    const double before[6] = {1, 2, 3, 0.5, -1, 2}, v[6] = {2, 2, 1, 1, 2, -1}, still[6] = {0};
-    double lead[6], cross[3] = {0};
-    lead_own(before, v, 1, lead);
+    const double before[6] = {1, 2, 3, 0.5, -1, 2}, v[6] = {2, 2, 1, 1, 2, -1};
+    double lead[6];
+    lead_own(before, v, lead);
     for (int k = 0; k < 6; ++k) ck_assert(lead[k] == (v[k] - before[k]) / 2);
-    lead_own(before, v, 0, lead);
-    for (int k = 0; k < 3; ++k) ck_assert(lead[k] == (v[k] - before[k]) / 2);
-    add_cross(lead + 3, v + 3, 1, cross);
-    ck_assert_double_lt(length3(cross), 1e-15); /* of numbers of about 1 */
-    ck_assert_double_eq_tol(dot3(lead + 3, v + 3), (0.5 * 1 + 3 * 2 + -3 * -1) / 2, 1e-15);
-    lead_own(before, still, 0, lead); /* no axis */
-    for (int k = 3; k < 6; ++k) ck_assert(lead[k] == 0);
 }
 END_TEST
 
@@ -105,7 +96,7 @@ int main(void)
     Suite *suite = suite_create("lead");
     TCase *cases = tcase_create("lead");
     tcase_add_loop_test(cases, kinds, 0, KINDS);
-    tcase_add_test(cases, axes);
+    tcase_add_test(cases, half_of_the_change);
     tcase_add_loop_test(cases, points, 0, POINTS);
     suite_add_tcase(suite, cases);
     return run_suite(suite);

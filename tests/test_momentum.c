@@ -239,6 +239,31 @@ START_TEST(bodies_on_ice)
 }
 END_TEST
 
+/* Mechanisms that balls run into: whatever the iterations, in flight all of it, in space, too; on ice along the floor and
+ * turning on it; on a joint with the world what turns about that. */
+START_TEST(mechanisms)
+{
+    const int engine = _i % ENGINES, budget = _i / ENGINES % BUDGETS, space = _i / ENGINES / BUDGETS;
+    for (int k = 0; k < 4 * MECHANISM_PLACES; ++k) {
+        const enum mechanism_place place = (enum mechanism_place)(k / 4);
+        const int method = k % 2, rough = k / 2 % 2, steps = place >= MECHANISM_ON_ICE ? 120 : 30;
+        sadmm_world *world = empty_world(engines[engine].backend, engines[engine].precision, (sadmm_method)method,
+                                         budgets[budget], mechanism_has_weight(place));
+        char what[80];
+        int touched = 0;
+        snprintf(what, sizeof what, "place %d, space %d, method %d, friction %d", place, space, method, rough);
+        add_mechanism(world, place, space, rough ? 0.5 : 0);
+        for (int step = 0; step < steps; ++step) {
+            expect_whole_momentum_kept(world, mechanism_keeps(place, space), place == MECHANISM_HANGS,
+                                       momentum_tolerance(engines[engine].precision), what);
+            touched += world_report(world).contacts > 0;
+        }
+        ck_assert_int_gt(touched, 0);
+        sadmm_world_destroy(world);
+    }
+}
+END_TEST
+
 /* Balls in one place in the air: however few the iterations, they fall as one, and come apart. */
 START_TEST(overlapping_balls_fall_and_come_apart)
 {
@@ -380,6 +405,7 @@ int main(void)
     tcase_set_timeout(worlds, 120);
     tcase_add_loop_test(worlds, clusters_in_flight, 0, ENGINES * BUDGETS);
     tcase_add_loop_test(worlds, a_large_cluster, 0, BUDGETS);
+    tcase_add_loop_test(worlds, mechanisms, 0, 2 * ENGINES * BUDGETS);
     tcase_add_loop_test(worlds, bodies_on_ice, 0, ENGINES * BUDGETS);
     tcase_add_loop_test(worlds, overlapping_balls_fall_and_come_apart, 0, BUDGETS);
     tcase_add_loop_test(worlds, clusters_gain_no_energy, 0, BUDGETS);

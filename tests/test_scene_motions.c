@@ -193,7 +193,7 @@ static double energy_of(sadmm_world *world)
 }
 
 /* Closed to 1e-8 m over two swings; to the mirrored position and back (P3 is the hinge opposite to the first one), with
- * its energy, of which it loses 1.5e-4 W at a step of 0.5 ms: gyroscopic terms are of first order. */
+ * its energy. */
 START_TEST(bricards_linkage_moves_and_stays_closed)
 {
     double x[3] = {0}, off = 0, least = 1;

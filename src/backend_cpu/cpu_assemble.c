@@ -81,7 +81,7 @@ static void assemble_body_share(void *context, int thread, int threads)
     for (size_t first = begin; first < end; first += LANES) {
         const size_t count = end - first < (size_t)LANES ? end - first : (size_t)LANES;
         double b[6 * LANES], *A = &c->A[first * PACKED6];
-        sadmm_body_terms(c->system, &c->settings, first, count, A, b);
+        sadmm_body_terms(c->system, &c->settings, first, count, A, b, c->leads);
         for (size_t l = 0; l < count; ++l) assemble_body(c, first + l, A + PACKED6 * l, b + 6 * l);
     }
 }

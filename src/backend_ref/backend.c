@@ -111,9 +111,10 @@ static void touch(struct sadmm_context *c)
     const struct sadmm_contact_set *contacts = c->system->contacts;
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
+        double before[6];
         body->touch = body->island_touch = 0;
-        lead_own(c->system->rigid[i].velocity, body->v, rigid_is_isotropic(v3_load(c->system->rigid[i].inertia)),
-                 body->lead);
+        spin_before(&c->system->rigid[i], c->settings->dt, before);
+        lead_own(before, body->v, body->lead);
     }
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
@@ -138,17 +139,15 @@ static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next,
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         const struct ref_body *from = &c->bodies[i];
         const enum lead_kind kind = lead_kind_of(c->bodies[from->label].island_touch, from->touch);
-        struct sadmm_rigid body = c->system->rigid[i];
+        const struct sadmm_rigid *start = &c->system->rigid[i];
         double lead[6] = {0}, mean[6];
         if (kind == LEAD_SHARED) lead_shared(c->settings->gravity, dt, lead);
         if (kind == LEAD_OWN) memcpy(lead, from->lead, sizeof lead);
         for (int k = 0; k < 6; ++k) mean[k] = from->v[k] - lead[k];
-        v3_store(rigid_move(v3_load(body.position), v3_load(mean), dt), body.position);
-        q_store(rigid_turn(q_load(body.orientation), v3_load(mean + 3), dt), body.orientation);
-        memcpy(body.velocity, from->v, sizeof body.velocity);
-        rolling_forget(&body);
-        body.mean = kind == LEAD_OWN;
-        next[i] = body;
+        next[i] = *start;
+        spin_move(start, from->v, mean, kind != LEAD_OWN, dt, next[i].position, next[i].orientation, next[i].velocity);
+        rolling_forget(&next[i]);
+        next[i].mean = kind == LEAD_OWN;
     }
     return SADMM_OK;
 }

@@ -78,6 +78,7 @@ static const char *const buffer_names[] = {
     "what couplings keep",
     "rows of joints",
     "islands of joints",
+    "momentum of joints",
     "joined bodies",
     "contacts of joined bodies",
     "staged counts",

@@ -245,6 +245,7 @@ struct cuda_joined_body {
 struct cuda_joined_part {
     int64_t first_number, first_work;
     int32_t numbers, label; /* label: as in joint_view.is_direct */
+    int32_t first_body, body_count; /* in joint_view.members */
 };
 
 /* A side of a pair: code 2 pair + side, the number of its body in its part, points of the pair; and those of a part. */
@@ -283,10 +284,12 @@ struct joint_view {
     int32_t *kept;                  /* parts: solved before the iterations; */
     uint8_t *kept_state;            /* rows: their state then */
     const int32_t *entry;           /* bodies: number in their part */
+    const int32_t *members;         /* bodies of parts, ascending */
     int32_t *pair_parts;            /* sides of pairs: as is_direct of the body. By it small parts find their contacts: */
     struct cuda_joined_range *ranges; /* parts, into */
     struct cuda_joined_side *sides;   /* part by part, ascending in a part; parts as they come */
     int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_lead.h) */
+    struct joint_momentum *momentum; /* bodies; at labels then of islands, and what restores it (joint_momentum.h) */
 };
 
 /* Driven bodies of a world (step/driven.cu), and what islands ride on them. What the solve sees of both is in

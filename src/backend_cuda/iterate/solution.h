@@ -4,6 +4,7 @@
 
 #include "backend_cuda/device/double.h"
 #include "core/math/lead.h"
+#include "core/model/spin.h"
 
 /* Multiplier of a point as a world vector on b. */
 static __device__ __forceinline__ vec3 point_impulse(const contact_view &contacts, int32_t p, int32_t k)
@@ -12,18 +13,35 @@ static __device__ __forceinline__ vec3 point_impulse(const contact_view &contact
     return v3((double)lambda[0], (double)lambda[contacts.lambda_stride], (double)lambda[2 * contacts.lambda_stride]);
 }
 
-/* Q: where a body that ends with `velocity` gets to by that less its lead (math/lead.h): position, orientation. dt: the
- * settings', fetched early. */
-enum { PLACE = 7 };
+/* Q: where a body for which `velocity` is solved gets to by that less its lead (math/lead.h): position, orientation, and
+ * velocity at the end. dt: the settings', fetched early. */
+enum { PLACE = 13 };
 static __device__ __forceinline__ void move_body(const struct sadmm_rigid *body, const double velocity[6], double dt,
                                                  const double gravity[3], enum lead_kind kind, double place[PLACE])
 {
     double lead[6] = {}, mean[6];
     if (kind == LEAD_SHARED) lead_shared(gravity, dt, lead);
-    if (kind == LEAD_OWN) lead_own(body->velocity, velocity, rigid_is_isotropic(v3_load(body->inertia)), lead);
+    if (kind == LEAD_OWN) lead_own(body->velocity, velocity, lead); /* turned by it only where moments are equal */
     for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - lead[k];
-    v3_store(rigid_move(v3_load(body->position), v3_load(mean), dt), place);
-    q_store(rigid_turn(q_load(body->orientation), v3_load(mean + 3), dt), place + 3);
+    spin_move(body, velocity, mean, kind != LEAD_OWN, dt, place, place + 3, place + 7);
+}
+
+/* Both places of a body that rests or moves by itself: one tumble is enough. */
+static __device__ __forceinline__ void move_body_both(const struct sadmm_rigid *body, const double velocity[6],
+                                                      double dt, const double gravity[3], double stays[PLACE],
+                                                      double own[PLACE])
+{
+    move_body(body, velocity, dt, gravity, LEAD_OWN, own);
+    if (rigid_is_isotropic(v3_load(body->inertia))) {
+        move_body(body, velocity, dt, gravity, LEAD_STAYS, stays);
+        return;
+    }
+    const struct rigid_spin end = {q_load(own + 3), v3_load(own + 10)},
+                            whole = spin_end_whole(body, velocity + 3, end, dt);
+    v3_store(rigid_move(v3_load(body->position), v3_load(velocity), dt), stays);
+    q_store(whole.orientation, stays + 3);
+    for (int k = 0; k < 3; ++k) stays[7 + k] = velocity[k];
+    v3_store(whole.angular, stays + 10);
 }
 
 static __device__ __forceinline__ void store_wrench(const double wrench[6], int32_t lane, double *out)

@@ -105,9 +105,8 @@ static __device__ __forceinline__ finish_move begin_move(const cuda_view &v, dou
     let_next_begin();
     if (!m.live) return m;
     load_end_velocity(v, m.body, m.velocity);
-    move_body(&m.before.body, m.velocity, dt, v.model.settings->gravity, LEAD_STAYS, m.stays);
-    move_body(&m.before.body, m.velocity, dt, v.model.settings->gravity, LEAD_OWN, m.own);
-    m.finite = finite_numbers(m.stays, PLACE) && finite_numbers(m.own, PLACE) && finite_numbers(m.velocity, 6);
+    move_body_both(&m.before.body, m.velocity, dt, v.model.settings->gravity, m.stays, m.own);
+    m.finite = finite_numbers(m.stays, PLACE) && finite_numbers(m.own, PLACE);
     return m;
 }
 
@@ -121,7 +120,7 @@ static __device__ __forceinline__ void end_move(const cuda_view &v, double dt, c
     if (!m.live) return;
 #pragma unroll
     for (int k = 0; k < PLACE; ++k) place[k] = keeps ? m.stays[k] : m.own[k];
-    store_moved(v, m.body, m.before, m.velocity, place, !keeps, dt);
+    store_moved(v, m.body, m.before, place, !keeps, dt);
     if (!m.finite) atomicMin(&v.step.control->offending_body, m.body);
 }
 
@@ -138,9 +137,8 @@ static __device__ __noinline__ void finish_free(const cuda_view &v, double dt, i
     if (!live) return;
     load_end_velocity(v, body, velocity);
     move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
-    if (!moves_apart(v, body)) store_moved(v, body, before, velocity, place, true, dt);
-    const bool finite = finite_numbers(place, PLACE) && finite_numbers(velocity, 6);
-    if (!finite) atomicMin(&v.step.control->offending_body, body);
+    if (!moves_apart(v, body)) store_moved(v, body, before, place, true, dt);
+    if (!finite_numbers(place, PLACE)) atomicMin(&v.step.control->offending_body, body);
     double owed[6] = {};
     for (int32_t k = 0; v.model.wrenches && k < 6; ++k) add_owed(v, body, k, owed);
     for (int32_t k = 0; v.model.wrenches && k < 6; ++k)

@@ -92,7 +92,8 @@ static __global__ void __launch_bounds__(GEAR_THREADS)
     const int32_t named = row->body_b;
     v.joints.solution[slot] = lambda;
     v.joints.gear_after[g] = lambda / v.model.settings->dt;
-    atomicOr(&v.joints.touch[joined_label(v, named)], ISLAND_JOINED);
+    atomicOr(&v.joints.touch[joined_label(v, named)],
+             ISLAND_JOINED | (row->body_a < 0 || row->body_b < 0 ? ISLAND_MOORED : 0));
     if (!(lambda - lambda == 0)) atomicMin(&v.step.control->offending_body, 2 * v.model.bodies + named);
 }
 

@@ -16,7 +16,7 @@
 struct joined_memory {
     struct cuda_joined_part *parts;
     struct cuda_joined_range *ranges;
-    int32_t *is_direct, *entry, *kept, *structures;
+    int32_t *is_direct, *entry, *members, *kept, *structures;
     uint8_t *kept_state; /* rows */
     size_t given;        /* bytes until here */
     struct cuda_joined_body *bodies;
@@ -32,7 +32,8 @@ static struct joined_memory memory_at(char *at, const struct cuda_step *s)
     m.ranges = (struct cuda_joined_range *)(m.parts + s->joined_parts);
     m.is_direct = (int32_t *)(m.ranges + s->joined_parts);
     m.entry = m.is_direct + s->bodies + s->joint_constraints;
-    m.kept = m.entry + s->bodies;
+    m.members = m.entry + s->bodies;
+    m.kept = m.members + s->bodies;
     m.structures = m.kept + s->joined_parts;
     m.kept_state = (uint8_t *)(m.structures + s->joined_numbers);
     m.given = ((size_t)((char *)(m.kept_state + rows) - at) + sizeof(double) - 1) / sizeof(double) * sizeof(double);
@@ -81,13 +82,18 @@ static void measure(struct sadmm_context *c, const struct sadmm_joined_order *or
 static void fill(const struct cuda_step *s, const struct sadmm_joined_order *order, const struct joined_memory *m)
 {
     size_t work = 0;
+    int32_t members = 0;
     memcpy(m->structures, order->numbers, s->joined_numbers * sizeof *order->numbers);
     for (int32_t k = 0; k < order->parts; ++k) {
         const struct joined_structure part = sadmm_joined_part(order, k);
         const int32_t label = 1 + *std::min_element(part.body, part.body + part.bodies);
         const struct cuda_joined_part at = {(int64_t)order->first[k], (int64_t)work,
-                                            (int32_t)(order->first[k + 1] - order->first[k]), label};
+                                            (int32_t)(order->first[k + 1] - order->first[k]), label, members,
+                                            part.bodies};
         m->parts[k] = at;
+        memcpy(m->members + members, part.body, (size_t)part.bodies * sizeof *part.body);
+        std::sort(m->members + members, m->members + members + part.bodies);
+        members += part.bodies;
         work += joined_work_size(&part);
         for (int32_t e = 0; e < part.bodies; ++e) {
             m->is_direct[part.body[e]] = label;
@@ -148,6 +154,7 @@ void CUDA(view_joined)(struct sadmm_context *c)
     joints->kept_state = m.kept_state;
     joints->ranges = m.ranges;
     joints->entry = m.entry;
+    joints->members = m.members;
     joints->sides = buffer<struct cuda_joined_side>(c, BUFFER_JOINED_SIDES);
     joints->pair_parts = (int32_t *)(joints->sides + 2 * (size_t)c->view.contacts.pair_capacity);
 }

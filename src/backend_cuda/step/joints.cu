@@ -187,7 +187,7 @@ static __device__ __forceinline__ struct joint_lead lead_of(const cuda_view &v, 
     if (body >= 0 && v.joints.is_direct[body])
         for (size_t k = 0; k < 6; ++k) velocity[k] = v.joints.velocity[6 * (size_t)body + k];
     else if (body >= 0) load_end_velocity(v, body, velocity);
-    return joint_lead_of(body >= 0 ? &v.step.before[body] : nullptr, velocity);
+    return joint_lead_of(body >= 0 ? &v.step.before[body] : nullptr, velocity, v.model.settings->dt);
 }
 
 static __device__ __forceinline__ int32_t *island_of(const cuda_view &v, int32_t a, int32_t b)
@@ -244,8 +244,7 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
             if (!direct) v.joints.solution[slots + (size_t)r] = lambda[r];
             joint_keep_row(&memory, middle->axis, source[r].role, source[r].coordinate,
                            source[r].sign * lambda[r] / settings.dt);
-            if (joint_limit_jolts(&source[r], lambda[r], row->jacobian[0], row->jacobian[1], bodies, &settings))
-                bits |= ISLAND_LEADS_STAY;
+            bits |= joint_row_touches(&source[r], lambda[r], row->jacobian[0], row->jacobian[1], bodies, &settings);
         }
     }
     joint_end_wrench(&memory, &joint->def, middle->frame);
@@ -279,8 +278,9 @@ static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t 
         for (int s = 0; s < 2; ++s) touch.body[s] |= __shfl_xor_sync((unsigned)ALL_LANES, touch.body[s], o);
     }
     const bool driven = looks && v.driven.count > 0 && sadmm_pair_is_driven(&v.raw.system, pair);
-    if (looks && lane == 0 && (driven || joint_contacts_hold(&touch, bodies)))
-        atomicOr(island_of(v, a, b), ISLAND_LEADS_STAY);
+    if (looks && lane == 0)
+        atomicOr(island_of(v, a, b),
+                 ISLAND_TOUCHED | (driven || joint_contacts_hold(&touch, bodies) ? ISLAND_LEADS_STAY : 0));
 }
 
 /* args.count: threads for joints; the others are for pairs. */
@@ -301,8 +301,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     follow_if(all_early(v.model.bodies));
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x);
     if (v.model.live->abort_code) return;
-    if (i < v.model.bodies && moves_apart(v, i))
-        move_joined(v, i, v.joints.touch[joined_label(v, i)] & ISLAND_LEADS_STAY);
+    if (i < v.model.bodies && moves_apart(v, i)) move_joined(v, i);
     end_joints(v, i);
 }
 
@@ -337,7 +336,8 @@ sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_e
     args.count = (int32_t)(blocks * ROWS_THREADS);
     TRY(CUDA(launch_of)(c, joint_solution_kernel, "joints", blocks + (pairs + ROWS_THREADS - 1) / ROWS_THREADS,
                         ROWS_THREADS, &args, error));
-    return CUDA(launch_gear_solution)(c, error);
+    TRY(CUDA(launch_gear_solution)(c, error));
+    return CUDA(launch_joint_momentum)(c, error);
 }
 
 /* ---- where they are ---------------------------------------------------------------------------------------------- */
@@ -390,6 +390,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->couplings_before = couplings_of(c, step_state(into, substep - 1, substeps));
     joints->couplings_after = couplings_of(c, step_state(into, substep, substeps));
     joints->touch = buffer<int32_t>(c, BUFFER_JOINT_TOUCH);
+    joints->momentum = buffer<struct joint_momentum>(c, BUFFER_JOINT_MOMENTUM);
     c->view.rows.count = s->joint_constraints;
     CUDA(bind_raw_rows)(c, row_set(c, into));
     joints->solution = (double *)(row_set(c, into) + CUDA(raw_row_bytes)(s->joint_constraints));
@@ -440,6 +441,7 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
         {BUFFER_COUPLING_MEMORY, 3 * (size_t)s->couplings * sizeof(struct sadmm_coupling_memory)},
         {BUFFER_JOINT_ROWS, 2 * row_set_bytes(s)},
         {BUFFER_JOINT_TOUCH, (size_t)s->bodies * sizeof(int32_t)},
+        {BUFFER_JOINT_MOMENTUM, (size_t)s->bodies * sizeof(struct joint_momentum)},
     };
     TRY(reserve_all(c, wanted, error));
     /* Rows that a constraint does not have are fetched, too, beside the number of those that it has (joined.cu); and

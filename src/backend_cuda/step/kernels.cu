@@ -200,7 +200,7 @@ static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
     double velocity[6], place[PLACE];
     load_end_velocity(v, i, velocity);
     move_body(&before.body, velocity, dt, v.model.settings->gravity, kind, place);
-    store_moved(v, i, before, velocity, place, false, dt); /* finite, since both places were that it had to choose from */
+    store_moved(v, i, before, place, false, dt); /* finite, since both places were that it had to choose from */
 }
 
 /* Does any contact roll? */
@@ -210,7 +210,7 @@ static __device__ __forceinline__ bool rolls_again(const cuda_view &v)
 }
 
 /* What contacts that roll give body i to take along, which has been moved. */
-static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i)
+static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, bool restored)
 {
     const double dt = v.model.settings->dt;
     const int32_t slot = v.graph.slot_of[i];
@@ -220,6 +220,7 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i)
         const int32_t code = v.graph.incident[at], side = code & 1;
         if (code / 2 >= v.contacts.pair_capacity) continue; /* rows */
         const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];
+        if (restored && pair->body_a >= 0 && pair->body_b >= 0) continue; /* the island has what it owes, in sum */
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             const struct sadmm_contact_point *point = &v.raw.points[k];
             if (!point->migrates) continue;
@@ -244,9 +245,9 @@ static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_
 {
     const int32_t bits = joined ? v.joints.touch[joined_label(v, i)] : 0;
     if (joined && !v.joints.is_direct[i]) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
-    if (bits & ISLAND_JOINED) move_joined(v, i, bits & ISLAND_LEADS_STAY);
+    if (bits & ISLAND_JOINED) move_joined(v, i);
     else if (again) move_again(v, i);
-    if (rolls_again(v) && v.islands.touch[i] & TOUCH_ROLLS) keep_rolling(v, i);
+    if (rolls_again(v) && v.islands.touch[i] & TOUCH_ROLLS) keep_rolling(v, i, bits & ISLAND_RESTORED);
 }
 
 /* Are there bodies to be moved again (move.h)? */

@@ -58,14 +58,13 @@ static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int
 
 /* Body i goes to `place`; mean: by the mean of its velocities. */
 static __device__ __forceinline__ void store_moved(const cuda_view &v, int32_t i, const body_before &before,
-                                                   const double velocity[6], const double place[PLACE], bool mean,
-                                                   double dt)
+                                                   const double place[PLACE], bool mean, double dt)
 {
     struct sadmm_steady steady = before.steady;
     struct sadmm_rigid next = before.body;
     for (int k = 0; k < 3; ++k) next.position[k] = place[k];
     for (int k = 0; k < 4; ++k) next.orientation[k] = place[3 + k];
-    for (int k = 0; k < 6; ++k) next.velocity[k] = velocity[k];
+    for (int k = 0; k < 6; ++k) next.velocity[k] = place[7 + k];
     rolling_forget(&next);
     next.mean = mean;
     steady_keep(&steady, &before.body, &next, dt);

@@ -3,16 +3,21 @@
 #define SADMM_CUDA_STEP_MOVE_JOINED_H
 
 #include "core/model/gear_law.h"
+#include "core/model/joint_momentum.h"
 #include "move.h"
 
 /* Body i of an island with joints goes where these let it. */
-static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i, bool leads_stay)
+static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i)
 {
+    const int32_t label = joined_label(v, i), bits = v.joints.touch[label];
     const body_before before = fetch_body(v.step, i);
     const double dt = v.model.settings->dt;
-    double next[6], place[PLACE];
-    joint_move(&before.body, v.joints.velocity + 6 * (size_t)i, leads_stay, dt, place, place + 3, next);
-    store_moved(v, i, before, next, place, !leads_stay, dt);
+    const bool leads_stay = bits & ISLAND_LEADS_STAY;
+    double place[PLACE];
+    joint_move(&before.body, v.joints.velocity + 6 * (size_t)i, leads_stay, dt, place, place + 3, place + 7);
+    if (bits & ISLAND_RESTORED)
+        joint_restore(&v.joints.momentum[label], place, v.step.before[label].position, place + 7);
+    store_moved(v, i, before, place, !leads_stay, dt);
 }
 
 /* Joint j remembers how its bodies have been moved, once that is known; behind the joints, of a gear the first one. */

@@ -99,22 +99,22 @@ static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const _
     if (t.live && lane == 0) add_touch(v.islands, body, v.graph.label[body], sums.touch);
 }
 
-enum { MOVED = PLACE + 7 }; /* position, orientation, velocity, sadmm_rigid.mean */
+enum { MOVED = PLACE + 1 }; /* and sadmm_rigid.mean */
 
 static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     follow_if(all_early(v.model.bodies));
     int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
-    double *out = v.raw.out + MOVED * (size_t)i;
+    double *out = v.raw.out + MOVED * (size_t)i, velocity[6];
     const int island = args.count ? v.islands.touch[v.graph.label[i]] : 0, own = args.count ? v.islands.touch[i] : 0;
     for (int k = 0; k < 6; ++k) {
-        out[PLACE + k] = (double)v.bodies.state[(size_t)i * ROW + (size_t)k];
-        if (v.raw.system.carried) out[PLACE + k] += v.raw.system.carried[6 * (size_t)i + (size_t)k];
+        velocity[k] = (double)v.bodies.state[(size_t)i * ROW + (size_t)k];
+        if (v.raw.system.carried) velocity[k] += v.raw.system.carried[6 * (size_t)i + (size_t)k];
     }
     const enum lead_kind kind = lead_kind_of(island, own);
-    move_body(&v.raw.system.rigid[i], out + PLACE, v.model.settings->dt, v.model.settings->gravity, kind, out);
-    out[MOVED - 1] = kind == LEAD_OWN;
+    move_body(&v.raw.system.rigid[i], velocity, v.model.settings->dt, v.model.settings->gravity, kind, out);
+    out[PLACE] = kind == LEAD_OWN;
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
@@ -140,9 +140,9 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
         next[i] = c->system->rigid[i];
         memcpy(next[i].position, from, sizeof next[i].position);
         memcpy(next[i].orientation, from + 3, sizeof next[i].orientation);
-        memcpy(next[i].velocity, from + PLACE, sizeof next[i].velocity);
+        memcpy(next[i].velocity, from + 7, sizeof next[i].velocity);
         rolling_forget(&next[i]);
-        next[i].mean = from[MOVED - 1] != 0;
+        next[i].mean = from[PLACE] != 0;
     }
     return SADMM_OK;
 }

@@ -22,12 +22,14 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
     if (WHOLE) end_velocity(v, body, velocity);
     else
         for (int k = 0; k < 6; ++k) velocity[k] = row_at(v.bodies.state, (size_t)body)[k];
+    double before[6];
     for (int k = 0; k < 6; ++k) {
         out.before[k] = rigid->velocity[k];
         out.velocity[k] = (double)velocity[k];
         if (carried) out.velocity[k] += v.raw.system.carried[6 * (size_t)body + (size_t)k];
     }
-    lead_own(rigid->velocity, out.velocity, rigid_is_isotropic(v3_load(rigid->inertia)), out.lead);
+    spin_before(rigid, v.model.settings->dt, before);
+    lead_own(before, out.velocity, out.lead);
     return out;
 }
 

@@ -158,6 +158,7 @@ void CUDA(view_joints)(struct sadmm_context *, int into, int substep);
 /* joints.cu: rows of the (sub-)step; what its solution says of joints. */
 sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_joint_momentum)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_joint_move)(struct sadmm_context *, struct sadmm_error *error);
 /* joined_memory.cu: the same for bodies that joints join; what depends on the number of pairs. */
 sadmm_status CUDA(load_joined)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);

@@ -50,17 +50,10 @@ SADMM_INLINE void lead_shared(const double gravity[3], double dt, double lead[6]
     }
 }
 
-/* A body whose principal moments differ turns about v's axis: that stays where it is in the body's frame then, and so
- * do energy and angular momentum. Its lead is the part along that axis. */
-SADMM_INLINE void lead_own(const double before[6], const double v[6], int isotropic, double lead[6])
+SADMM_INLINE void lead_own(const double before[6], const double v[6], double lead[6])
 {
     SADMM_UNROLL
     for (int k = 0; k < 6; ++k) lead[k] = (v[k] - before[k]) / 2;
-    if (!isotropic) {
-        const double square = dot3(v + 3, v + 3), along = square > 0 ? dot3(lead + 3, v + 3) / square : 0;
-        SADMM_UNROLL
-        for (int k = 3; k < 6; ++k) lead[k] = along * v[k];
-    }
 }
 
 /* Of the velocity that v gives the point at `arm`, the part along n. */

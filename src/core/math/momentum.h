@@ -100,6 +100,17 @@ SADMM_INLINE void momentum_add_contact(double gram[PACKED6 + 1], const double no
     }
 }
 
+/* What a row of a constraint with the static world adds: on (linear, angular) of its body, which is at d. */
+SADMM_INLINE void momentum_add_row(double gram[PACKED6 + 1], const double jacobian[6], const double d[3])
+{
+    double row[6];
+    SADMM_UNROLL
+    for (int k = 0; k < 6; ++k) row[k] = jacobian[k];
+    add_cross(d, jacobian, 1, row + 3);
+    packed_add_row(gram, row, 1);
+    gram[MOMENTUM_CONTACTS] += 2; /* it is no single point with friction, nor nothing */
+}
+
 /* The motions, and the momentum along each. */
 struct momentum_motions {
     int count; /* 0: the island is held */
@@ -233,10 +244,11 @@ SADMM_INLINE int momentum_find_free(const struct momentum_sums *s, struct moment
     return 1;
 }
 
-/* `s` loses its gram. Every static contact shows in the directions that its point does not move in. */
+/* `s` loses its gram. Every static contact shows in the directions that its point does not move in; rows are counted. */
 SADMM_INLINE void momentum_find_motions(struct momentum_sums *s, struct momentum_motions *out)
 {
-    if (s->gram[0] + s->gram[2] + s->gram[5] == 0 && momentum_find_free(s, out)) return;
+    const double linear = s->gram[0] + s->gram[2] + s->gram[5];
+    if (linear == 0 && s->gram[MOMENTUM_CONTACTS] == 0 && momentum_find_free(s, out)) return;
     const int left = momentum_null_space(s, out->motion);
     double y[6];
     out->count = 0;

@@ -1,4 +1,4 @@
-/* Rigid body formulas: world inertia, dynamics vector, gyroscopic term, pose integration. */
+/* Rigid body formulas: world inertia, angular momentum, motion without torque, pose integration. */
 #ifndef SADMM_MATH_RIGID_H
 #define SADMM_MATH_RIGID_H
 
@@ -11,6 +11,12 @@ SADMM_INLINE vec3 s3_mul(sym3 s, vec3 v)
 {
     return v3(s.xx * v.x + s.xy * v.y + s.xz * v.z, s.xy * v.x + s.yy * v.y + s.yz * v.z,
               s.xz * v.x + s.yz * v.y + s.zz * v.z);
+}
+
+SADMM_INLINE sym3 s3_add(sym3 a, sym3 b)
+{
+    a.xx += b.xx, a.yy += b.yy, a.zz += b.zz, a.xy += b.xy, a.xz += b.xz, a.yz += b.yz;
+    return a;
 }
 
 /* R diag(inertia) R^T */
@@ -41,44 +47,108 @@ SADMM_INLINE vec3 m3_solve(mat3 m, vec3 r)
     return v3_scale(v3_madd(v3_madd(v3_scale(c0, r.x), r.y, c1), r.z, c2), inv);
 }
 
-/* Angular velocity (body frame) after dt of torque-free motion by the implicit midpoint rule,
- *   I (w' - w) + dt m x I m = 0,  m = (w + w') / 2,
- * which conserves the energy w.Iw and the angular momentum |Iw| exactly once solved, at any speed. Newton from w; the
- * step is cut so that no piece turns more than half a radian, where Newton converges to rounding in a few steps. */
-SADMM_INLINE vec3 rigid_gyroscopic(vec3 inertia, vec3 w, real dt)
-{
-    real turn = v3_norm(w) * dt;
-    int pieces = turn > (real)0.5 ? (int)real_min(turn * 2 + 1, (real)4096) : 1;
-    real h = dt / (real)pieces;
-    int p, k;
-    for (p = 0; p < pieces; ++p) {
-        vec3 x = w;
-        for (k = 0; k < 5; ++k) {
-            vec3 m = v3_scale(v3_add(w, x), (real)0.5);
-            vec3 Im = v3(inertia.x * m.x, inertia.y * m.y, inertia.z * m.z);
-            vec3 d = v3_sub(x, w), g = v3_cross(m, Im), f, dx;
-            mat3 J;
-            f = v3(inertia.x * d.x + h * g.x, inertia.y * d.y + h * g.y, inertia.z * d.z + h * g.z);
-            /* J = I + h/2 ([m]x I - [I m]x) */
-            J.r[0] = v3(inertia.x, h / 2 * (-m.z * inertia.y + Im.z), h / 2 * (m.y * inertia.z - Im.y));
-            J.r[1] = v3(h / 2 * (m.z * inertia.x - Im.z), inertia.y, h / 2 * (-m.x * inertia.z + Im.x));
-            J.r[2] = v3(h / 2 * (-m.y * inertia.x + Im.y), h / 2 * (m.x * inertia.y - Im.x), inertia.z);
-            dx = m3_solve(J, f);
-            x = v3_sub(x, dx);
-            if (v3_max_abs(dx) <= 2 * SADMM_EPSILON * v3_max_abs(x)) break;
-        }
-        w = x;
-    }
-    return w;
-}
+/* A pose after dt of motion by one velocity. */
+SADMM_INLINE vec3 rigid_move(vec3 x, vec3 v, real dt) { return v3_madd(x, dt, v); }
+SADMM_INLINE quat rigid_turn(quat q, vec3 w, real dt) { return q_normalize(q_mul(q_exp(v3_scale(w, dt)), q)); }
 
-/* Angular part of b without external torque: world inertia times the angular velocity after the gyroscopic term. */
-SADMM_INLINE vec3 rigid_angular_momentum(quat q, vec3 inertia, vec3 w_world, real dt)
+/* Where a body is turned to, and its angular velocity; world frame. */
+struct rigid_spin {
+    quat orientation;
+    vec3 angular;
+};
+
+/* R diag(inertia) R^T w */
+SADMM_INLINE vec3 rigid_angular_momentum(quat q, vec3 inertia, vec3 w)
 {
     mat3 R = q_matrix(q);
-    vec3 w = m3_tmul(R, w_world);
-    if (!rigid_is_isotropic(inertia)) w = rigid_gyroscopic(inertia, w, dt);
-    return m3_mul(R, v3(inertia.x * w.x, inertia.y * w.y, inertia.z * w.z));
+    vec3 body = m3_tmul(R, w);
+    return m3_mul(R, v3(inertia.x * body.x, inertia.y * body.y, inertia.z * body.z));
+}
+
+/* The angular velocity of a body with this angular momentum. */
+SADMM_INLINE vec3 rigid_angular_velocity(quat q, vec3 inertia, vec3 momentum)
+{
+    mat3 R = q_matrix(q);
+    vec3 body = m3_tmul(R, momentum);
+    return m3_mul(R, v3(body.x / inertia.x, body.y / inertia.y, body.z / inertia.z));
+}
+
+/* tan(x) / x of half an angle, of 1 rad at most: far from where it has none. Series below 0.1 rad: its next term is under
+ * 1e-17. */
+SADMM_INLINE real rigid_half_tangent(real angle)
+{
+    const double x = angle < 1 ? 0.5 * (double)angle : 0.5, y = x * x;
+    if (x > 0.05) return (real)(tan(x) / x);
+    return (real)(1 + y * (1 / 3. + y * (2 / 15. + y * (17 / 315. + y * (62 / 2835. + y * (1382 / 155925.))))));
+}
+
+/* The mean angular velocity m, in the body's frame, of h of motion without torque from angular velocity w and momentum
+ * p = I w,
+ *
+ *     I m - p + h/2 m x I m = 0,
+ *
+ * by iteration, which comes near, then by Newton's method. The turn by 2 atan(h |m| / 2) about m takes p to 2 I m - p,
+ * which has the same energy; longer by rigid_half_tangent, h makes it the turn of the angle that a body goes by in that
+ * time about an axis that stays. */
+SADMM_INLINE vec3 rigid_mean_spin(vec3 inertia, vec3 w, vec3 p, real h)
+{
+    const vec3 inverse = v3(1 / inertia.x, 1 / inertia.y, 1 / inertia.z);
+    const real turn = h * v3_max_abs(w);
+    vec3 m = w;
+    int k;
+    for (k = 0; k < 2; ++k) {
+        const vec3 g = v3_cross(m, v3(inertia.x * m.x, inertia.y * m.y, inertia.z * m.z));
+        m = v3(w.x - h / 2 * (g.x * inverse.x), w.y - h / 2 * (g.y * inverse.y), w.z - h / 2 * (g.z * inverse.z));
+    }
+    for (k = 0; k < 8; ++k) {
+        const vec3 Im = v3(inertia.x * m.x, inertia.y * m.y, inertia.z * m.z), g = v3_cross(m, Im);
+        const vec3 f = v3_madd(v3_sub(Im, p), h / 2, g);
+        real step, size;
+        vec3 dm;
+        mat3 J; /* I + h/2 ([m]x I - [I m]x) */
+        J.r[0] = v3(inertia.x, h / 2 * (-m.z * inertia.y + Im.z), h / 2 * (m.y * inertia.z - Im.y));
+        J.r[1] = v3(h / 2 * (m.z * inertia.x - Im.z), inertia.y, h / 2 * (-m.x * inertia.z + Im.x));
+        J.r[2] = v3(h / 2 * (-m.y * inertia.x + Im.y), h / 2 * (m.x * inertia.y - Im.x), inertia.z);
+        dm = m3_solve(J, f);
+        m = v3_sub(m, dm);
+        step = v3_max_abs(dm), size = v3_max_abs(m);
+        if (!(turn * step * step > SADMM_EPSILON * size * size)) break; /* the next one would be rounding */
+    }
+    return m;
+}
+
+/* dt of motion without torque of a body whose moments differ, in pieces of at most half a radian, in which Newton's
+ * method closes in at once. The angular momentum in space is as it was, to rounding, and so is the energy. */
+SADMM_CALLED struct rigid_spin rigid_tumble(struct rigid_spin from, vec3 inertia, real dt)
+{
+    const real turn = v3_norm(from.angular) * dt;
+    const int pieces = turn > (real)0.5 ? (int)real_min(turn * 2 + 1, (real)4096) : 1;
+    const real h = dt / (real)pieces;
+    mat3 R = q_matrix(from.orientation);
+    vec3 w = m3_tmul(R, from.angular), p = v3(inertia.x * w.x, inertia.y * w.y, inertia.z * w.z);
+    const vec3 momentum = m3_mul(R, p);
+    int k;
+    for (k = 0; k < pieces; ++k) {
+        const real stretched = h * rigid_half_tangent(h * v3_norm(w));
+        const vec3 m = rigid_mean_spin(inertia, w, p, stretched);
+        quat step;
+        step.w = 1;
+        step.x = stretched / 2 * m.x, step.y = stretched / 2 * m.y, step.z = stretched / 2 * m.z;
+        from.orientation = q_normalize(q_mul(from.orientation, step));
+        R = q_matrix(from.orientation);
+        p = m3_tmul(R, momentum);
+        w = v3(p.x / inertia.x, p.y / inertia.y, p.z / inertia.z);
+    }
+    from.angular = m3_mul(R, w);
+    return from;
+}
+
+/* dt of motion without torque. */
+SADMM_INLINE struct rigid_spin rigid_drift(struct rigid_spin from, vec3 inertia, real dt)
+{
+    if (!rigid_is_isotropic(inertia)) return rigid_tumble(from, inertia, dt);
+    from.orientation = rigid_turn(from.orientation, from.angular, dt);
+    return from;
 }
 
 /* Sizes of the accelerations that a force (N) and a torque (N m, world frame) give by themselves, m/s^2 and rad/s^2. */
@@ -93,9 +163,5 @@ SADMM_INLINE real rigid_angular_acceleration(quat q, vec3 inertia, vec3 torque)
     t = m3_tmul(q_matrix(q), torque);
     return v3_norm(v3(t.x / inertia.x, t.y / inertia.y, t.z / inertia.z));
 }
-
-/* A pose after dt of motion by one velocity. */
-SADMM_INLINE vec3 rigid_move(vec3 x, vec3 v, real dt) { return v3_madd(x, dt, v); }
-SADMM_INLINE quat rigid_turn(quat q, vec3 w, real dt) { return q_normalize(q_mul(q_exp(v3_scale(w, dt)), q)); }
 
 #endif

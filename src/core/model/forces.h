@@ -87,14 +87,15 @@ SADMM_INLINE double forces_angular_acceleration(const struct sadmm_rigid *body, 
     return z > 0 ? size + forces_braking(body->velocity + 3, z, dt) : size;
 }
 
-/* Velocity after a step without contacts and torques. */
-SADMM_INLINE void forces_free(const struct sadmm_rigid *body, const double gravity[3], double dt, double free[6])
+/* What a step without contacts and torques makes of a velocity of its middle. */
+SADMM_INLINE void forces_free(const struct sadmm_rigid *body, const double velocity[6], const double gravity[3],
+                              double dt, double free[6])
 {
     const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
     for (int k = 0; k < 3; ++k) {
         const double gained = dt * (forces_gravity(body, gravity, k) + body->wrench[k] / body->mass);
-        free[k] = (linear.keep * body->velocity[k] + gained) / linear.mass;
-        free[k + 3] = angular.keep * body->velocity[k + 3] / angular.mass;
+        free[k] = (linear.keep * velocity[k] + gained) / linear.mass;
+        free[k + 3] = angular.keep * velocity[k + 3] / angular.mass;
     }
 }
 

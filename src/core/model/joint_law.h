@@ -11,6 +11,7 @@
 #include "core/math/max.h"
 #include "core/math/rigid.h"
 #include "forces.h"
+#include "spin.h"
 #include "subadmm/joint.h"
 #include "system.h"
 
@@ -109,8 +110,9 @@ struct joint_side {
     int32_t system_body;             /* -1: it does not move, or is steered */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the static world */
     bool steered;
-    double velocity[6], free[6];     /* at the start; at the end of free motion */
-    quat back;                       /* what turns the row's torque to where the body's moments are (docs) */
+    double velocity[6], middle[6];   /* at the start; halfway, before anything acts */
+    double free[6];                  /* halfway, once gravity has acted alone */
+    quat turned;                     /* its orientation halfway */
 };
 
 struct acting_joint {
@@ -122,18 +124,23 @@ struct acting_joint {
 SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struct sadmm_settings *settings)
 {
     struct joint_side side;
+    struct rigid_spin spin;
     int k;
     side.system_body = body.system_body;
     side.rigid = body.rigid;
     side.steered = body.steered;
-    side.back.w = 1;
-    side.back.x = side.back.y = side.back.z = 0;
+    side.turned.w = 1;
+    side.turned.x = side.turned.y = side.turned.z = 0;
     for (k = 0; k < 6; ++k)
-        side.velocity[k] = side.free[k] = body.system_body >= 0 || body.steered ? body.rigid->velocity[k] : 0;
+        side.velocity[k] = side.middle[k] = side.free[k] =
+            body.system_body >= 0 || body.steered ? body.rigid->velocity[k] : 0;
+    if (body.steered)
+        side.turned = rigid_turn(q_load(body.rigid->orientation), v3_load(side.velocity + 3), settings->dt / 2);
     if (body.system_body < 0) return side;
-    forces_free(side.rigid, settings->gravity, settings->dt, side.free);
-    if (!rigid_is_isotropic(v3_load(side.rigid->inertia)))
-        side.back = q_exp(v3_scale(v3_load(side.velocity + 3), -settings->dt / 2));
+    spin = spin_halfway(body.rigid, settings->dt);
+    side.turned = spin.orientation;
+    v3_store(spin.angular, side.middle + 3);
+    forces_free(side.rigid, side.middle, settings->gravity, settings->dt, side.free);
     return side;
 }
 
@@ -142,7 +149,7 @@ SADMM_INLINE struct joint_end joint_end_halfway(const struct joint_frame *frame,
                                                 double dt)
 {
     return joint_end_of(frame, rigid_move(v3_load(side->rigid->position), v3_load(side->velocity), dt / 2),
-                        rigid_turn(q_load(side->rigid->orientation), v3_load(side->velocity + 3), dt / 2));
+                        side->turned);
 }
 
 /* From a coupling's target, translations are by its origin's velocity alone, along axes that stay where they are in the
@@ -185,7 +192,7 @@ SADMM_INLINE void joint_step_row(const struct acting_joint *acting, int s, int k
     const double sign = s ? 1 : -1;
     joint_row(&acting->middle, k, s ? acting->middle.arm_b : acting->middle.arm_a, &linear, &angular);
     v3_store(v3_scale(linear, sign), row);
-    v3_store(v3_scale(q_turn(acting->side[s].back, angular), sign), row + 3);
+    v3_store(v3_scale(angular, sign), row + 3);
 }
 
 SADMM_INLINE double joint_row_product(const double row[6], const double v[6])
@@ -217,7 +224,7 @@ SADMM_INLINE double joint_rate(const struct joint_geometry *geometry, int coordi
 SADMM_INLINE double joint_response(const struct joint_side *side, const double row[6])
 {
     const double *inertia = side->rigid->inertia;
-    const vec3 turn = m3_tmul(q_matrix(q_load(side->rigid->orientation)), v3_load(row + 3));
+    const vec3 turn = m3_tmul(q_matrix(side->turned), v3_load(row + 3));
     return v3_norm2(v3_load(row)) / side->rigid->mass + turn.x * turn.x / inertia[0] + turn.y * turn.y / inertia[1] +
            turn.z * turn.z / inertia[2];
 }
@@ -244,7 +251,7 @@ struct joint_moving {
     const struct sadmm_joint_memory *memory;
     double value, before; /* and its rate, at the step's start */
     double free;          /* its rate at the end, if nothing but gravity and wrenches acted */
-    double turning;       /* what the row's rate by the velocities at the start is more: axes and arms turn */
+    double turning;       /* what the row's rate halfway is more, before anything acts: axes, arms and bodies turn */
     double turned;        /* what the rate at the end is more than the row's, so far as the law counts it */
     double steered;       /* of the rate what steered sides give */
     bool turns;           /* by more than a step resolves: its bodies will be moved by the velocities of the step's end, */
@@ -317,7 +324,7 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
 {
     const struct joint_side *a = &acting->side[0], *b = &acting->side[1];
     struct joint_moving m;
-    double middle = 0, free = 0, steered = 0;
+    double middle = 0, free = 0, steered = 0, start = 0; /* start: of velocities at the start */
     int s;
     m.memory = memory;
     m.dt = settings->dt;
@@ -335,14 +342,15 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
             steered += joint_row_product(row, acting->side[s].velocity);
             continue;
         }
-        middle += joint_row_product(row, acting->side[s].velocity);
+        start += joint_row_product(row, acting->side[s].velocity);
+        middle += joint_row_product(row, acting->side[s].middle);
         free += joint_row_product(row, acting->side[s].free);
         m.response += joint_response(&acting->side[s], row);
     }
-    middle += steered, free += steered;
+    start += steered, middle += steered, free += steered;
     m.steered = steered;
     m.turning = middle - m.before;
-    m.turns = joint_turns(acting, k, joint_is_radial(def->kind), m.turning, m.dt);
+    m.turns = joint_turns(acting, k, joint_is_radial(def->kind), start - m.before, m.dt);
     m.free = free - m.turning;
     m.late = memory->leads_stay || m.turns;
     m.turned = (m.late ? 0 : m.turning) + steered; /* the solve's rates are of its bodies alone */

@@ -8,9 +8,21 @@
 #include "core/math/lead.h"
 #include "joint_law.h"
 #include "rolling.h"
+#include "spin.h"
 
-/* Of islands. */
-enum { ISLAND_JOINED = 1, ISLAND_LEADS_STAY = 2 };
+/* Of islands. TOUCHED: by a contact; HELD: by one that leaves it no motion (math/momentum.h); RESTORED: on a device, it
+ * is (joint_momentum.h); TURNS: rows of it turn by more than a step resolves; POWERED: springs, drives or armatures act;
+ * MOORED: rows hold it to what does not move by itself. */
+enum {
+    ISLAND_JOINED = 1,
+    ISLAND_LEADS_STAY = 2,
+    ISLAND_TOUCHED = 4,
+    ISLAND_HELD = 8,
+    ISLAND_RESTORED = 16,
+    ISLAND_TURNS = 32,
+    ISLAND_POWERED = 64,
+    ISLAND_MOORED = 128
+};
 
 /* A body as the step ends. */
 struct joint_lead {
@@ -18,15 +30,17 @@ struct joint_lead {
     double velocity[6], lead[6];
 };
 
-/* velocity: at the end; rigid NULL: not read. */
-SADMM_INLINE struct joint_lead joint_lead_of(const struct sadmm_rigid *rigid, const double *velocity)
+/* velocity: the solution; rigid NULL: not read. */
+SADMM_INLINE struct joint_lead joint_lead_of(const struct sadmm_rigid *rigid, const double *velocity, double dt)
 {
     struct joint_lead out;
+    double before[6];
     int k;
     out.rigid = rigid;
+    if (rigid) spin_before(rigid, dt, before);
     for (k = 0; k < 6; ++k) {
         out.velocity[k] = rigid ? velocity[k] : 0;
-        out.lead[k] = rigid ? (velocity[k] - rigid->velocity[k]) / 2 : 0;
+        out.lead[k] = rigid ? (velocity[k] - before[k]) / 2 : 0;
     }
     return out;
 }
@@ -75,7 +89,6 @@ SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, dou
     const double margin = source->slack + LEAD_SLOP * settings->slop;
     double lead = 0, speed = source->steered, way;
     int s, j;
-    if (source->slack == INFINITY) return true;
     if (!table && ((source->role != SADMM_ROLE_LOWER && source->role != SADMM_ROLE_UPPER) || !(lambda > 0)))
         return false;
     for (s = 0; s < 2; ++s) {
@@ -90,21 +103,27 @@ SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, dou
     return lambda < 0 ? way > max_of(source->gap, 0) + margin : -way > max_of(-source->gap, 0) + margin;
 }
 
-/* Velocities of bodies whose principal moments differ are solved for as what they are in the body's frame, which turns
- * by the mean velocity: with it turns what they are in the world. Energy and the size of the angular momentum stay. */
+/* What a row says of its island. */
+SADMM_INLINE int joint_row_touches(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
+                                   const double row_b[6], const struct joint_lead bodies[2],
+                                   const struct sadmm_settings *settings)
+{
+    const bool lock = source->role == SADMM_ROLE_LOCK, moors = !bodies[0].rigid || !bodies[1].rigid,
+               powers = source->role == SADMM_ROLE_DRIVE || source->role == SADMM_ROLE_SPRING ||
+                        source->role == SADMM_ROLE_ARMATURE;
+    const int bits = (moors && (lock || lambda != 0) ? ISLAND_MOORED : 0) | (powers ? ISLAND_POWERED : 0);
+    if (source->slack == INFINITY) return bits | ISLAND_LEADS_STAY | ISLAND_TURNS;
+    return joint_limit_jolts(source, lambda, row_a, row_b, bodies, settings) ? bits | ISLAND_LEADS_STAY : bits;
+}
+
+/* Position, orientation and velocity at the end, by the solution v. */
 SADMM_INLINE void joint_move(const struct sadmm_rigid *from, const double v[6], bool leads_stay, double dt,
                              double position[3], double orientation[4], double velocity[6])
 {
     double mean[6];
     int k;
-    for (k = 0; k < 6; ++k) {
-        mean[k] = leads_stay ? v[k] : (from->velocity[k] + v[k]) / 2;
-        velocity[k] = v[k];
-    }
-    v3_store(rigid_move(v3_load(from->position), v3_load(mean), dt), position);
-    q_store(rigid_turn(q_load(from->orientation), v3_load(mean + 3), dt), orientation);
-    if (!leads_stay && !rigid_is_isotropic(v3_load(from->inertia)))
-        v3_store(q_turn(q_exp(v3_scale(v3_load(mean + 3), dt)), v3_load(v + 3)), velocity + 3);
+    for (k = 0; k < 6; ++k) mean[k] = leads_stay ? v[k] : (from->velocity[k] + v[k]) / 2;
+    spin_move(from, v, mean, leads_stay, dt, position, orientation, velocity);
 }
 
 #endif

@@ -8,32 +8,38 @@
 #include "core/math/impact.h"
 #include "core/math/rigid.h"
 #include "forces.h"
+#include "spin.h"
 #include "system.h"
 
 #ifndef SADMM_REAL_IS_DOUBLE
 #error "system_math.h is double only: do not include it in a source compiled per precision"
 #endif
 
-/* Its inertia with dt^2 / 2 times its stiffness (rolling.h); b along with it: what is added resists changes alone. */
-SADMM_RARE sym3 sadmm_stiffened(const struct sadmm_rigid *body, double dt, sym3 I, double b[6])
+/* What stiffness adds to its inertia (rolling.h). */
+SADMM_INLINE sym3 sadmm_stiffness(const struct sadmm_rigid *body, double dt)
 {
     const double *k = body->stiffness, s = dt * dt / 2;
     const sym3 more = {s * k[0], s * k[1], s * k[2], s * k[3], s * k[4], s * k[5]};
-    v3_store(v3_add(v3_load(b + 3), s3_mul(more, v3_load(body->velocity + 3))), b + 3);
-    I.xx += more.xx, I.yy += more.yy, I.zz += more.zz, I.xy += more.xy, I.xz += more.xz, I.yz += more.yz;
-    return I;
+    return more;
 }
 
-/* Eq. (1) of a rigid body: A = diag(m I, world inertia) and b = A v + dt (m g + f, tau) with the gyroscopic term inside
- * the angular momentum (math/rigid.h), and damping (forces.h). Returns the inertia; *mass: of A. */
-SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double *mass,
-                                   double b[6])
+/* Its inertia with that; b, which is made of this angular velocity, along with it: what is added resists changes alone. */
+SADMM_RARE sym3 sadmm_stiffened(const struct sadmm_rigid *body, vec3 angular, double dt, sym3 I, double b[6])
+{
+    const sym3 more = sadmm_stiffness(body, dt);
+    v3_store(v3_add(v3_load(b + 3), s3_mul(more, angular)), b + 3);
+    return s3_add(I, more);
+}
+
+/* Eq. (1) of a rigid body: A = diag(m I, world inertia) halfway through the step (spin: spin_of_system) and b = A v +
+ * dt (m g + f, tau), with damping (forces.h), and what contacts that roll owe it. Returns the inertia; *mass: of A. */
+SADMM_INLINE sym3 sadmm_rigid_body_at(const struct sadmm_rigid *body, struct rigid_spin spin,
+                                      const struct sadmm_settings *settings, double *mass, double b[6])
 {
     const double dt = settings->dt;
-    const quat q = q_load(body->orientation);
     const vec3 inertia = v3_load(body->inertia);
     const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
-    const vec3 momentum = rigid_angular_momentum(q, inertia, v3_load(body->velocity + 3), dt);
+    const vec3 momentum = rigid_angular_momentum(spin.orientation, inertia, spin.angular);
     for (int k = 0; k < 3; ++k) {
         const double gained = dt * forces_gravity(body, settings->gravity, k);
         b[k] = body->mass * (linear.keep * body->velocity[k] + gained) + dt * body->wrench[k];
@@ -41,8 +47,14 @@ SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct 
     v3_store(v3_madd(v3_scale(momentum, angular.keep), dt, v3_load(body->wrench + 3)), b + 3);
     for (int k = 0; k < 6; ++k) b[k] += body->owed[k];
     *mass = linear.mass * body->mass;
-    const sym3 I = rigid_world_inertia(q_matrix(q), v3_scale(inertia, angular.mass));
-    return rolling_is_stiff(body) ? sadmm_stiffened(body, dt, I, b) : I;
+    const sym3 I = rigid_world_inertia(q_matrix(spin.orientation), v3_scale(inertia, angular.mass));
+    return rolling_is_stiff(body) ? sadmm_stiffened(body, spin.angular, dt, I, b) : I;
+}
+
+SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double *mass,
+                                   double b[6])
+{
+    return sadmm_rigid_body_at(body, spin_of_system(body, settings->dt), settings, mass, b);
 }
 
 /* b of the motion less c, of a rigid body: b - A c. */
@@ -154,16 +166,14 @@ SADMM_INLINE struct sadmm_impact_body sadmm_impact_body_of(const struct sadmm_sy
     }
     if (i < 0) return out;
     const struct sadmm_rigid *body = &system->rigid[i];
-    const mat3 R = q_matrix(q_load(body->orientation));
+    const struct rigid_spin spin = spin_of_system(body, dt);
+    const mat3 R = q_matrix(spin.orientation);
     const vec3 inertia = v3_load(body->inertia);
     const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
     const vec3 heavy = v3_scale(inertia, angular.mass);
     const sym3 inverse = rigid_world_inertia(R, v3(1 / heavy.x, 1 / heavy.y, 1 / heavy.z));
     out.linear = v3_scale(v3_load(body->velocity), linear.keep / linear.mass);
-    out.angular = v3_load(body->velocity + 3);
-    if (!rigid_is_isotropic(inertia))
-        out.angular = m3_mul(R, rigid_gyroscopic(inertia, m3_tmul(R, out.angular), dt));
-    out.angular = v3_scale(out.angular, angular.keep / angular.mass);
+    out.angular = v3_scale(spin.angular, angular.keep / angular.mass);
     out.push = v3_scale(v3_madd(v3_scale(v3_load(settings->gravity), body->gravity_scale), 1 / body->mass,
                                 v3_load(body->wrench)), dt / 2 / linear.mass);
     out.turn = v3_scale(s3_mul(inverse, v3_load(body->wrench + 3)), dt / 2);

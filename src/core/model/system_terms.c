@@ -19,14 +19,16 @@ static void pack_rigid(double mass, sym3 I, double out[PACKED6])
 }
 
 void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, size_t first,
-                      size_t count, double *A, double *b)
+                      size_t count, double *A, double *b, struct sadmm_lead *leads)
 {
     const struct sadmm_rigid *bodies = system->rigid;
     if (!bodies) memcpy(b, system->b + 6 * first, 6 * count * sizeof *b);
     for (size_t i = 0; i < count && !bodies; ++i) pack(system->A + 36 * (first + i), A + PACKED6 * i);
     for (size_t i = 0; i < count && bodies; ++i) {
+        const struct rigid_spin spin = spin_of_system(&bodies[first + i], settings->dt);
         double mass;
-        const sym3 I = sadmm_rigid_body(&bodies[first + i], settings, &mass, b + 6 * i);
+        const sym3 I = sadmm_rigid_body_at(&bodies[first + i], spin, settings, &mass, b + 6 * i);
+        q_store(spin.orientation, leads[first + i].halfway);
         pack_rigid(mass, I, A + PACKED6 * i);
         if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (first + i), b + 6 * i);
     }
@@ -48,7 +50,10 @@ void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const doub
 {
     for (size_t i = 0; i < count; ++i) {
         struct sadmm_lead *out = &leads[i];
-        lead_own(bodies[i].velocity, velocity + 6 * i, rigid_is_isotropic(v3_load(bodies[i].inertia)), out->lead);
+        double before[6];
+        spin_before(&bodies[i], settings->dt, before);
+        lead_own(before, velocity + 6 * i, out->lead);
+        out->kind = LEAD_OWN;
         out->linear = size3(out->lead);
         out->angular = size3(out->lead + 3);
         out->moves_linear = lead_speed_part(bodies[i].velocity, velocity + 6 * i, 0);
@@ -65,12 +70,9 @@ static void advance(const struct sadmm_rigid *body, const double velocity[6], co
 {
     double mean[6];
     for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - lead->lead[k];
-    const vec3 position = rigid_move(v3_load(body->position), v3_load(mean), dt);
-    const quat orientation = rigid_turn(q_load(body->orientation), v3_load(mean + 3), dt);
     *next = *body;
-    v3_store(position, next->position);
-    q_store(orientation, next->orientation);
-    memcpy(next->velocity, velocity, sizeof next->velocity);
+    spin_move_from(body, q_load(lead->halfway), velocity, mean, lead->kind != LEAD_OWN, dt, next->position,
+                   next->orientation, next->velocity);
     rolling_forget(next);
     next->mean = lead->kind == LEAD_OWN;
 }

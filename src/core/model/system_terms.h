@@ -5,10 +5,6 @@
 #include "core/math/lead.h"
 #include "system.h"
 
-/* A (count x PACKED6: lower triangles) and b (count x 6) of eq. (1), of bodies [first, first + count). */
-void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, size_t first,
-                      size_t count, double *A, double *b);
-
 /* e of a pair's k-th point, m/s; points: the pair's. */
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
                          const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points, int32_t k);
@@ -22,9 +18,15 @@ struct sadmm_lead {
     double linear, angular;             /* size3 of its parts */
     double moves_linear, moves_angular; /* lead_speed_part: m/s, rad/s */
     double rest;                        /* lead_rest_speed, m/s */
+    double halfway[4];                  /* the body's orientation in the middle of the step: sadmm_body_terms */
     enum lead_kind kind;                /* what becomes of it: LEAD_OWN, until contacts are known */
     int touch;                          /* forces_touch (forces.h) */
 };
+
+/* A (count x PACKED6: lower triangles) and b (count x 6) of eq. (1), of bodies [first, first + count); leads: of those with
+ * a state. */
+void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, size_t first,
+                      size_t count, double *A, double *b, struct sadmm_lead *leads);
 
 /* Leads of `count` bodies, each by itself, which end the step with `velocity` (count x 6). */
 void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity,

@@ -42,8 +42,9 @@ static void explain_driven(struct text *t, int32_t count)
 
 static void explain_options(struct text *t, const struct sadmm_plan *plan, const sadmm_settings *s)
 {
-    line(t, plan->gyroscopic ? "gyroscopic   implicit midpoint, for bodies of unequal principal moments\n"
-                             : "gyroscopic   left out: every body has equal principal moments\n");
+    line(t, plan->gyroscopic
+                ? "gyroscopic   midpoint rule on either side of impulses, for bodies of unequal principal moments\n"
+                : "gyroscopic   left out: every body has equal principal moments\n");
     line(t, plan->predict    ? "start        loads predicted where they can be, else cold: no step came before\n"
             : plan->warm_start ? "start        warm: impulses and velocities of the last step\n"
                                : "start        cold: impulses 0, velocities A^-1 b (asked for)\n");

@@ -3,14 +3,15 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "core/math/momentum.h"
 #include "core/model/islands.h"
 #include "core/model/joint_lead.h"
 #include "world_internal.h"
 
-static struct joint_lead lead_of(const sadmm_world *world, int32_t body)
+static struct joint_lead lead_of(const sadmm_world *world, int32_t body, double dt)
 {
-    return body >= 0 ? joint_lead_of(&world->start.rigid[body], world->velocity + 6 * (size_t)body)
-                     : joint_lead_of(NULL, NULL);
+    return body >= 0 ? joint_lead_of(&world->start.rigid[body], world->velocity + 6 * (size_t)body, dt)
+                     : joint_lead_of(NULL, NULL, dt);
 }
 
 static uint8_t *island_of(const sadmm_world *world, int32_t a, int32_t b)
@@ -22,15 +23,25 @@ static void add_constraint(const sadmm_world *world, const struct sadmm_row_cons
                            const sadmm_settings *settings)
 {
     const struct sadmm_rows *rows = &world->start.rows;
-    const struct joint_lead bodies[2] = {lead_of(world, constraint->body_a), lead_of(world, constraint->body_b)};
+    const struct joint_lead bodies[2] = {lead_of(world, constraint->body_a, settings->dt),
+                                         lead_of(world, constraint->body_b, settings->dt)};
     uint8_t *island = island_of(world, constraint->body_a, constraint->body_b);
     *island |= ISLAND_JOINED;
     for (int32_t k = 0; k < constraint->count; ++k) {
         const size_t r = (size_t)(constraint->first + k);
-        if (joint_limit_jolts(&world->joint_sources[r], rows->lambda[r], rows->jacobian_a + 6 * r,
-                              rows->jacobian_b + 6 * r, bodies, settings))
-            *island |= ISLAND_LEADS_STAY;
+        *island |= (uint8_t)joint_row_touches(&world->joint_sources[r], rows->lambda[r], rows->jacobian_a + 6 * r,
+                                              rows->jacobian_b + 6 * r, bodies, settings);
     }
+}
+
+/* A static pair that leaves its island no motion. */
+static bool holds(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
+{
+    struct arm_sums arms = {0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
+    if (pair->body_a >= 0 && pair->body_b >= 0) return false;
+    for (int32_t p = pair->first; p < pair->first + pair->count; ++p)
+        add_arm(&arms, pair->body_a >= 0 ? contacts->points[p].arm_a : contacts->points[p].arm_b, 1);
+    return momentum_is_held(pair->friction, &arms);
 }
 
 static void find_islands(const sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings)
@@ -43,8 +54,11 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
     for (size_t k = 0; k < contacts->pair_count; ++k) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[k];
         uint8_t *island = island_of(world, pair->body_a, pair->body_b);
-        if (!(*island & ISLAND_JOINED) || *island & ISLAND_LEADS_STAY) continue;
-        const struct joint_lead bodies[2] = {lead_of(world, pair->body_a), lead_of(world, pair->body_b)};
+        if (!(*island & ISLAND_JOINED)) continue;
+        *island |= ISLAND_TOUCHED | (holds(contacts, pair) ? ISLAND_HELD : 0);
+        if (*island & ISLAND_LEADS_STAY) continue;
+        const struct joint_lead bodies[2] = {lead_of(world, pair->body_a, settings->dt),
+                                             lead_of(world, pair->body_b, settings->dt)};
         struct lead_touch touch = {0, {0, 0}};
         for (int32_t p = pair->first; p < pair->first + pair->count; ++p)
             joint_contact_touches(pair->normal, &contacts->points[p],
@@ -75,5 +89,5 @@ sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *s
         world->joints[world->joint_sources[constraint->first].joint].next.leads_stay =
             *island_of(world, constraint->body_a, constraint->body_b) & ISLAND_LEADS_STAY;
     }
-    return SADMM_OK;
+    return sadmm_world_restore_joined(world, settings);
 }

@@ -7,6 +7,7 @@
 #include "core/base/clock.h"
 #include "core/base/memory.h"
 #include "core/solve/registry.h"
+#include "core/model/joint_momentum.h"
 #include "core/model/steady.h"
 #include "world_internal.h"
 
@@ -228,13 +229,21 @@ static void keep_rolling(sadmm_world *world, const struct sadmm_contact_pair *pa
     }
 }
 
+/* Between bodies of an island whose momentum has been restored: it has what such a contact owes already, in sum. */
+static bool is_restored(const sadmm_world *world, const struct sadmm_contact_pair *pair)
+{
+    return world->start.rows.constraint_count > 0 && pair->body_a >= 0 && pair->body_b >= 0 &&
+           joint_island_is_loose(world->joint_touch[world->joint_labels[pair->body_a]]);
+}
+
 static void keep_rolling_contacts(sadmm_world *world, double dt)
 {
     const struct sadmm_contact_set *contacts = &world->contacts;
     if (contacts->migrating == 0) return;
     for (size_t p = 0; p < contacts->pair_count; ++p)
         for (int32_t k = contacts->pairs[p].first; k < contacts->pairs[p].first + contacts->pairs[p].count; ++k)
-            if (contacts->points[k].migrates) keep_rolling(world, &contacts->pairs[p], k, dt);
+            if (contacts->points[k].migrates && !is_restored(world, &contacts->pairs[p]))
+                keep_rolling(world, &contacts->pairs[p], k, dt);
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_rigid *next = &world->next[i];
         rolling_moved(world->start.rigid[i].position, next->position, next->owed);

@@ -73,7 +73,8 @@ void sadmm_world_destroy(sadmm_world *world)
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; ++i) sadmm_pair_table_free(pairs[i]);
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->block_shapes,
                       world->shape_links, world->filtered_pairs, world->joints, world->couplings, world->gears,
-                      world->joint_sources, world->joint_labels, world->joint_touch, world->joint_constraints,
+                      world->joint_sources, world->joint_labels, world->joint_touch, world->joint_number,
+                      world->joint_momentum, world->joint_constraints,
                       world->start.multiplier, world->last_start.multiplier,
                       world->collision_bodies, world->start.rigid, world->start.velocity,
                       world->start.impulse, world->last_start.rigid, world->last_start.velocity,

@@ -5,7 +5,8 @@
  *   gather                           what a step reads
  *   coupling_step                    what couplings keep from step to step
  *   joint_act                        a joint in a step
- *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
+ *   gear_rows, joint_rows            gears and joints as constraint rows
+ *   joint_momentum, joint_move       where joints let bodies go, with what momentum
  *   resident_joints, resident_driven, resident   where a backend keeps the world
  *   query_scene                      what queries look at
  *   shape_form, shape, mass, joint, coupling, gear, body, contacts,
@@ -196,7 +197,10 @@ struct sadmm_world {
     size_t joint_constraint_count, joint_constraint_capacity;
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
     uint8_t *joint_touch;                     /* of islands, at their labels (joint_move.c) */
-    size_t joint_source_capacity, joint_label_capacity, joint_touch_capacity;
+    int32_t *joint_number;                    /* of bodies of islands whose momentum is restored (joint_momentum.c) */
+    struct joint_momentum *joint_momentum;    /* at these numbers */
+    size_t joint_source_capacity, joint_label_capacity, joint_touch_capacity, joint_number_capacity,
+        joint_momentum_capacity;
     int32_t joints_acting, couplings_acting;  /* in the step at hand */
 
     /* The last step: everything freeze, contacts and the next warm start need. */
@@ -376,6 +380,11 @@ void sadmm_world_commit_joints(sadmm_world *world);
 
 /* Bodies of islands with joints as they are after the step, in the place of what the backend made of them. */
 sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *settings);
+
+/* ---- joint_momentum.c ---- */
+
+/* In `next`: islands with joints that contacts touch, once they have been moved. */
+sadmm_status sadmm_world_restore_joined(sadmm_world *world, const sadmm_settings *settings);
 
 /* ---- report.c ---- */
 

@@ -1,0 +1,168 @@
+/* Momentum and energy of islands with joints (core/model/joint_momentum.h) on the device. A thread block an island, once
+ * it is known where its joints let it go: what each body adds, then sums over the bodies, in the order of the host
+ * (core/world/joint_momentum.c). Bodies get what restores it where they are moved (move_joined.h). */
+#include <algorithm>
+
+#include "backend_cuda/device/double.h"
+
+#include "core/model/joined.h"
+#include "core/model/joint_momentum.h"
+#include "move.h"
+#include "world.h"
+
+enum { ISLAND_THREADS = 128, ISLAND_BLOCKS = 1024 };
+
+/* Its bodies, ascending. part: where joints are apart (device/step.h), else NULL. */
+struct joint_island {
+    int32_t label, count;
+    const int32_t *body;
+    const struct joined_structure *part;
+    int32_t bits; /* core/model/joint_lead.h */
+};
+
+static __device__ __forceinline__ bool is_static(const struct sadmm_contact_pair *pair)
+{
+    return pair->body_a < 0 || pair->body_b < 0;
+}
+
+static __device__ __forceinline__ bool holds(const cuda_view &v, int32_t body)
+{
+    const int32_t slot = v.graph.slot_of[body];
+    for (int32_t at = v.graph.offsets[slot]; at < v.graph.offsets[slot + 1]; ++at) {
+        const int32_t code = v.graph.incident[at];
+        if (code / 2 >= v.contacts.pair_capacity) break; /* rows come last */
+        const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];
+        struct arm_sums arms = {};
+        if (!is_static(pair)) continue;
+        for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
+            add_arm(&arms, code & 1 ? v.raw.points[k].arm_b : v.raw.points[k].arm_a, 1);
+        if (momentum_is_held(pair->friction, &arms)) return true;
+    }
+    return false;
+}
+
+static __device__ __forceinline__ void add_static_rows(const cuda_view &v, int32_t constraint, int side,
+                                                       const struct sadmm_rigid *body, const double origin[3],
+                                                       double dt, struct joint_momentum *sums)
+{
+    const struct sadmm_row_constraint *rows = &v.raw.constraints[constraint];
+    if (rows->body_a >= 0 && rows->body_b >= 0) return;
+    for (int32_t r = 0; r < rows->count; ++r) {
+        const size_t slot = (size_t)constraint * SADMM_MAX_ROWS + (size_t)r;
+        joint_add_static_row(sums, v.raw.rows[slot].jacobian[side], v.joints.solution[slot], body, origin, dt);
+    }
+}
+
+/* By the layout of the step: pairs, then rows, both ascending. */
+static __device__ __forceinline__ void add_sides(const cuda_view &v, int32_t i, const struct sadmm_rigid *body,
+                                                 const double origin[3], double dt, struct joint_momentum *sums)
+{
+    const int32_t slot = v.graph.slot_of[i];
+    for (int32_t at = v.graph.offsets[slot]; at < v.graph.offsets[slot + 1]; ++at) {
+        const int32_t code = v.graph.incident[at], side = code & 1, p = code / 2;
+        if (p >= v.contacts.pair_capacity) {
+            add_static_rows(v, p - v.contacts.pair_capacity, side, body, origin, dt, sums);
+            continue;
+        }
+        const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
+        if (!is_static(pair)) continue;
+        for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
+            joint_add_static_point(sums, pair->normal, pair->friction, body,
+                                   side ? v.raw.points[k].arm_b : v.raw.points[k].arm_a, origin, dt);
+    }
+}
+
+/* By the part, where there are no contacts: rows, the next one each time. */
+static __device__ __forceinline__ void add_part_rows(const cuda_view &v, const struct joined_structure *part, int32_t i,
+                                                     const struct sadmm_rigid *body, const double origin[3], double dt,
+                                                     struct joint_momentum *sums)
+{
+    const int32_t e = v.joints.entry[i], first = part->first_around[e], end = part->first_around[e + 1];
+    for (int32_t last = -1;;) {
+        int32_t next = INT32_MAX, side = 0;
+        for (int32_t at = first; at < end; ++at) {
+            const int32_t constraint = part->constraint[part->around[at] / 2];
+            if (constraint > last && constraint < next) next = constraint, side = part->around[at] % 2;
+        }
+        if (next == INT32_MAX) return;
+        add_static_rows(v, next, side, body, origin, dt, sums);
+        last = next;
+    }
+}
+
+static __device__ __noinline__ void store_body(const cuda_view &v, const struct joint_island &island, int32_t i)
+{
+    const struct sadmm_rigid *body = &v.step.before[i];
+    const double *origin = v.step.before[island.label].position;
+    const struct sadmm_settings settings = *v.model.settings;
+    struct joint_momentum sums = {};
+    double velocity[6], place[PLACE];
+    if (island.part) add_part_rows(v, island.part, i, body, origin, settings.dt, &sums);
+    else add_sides(v, i, body, origin, settings.dt, &sums);
+    if (v.joints.is_direct[i])
+        for (int k = 0; k < 6; ++k) velocity[k] = v.joints.velocity[6 * (size_t)i + (size_t)k];
+    else load_end_velocity(v, i, velocity);
+    joint_move(body, velocity, island.bits & ISLAND_LEADS_STAY, settings.dt, place, place + 3, place + 7);
+    joint_add_momentum(&sums, body, place, place + 3, place + 7, origin, &settings);
+    v.joints.momentum[i] = sums;
+}
+
+/* Every thread of the block comes here. */
+static __device__ __forceinline__ void restore_island(const cuda_view &v, const struct joint_island &island)
+{
+    static_assert(offsetof(struct joint_momentum, factor) == JOINT_MOMENTUM_SUMS * sizeof(double),
+                  "numbers are added one by one");
+    const int32_t t = (int32_t)threadIdx.x;
+    double *to = (double *)&v.joints.momentum[island.label];
+    __syncthreads(); /* all have seen its bits */
+    for (int32_t k = t; k < island.count && !island.part; k += ISLAND_THREADS)
+        if (holds(v, island.body[k])) atomicOr(&v.joints.touch[island.label], ISLAND_HELD);
+    __syncthreads();
+    if (__ldcg(&v.joints.touch[island.label]) & ISLAND_HELD) return;
+    for (int32_t k = t; k < island.count; k += ISLAND_THREADS) store_body(v, island, island.body[k]);
+    __syncthreads();
+    for (int32_t n = t; n < JOINT_MOMENTUM_SUMS; n += ISLAND_THREADS) {
+        double sum = to[n];
+        for (int32_t k = 1; k < island.count; ++k) sum += ((const double *)&v.joints.momentum[island.body[k]])[n];
+        to[n] = sum;
+    }
+    __syncthreads();
+    if (t > 0) return;
+    joint_restoring(&v.joints.momentum[island.label], island.bits, v.model.settings->dt);
+    v.joints.touch[island.label] |= ISLAND_RESTORED;
+}
+
+/* args.count: parts, where joints are apart. */
+static __global__ void __launch_bounds__(ISLAND_THREADS)
+    joint_momentum_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    follow_if(all_early(v.model.bodies));
+    if (v.model.live->abort_code) return;
+    const int32_t count = v.joints.apart ? args.count : v.model.bodies;
+    for (int32_t k = (int32_t)blockIdx.x; k < count; k += (int32_t)gridDim.x) {
+        struct joint_island island = {k, 0, nullptr, nullptr, 0};
+        struct joined_structure structure = {};
+        if (v.joints.apart) {
+            const struct cuda_joined_part part = v.joints.parts[k];
+            structure = joined_structure_at(v.joints.structures + part.first_number);
+            island.label = part.label - 1;
+            island.count = part.body_count;
+            island.body = v.joints.members + part.first_body;
+            island.part = &structure;
+        } else if (v.graph.label[k] == k) {
+            island.count = v.graph.island_bodies[k];
+            island.body = v.graph.body_of + v.graph.slot_of[k];
+        }
+        island.bits = v.joints.touch[island.label];
+        if (island.count > 0 && joint_island_is_loose(island.bits)) restore_island(v, island);
+    }
+}
+
+sadmm_status CUDA(launch_joint_momentum)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.count = c->step->joined_parts;
+    const int64_t islands = c->view.joints.apart ? args.count : c->view.model.bodies;
+    return CUDA(launch_of)(c, joint_momentum_kernel, "momentum of joints",
+                           std::min<int64_t>(islands, ISLAND_BLOCKS), ISLAND_THREADS, &args, error);
+}

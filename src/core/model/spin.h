@@ -1,0 +1,90 @@
+/* How a step turns a body (docs/algorithm.md, sections 6 and 9): half a step of motion without torque, then everything
+ * that acts on it, then half a step without torque again. A and b of eq. (1), rows of joints and the solution are those
+ * of the orientation halfway: torques change the angular momentum in space by dt times themselves, what is between keeps
+ * it, and no gyroscopic term is left. Where all principal moments are equal, spin and A do not depend on the orientation,
+ * and it is turned at the end, by one velocity. In double. */
+#ifndef SADMM_CORE_MODEL_SPIN_H
+#define SADMM_CORE_MODEL_SPIN_H
+
+#include "core/math/rigid.h"
+#include "system.h"
+
+#ifndef SADMM_REAL_IS_DOUBLE
+#error "spin.h is double only: do not include it in a source compiled per precision"
+#endif
+
+SADMM_INLINE struct rigid_spin spin_start(const struct sadmm_rigid *body)
+{
+    const struct rigid_spin start = {q_load(body->orientation), v3_load(body->velocity + 3)};
+    return start;
+}
+
+/* Halfway, before anything acts on it. */
+SADMM_INLINE struct rigid_spin spin_halfway(const struct sadmm_rigid *body, double dt)
+{
+    return rigid_drift(spin_start(body), v3_load(body->inertia), dt / 2);
+}
+
+/* The same for what A and b are of: where moments are equal, the start. */
+SADMM_INLINE struct rigid_spin spin_of_system(const struct sadmm_rigid *body, double dt)
+{
+    const struct rigid_spin start = spin_start(body);
+    return rigid_is_isotropic(v3_load(body->inertia)) ? start : rigid_tumble(start, v3_load(body->inertia), dt / 2);
+}
+
+/* Velocities of the start with the spin halfway, to first order, which is enough to compare a solution with (leads). */
+SADMM_INLINE void spin_before(const struct sadmm_rigid *body, double dt, double before[6])
+{
+    const vec3 inertia = v3_load(body->inertia), spin = v3_load(body->velocity + 3);
+    int k;
+    for (k = 0; k < 6; ++k) before[k] = body->velocity[k];
+    if (rigid_is_isotropic(inertia) || v3_max_abs(spin) == 0) return;
+    const quat q = q_load(body->orientation);
+    const vec3 torque = v3_cross(rigid_angular_momentum(q, inertia, spin), spin);
+    v3_store(v3_madd(spin, dt / 2, rigid_angular_velocity(q, inertia, torque)), before + 3);
+}
+
+/* Where a body whose moments differ gets to: on from halfway by the spin that the step has left it with. */
+SADMM_RARE struct rigid_spin spin_end(const struct sadmm_rigid *body, quat halfway, const double spin[3], double dt)
+{
+    const struct rigid_spin from = {halfway, v3_load(spin)};
+    return rigid_tumble(from, v3_load(body->inertia), dt / 2);
+}
+
+/* The same where it keeps its lead (math/lead.h): it has turned by that spin since the step began, as its contacts have
+ * been told. Its motion in its own frame is the one that ends at `end`, and so is its energy; but as it did not turn like
+ * that before, its angular momentum turns with it, by dt times the lead. */
+SADMM_INLINE struct rigid_spin spin_end_whole(const struct sadmm_rigid *body, const double spin[3],
+                                              struct rigid_spin end, double dt)
+{
+    const vec3 own = m3_tmul(q_matrix(end.orientation), end.angular);
+    end.orientation = rigid_turn(q_load(body->orientation), v3_load(spin), dt);
+    end.angular = m3_mul(q_matrix(end.orientation), own);
+    return end;
+}
+
+/* The pose and the velocity that the solution v leaves it with. mean: what it is moved by, and turned, where moments are
+ * equal; halfway: its orientation then, where they differ; whole: it keeps its lead. */
+SADMM_INLINE void spin_move_from(const struct sadmm_rigid *body, quat halfway, const double v[6], const double mean[6],
+                                 bool whole, double dt, double position[3], double orientation[4], double velocity[6])
+{
+    int k;
+    v3_store(rigid_move(v3_load(body->position), v3_load(mean), dt), position);
+    for (k = 0; k < 6; ++k) velocity[k] = v[k];
+    if (rigid_is_isotropic(v3_load(body->inertia))) {
+        q_store(rigid_turn(q_load(body->orientation), v3_load(mean + 3), dt), orientation);
+    } else {
+        struct rigid_spin end = spin_end(body, halfway, v + 3, dt);
+        if (whole) end = spin_end_whole(body, v + 3, end, dt);
+        q_store(end.orientation, orientation);
+        v3_store(end.angular, velocity + 3);
+    }
+}
+
+SADMM_INLINE void spin_move(const struct sadmm_rigid *body, const double v[6], const double mean[6], bool whole,
+                            double dt, double position[3], double orientation[4], double velocity[6])
+{
+    spin_move_from(body, spin_of_system(body, dt).orientation, v, mean, whole, dt, position, orientation, velocity);
+}
+
+#endif
