@@ -15,7 +15,7 @@
 #endif
 
 /* Its inertia with dt^2 / 2 times its stiffness (rolling.h); b along with it: what is added resists changes alone. */
-SADMM_RARE sym3 sadmm_stiffened(const struct sadmm_rigid *body, double dt, sym3 I, double b[6])
+SADMM_INLINE sym3 sadmm_stiffened(const struct sadmm_rigid *body, double dt, sym3 I, double b[6])
 {
     const double *k = body->stiffness, s = dt * dt / 2;
     const sym3 more = {s * k[0], s * k[1], s * k[2], s * k[3], s * k[4], s * k[5]};
@@ -39,7 +39,7 @@ SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct 
         b[k] = body->mass * (linear.keep * body->velocity[k] + gained) + dt * body->wrench[k];
     }
     v3_store(v3_madd(v3_scale(momentum, angular.keep), dt, v3_load(body->wrench + 3)), b + 3);
-    for (int k = 0; k < 6; ++k) b[k] += body->owed[k];
+    rolling_pay(body, b);
     *mass = linear.mass * body->mass;
     const sym3 I = rigid_world_inertia(q_matrix(q), v3_scale(inertia, angular.mass));
     return rolling_is_stiff(body) ? sadmm_stiffened(body, dt, I, b) : I;

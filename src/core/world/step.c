@@ -222,6 +222,7 @@ static void keep_rolling(sadmm_world *world, const struct sadmm_contact_pair *pa
         if (body[s] < 0) continue;
         struct sadmm_rigid *next = &world->next[body[s]];
         const double *arm = s ? point->arm_b : point->arm_a;
+        rolling_begin(next);
         rolling_owe(pair->normal, arm, at.normal, s ? at.arm_b : at.arm_a, point->impulse, s ? 1 : -1, next->owed);
         rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->gap), migration->radius, push, dt,
                         next->stiffness);
@@ -237,8 +238,7 @@ static void keep_rolling_contacts(sadmm_world *world, double dt)
             if (contacts->points[k].migrates) keep_rolling(world, &contacts->pairs[p], k, dt);
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_rigid *next = &world->next[i];
-        rolling_moved(world->start.rigid[i].position, next->position, next->owed);
-        rolling_judge(next->inertia, dt, next->stiffness);
+        if (next->rolls) rolling_keep(next, world->start.rigid[i].position, dt, next->owed, next->stiffness);
     }
 }
 
