@@ -183,7 +183,8 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
                           (real)start.limit, cache, &m);
         m.ahead = start.ahead;
         if (pair_asks_balls(pa, pb, input->hulls, (uint32_t)triangle, &start, input->gravity, input->dt, &m))
-            inner_balls_add(pa, pb, input->hulls, (uint32_t)triangle, cache != 0, input->gravity, input->dt, &m);
+            inner_balls_add(pa, pb, input->hulls, (uint32_t)triangle, cache != 0, start.touch, input->gravity,
+                            input->dt, &m);
         if (!keep_triangle(n, a, b, (uint32_t)triangle, &m, before, beside)) return false;
     }
     return true;
