@@ -484,10 +484,11 @@ START_TEST(an_isolated_collision_keeps_momentum)
     double met = 0;
     for (int i = 0; i < 100; ++i) {
         step_world(world, 1);
-        sadmm_contact contact;
-        if (world_report(world).contacts == 0) continue;
-        MUST(world, sadmm_world_contacts(world, 0, 1, &contact));
-        met = fmax(met, norm3(contact.impulse));
+        for (int32_t k = 0; k < sadmm_world_contact_count(world); ++k) {
+            sadmm_contact contact;
+            MUST(world, sadmm_world_contacts(world, k, 1, &contact));
+            met = fmax(met, norm3(contact.impulse));
+        }
     }
     struct momenta after = momenta_of(world);
     ck_assert_double_gt(met, 0.1); /* they did collide */
@@ -506,6 +507,7 @@ START_TEST(a_sphere_leaves_the_ground_with_its_restitution)
 {
     const double restitution = 0.25 * (_i % 5);
     struct sadmm_scene scene = open_scene("bounce");
+    scene.def.settings.hits = 0; /* the solve's bounce: test_hits.c has the one at its moment */
     sadmm_world *world = solver_scene(_i / 5, &scene);
     sadmm_body_id id = body_at(world, 1 + _i % 5); /* after the ground */
     const double fall = sqrt(2 * g * 1.0), dt = scene.def.settings.dt;

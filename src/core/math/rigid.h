@@ -47,7 +47,7 @@ SADMM_INLINE vec3 m3_solve(mat3 m, vec3 r)
  * step is cut so that no piece turns more than half a radian, where Newton converges to rounding in a few steps. */
 SADMM_INLINE vec3 rigid_gyroscopic(vec3 inertia, vec3 w, real dt)
 {
-    real turn = v3_norm(w) * dt;
+    real turn = v3_norm(w) * real_abs(dt);
     int pieces = turn > (real)0.5 ? (int)real_min(turn * 2 + 1, (real)4096) : 1;
     real h = dt / (real)pieces;
     int p, k;

@@ -83,6 +83,7 @@ void sadmm_archive_settings(struct sadmm_archive *archive, sadmm_settings *s)
     SADMM_ARCHIVE(archive, s->slop);
     SADMM_ARCHIVE(archive, s->correction_speed);
     SADMM_ARCHIVE(archive, s->restitution_threshold);
+    SADMM_ARCHIVE(archive, s->hits);
     SADMM_ARCHIVE(archive, s->threads);
     if (archive->reading && archive->status == SADMM_OK)
         sadmm_archive_expect(archive, sadmm_settings_validate(s, archive->error) == SADMM_OK, "settings");

@@ -30,6 +30,7 @@ static sadmm_status find_contacts(sadmm_world *world, int substep)
 {
     struct sadmm_collision_input input = sadmm_world_collision_input(world, substep);
     input.team = &world->team;
+    world->hit_since = NULL;
     return (substep > 0 ? sadmm_collision_find_again : sadmm_collision_find)(world->collision, &input,
                                                                              &world->contacts, &world->error);
 }
@@ -275,6 +276,7 @@ static sadmm_status find_wrenches(const struct host_step *step)
     for (size_t i = 0; i < (size_t)world->dynamic_count; ++i)
         for (int k = 0; k < 6; ++k)
             world->wrench[6 * i + (size_t)k] += rolling_wrench(&world->start.rigid[i], step->settings.dt, k);
+    sadmm_world_add_hit_wrenches(world, &step->settings);
     return SADMM_OK;
 }
 
@@ -283,7 +285,11 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     sadmm_world *world = step->world;
     switch (stage->kind) {
     case SADMM_STAGE_GATHER: return sadmm_world_gather(world);
-    case SADMM_STAGE_FIND: return find_contacts(world, step->stages.substep);
+    case SADMM_STAGE_FIND:
+        TRY(sadmm_world_take_hits(world, step->stages.substep));
+        TRY(find_contacts(world, step->stages.substep));
+        sadmm_world_open_gaps(world);
+        return SADMM_OK;
     case SADMM_STAGE_PLAN: return make_plan(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
     case SADMM_STAGE_WRENCHES: return find_wrenches(step);
