@@ -111,7 +111,9 @@ typedef struct sadmm_settings {
     bool certify;                /* report the certificate of every step (of its last sub-step); default false */
     bool recover_wrenches;       /* compute the contact wrench of every body; default true */
 
-    double baumgarte;            /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2 */
+    double baumgarte;            /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2. Bodies
+                                    are moved by it and get no velocity that stays (docs/algorithm.md, section 6), but
+                                    on CUDA and in islands with joints */
     double slop;                 /* penetration left alone, m, in [0, 1]; default 1e-5 */
     double correction_speed;     /* cap of the corrective speed of contacts along their normals, m/s, and of joints
                                     along each coordinate, m/s or rad/s; in [0, 1e3]; default 1 */

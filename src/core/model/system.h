@@ -64,6 +64,7 @@ struct sadmm_system {
     bool errors_given;               /* points carry e (problem level) instead of a gap */
     bool first;                      /* no step came before: where there are no impulses, none are known */
     struct sadmm_rows *rows;         /* constraints given by Jacobian rows; NULL: none */
+    const int32_t *islands;          /* (body_count) as sadmm_islands finds them; NULL: not known yet */
 };
 
 /* Constraints given by rows. */

@@ -243,7 +243,8 @@ SADMM_INLINE double sadmm_contact_e_plain(const struct sadmm_system *system, con
 {
     return system->errors_given ? point->error
                                 : contact_error(point->gap, settings->dt, settings->baumgarte, settings->slop,
-                                                settings->correction_speed);
+                                                settings->correction_speed) +
+                                      point->error;
 }
 
 /* e of a pair's k-th point. `points`: the pair's. */

@@ -155,6 +155,7 @@ struct host_step {
     bool unconverged;      /* one of them has not met a stop rule */
     int32_t limited;       /* islands, most of any */
     int32_t direct;        /* islands solved directly in this sub-step */
+    int32_t pushed;        /* bodies moved out of overlaps in this sub-step */
     int64_t islands_above; /* likewise, but of the last sub-step; -1: no stop rule */
     double ms[SADMM_PHASE_COUNT];
 };
@@ -182,6 +183,27 @@ static sadmm_status solve_direct(struct host_step *step)
                               &step->direct, &world->error);
 }
 
+/* Which islands are pushed apart without a velocity (core/solve/push.h). */
+static sadmm_status choose_pushes(struct host_step *step, double depth)
+{
+    sadmm_world *world = step->world;
+    step->pushed = 0;
+    /* a backend that makes steps by itself has pushes in velocities, and the host is to make the same ones */
+    if (depth <= step->settings.slop || world->kernels->resident) return SADMM_OK;
+    if (!world->push) world->push = sadmm_push_create();
+    if (!world->push) return sadmm_fail_memory(&world->error, "bodies that overlap");
+    TRY(sadmm_push_choose(world->push, &step->system, &step->settings, world->plan.threads, &world->error));
+    step->pushed = sadmm_push_count(world->push);
+    return SADMM_OK;
+}
+
+static sadmm_status solve_pushes(struct host_step *step)
+{
+    if (step->pushed == 0) return SADMM_OK;
+    return sadmm_push_solve(step->world->push, step->world->kernels, &step->system, &step->settings,
+                            &step->world->error);
+}
+
 static sadmm_status make_plan(struct host_step *step)
 {
     sadmm_world *world = step->world;
@@ -194,6 +216,7 @@ static sadmm_status make_plan(struct host_step *step)
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
     TRY(keep_start(world, &depth));
+    TRY(choose_pushes(step, depth));
     if (world->joined) sadmm_joined_begin(world->joined);
     if (world->plan.warm_start) TRY(solve_joined(step, false));
     step->depth = depth > step->depth ? depth : step->depth;
@@ -262,6 +285,7 @@ static sadmm_status integrate(struct host_step *step)
     }
     TRY(sadmm_world_move_driven(world, &step->settings));
     sadmm_world_move_targets(world, step->settings.dt);
+    if (step->pushed > 0) sadmm_push_move(world->push, step->settings.dt, world->next);
     keep_rolling_contacts(world, step->settings.dt);
     add_substep(step);
     return check_next(world);
@@ -291,6 +315,7 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
         sadmm_world_open_gaps(world);
         return SADMM_OK;
     case SADMM_STAGE_PLAN: return make_plan(step);
+    case SADMM_STAGE_SOLUTION: TRY(solve_stage(step, stage)); return solve_pushes(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
     case SADMM_STAGE_WRENCHES: return find_wrenches(step);
     case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;

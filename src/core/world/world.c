@@ -59,6 +59,7 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_certificate_workspace_free(&world->certificate_workspace);
     sadmm_joined_destroy(world->joined);
     sadmm_direct_destroy(world->direct);
+    sadmm_push_destroy(world->push);
     sadmm_rows_free(&world->start.rows);
     sadmm_rows_free(&world->last_start.rows);
     for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);

@@ -30,6 +30,7 @@
 #include "core/solve/certificate.h"
 #include "core/solve/direct.h"
 #include "core/solve/joined.h"
+#include "core/solve/push.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
 #include "links.h"
@@ -307,6 +308,7 @@ struct sadmm_world {
     int64_t certified_step; /* the step that the workspace's contacts are of, as report.step counts; -1: of none */
     struct sadmm_joined *joined; /* made with the first joint */
     struct sadmm_direct *direct; /* made with the first island that is solved directly */
+    struct sadmm_push *push;     /* made with the first overlap */
     sadmm_step_report report;
 };
 
