@@ -1,5 +1,5 @@
-/* Impacts: what restitution gives, and that it never gives energy; masses and levers that are far apart. By both
- * methods, on every CPU backend here, on CUDA in test_cuda_impacts.c (IMPACTS_ON_CUDA), which includes this file.
+/* Impacts that are left to the solve: what restitution gives, and that it never gives energy; masses and levers that are
+ * far apart. Hits at their moment: test_hits.c. By both methods, on every CPU backend here, on CUDA in test_cuda_impacts.c (IMPACTS_ON_CUDA), which includes this file.
  */
 #ifdef IMPACTS_ON_CUDA
 #include "cuda_worlds.h"
@@ -31,6 +31,7 @@ static sadmm_world *world_in(int solver, sadmm_precision precision, double dt, i
     def.settings.dt = dt;
     def.settings.iterations = iterations;
     def.settings.threads = 1;
+    def.settings.hits = 0;
     if (!gravity) memset(def.settings.gravity, 0, sizeof def.settings.gravity);
 #ifdef IMPACTS_ON_CUDA
     def.backend = SADMM_BACKEND_CPU;

@@ -50,6 +50,7 @@ static const struct bad_setting {
     REAL(slop, -1e-6, 1.1, NAN, END),
     REAL(correction_speed, -1, 1.1e3, NAN, END),
     REAL(restitution_threshold, -1, NAN, INFINITY, END),
+    INTEGER(hits, -1, 65, END),
     INTEGER(threads, -1, 1025, END),
 };
 
@@ -77,8 +78,8 @@ START_TEST(settings_at_the_ends_of_their_ranges)
     sadmm_settings s = sadmm_settings_default();
     OK(sadmm_settings_validate(&s, NULL));
     s.dt = 1, s.iterations = 1000000, s.penalty_period = 0, s.penalty_mass_factor = 0, s.penalty_offset = 1e15;
-    s.penalty_ratio_limit = 1, s.direct_points = 0, s.check_period = 1, s.baumgarte = 1, s.slop = 0, s.correction_speed = 0,
-    s.threads = 1024;
+    s.penalty_ratio_limit = 1, s.direct_points = 0, s.check_period = 1, s.baumgarte = 1, s.slop = 0,
+    s.correction_speed = 0, s.hits = 64, s.threads = 1024;
     OK(sadmm_settings_validate(&s, NULL));
     s.dt = 1e-6, s.iterations = 1, s.penalty_period = INT_MAX, s.penalty_mass_factor = 1e12, s.penalty_offset = 0;
     s.penalty_ratio_limit = 1e6, s.direct_points = 128, s.check_period = 1000000, s.baumgarte = 0, s.slop = 1, s.correction_speed = 1e3;

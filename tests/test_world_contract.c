@@ -501,7 +501,7 @@ START_TEST(settings_are_compared_by_their_members)
         BOTH(warm_start), BOTH(direct_points);
     BOTH(residual_tolerance), BOTH(certificate_tolerance), BOTH(certificate_momentum_tolerance), BOTH(check_period);
     BOTH(measure_residuals), BOTH(certify), BOTH(recover_wrenches), BOTH(baumgarte), BOTH(slop), BOTH(correction_speed);
-    BOTH(restitution_threshold), BOTH(threads);
+    BOTH(restitution_threshold), BOTH(hits), BOTH(threads);
     ck_assert(memcmp(&a, &b, sizeof a) != 0); /* there is padding */
     ck_assert(sadmm_settings_equal(&a, &b));
     /* Every other byte belongs to a member, and one changed bit of it makes a difference. */

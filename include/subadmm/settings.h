@@ -49,6 +49,9 @@ enum { SADMM_MOST_SUBSTEPS = 64 };
 /* The largest sadmm_settings.direct_points. */
 enum { SADMM_MOST_DIRECT_POINTS = 128 };
 
+/* The largest sadmm_settings.hits. */
+enum { SADMM_MOST_HITS = 64 };
+
 /* Settings of a solve. Start from sadmm_settings_default(); a struct is validated when it is handed over.
  * Symbols are the paper's (Sec. III-D). "kg/s^2" values are the paper's time-scaled units; the solver works
  * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/algorithm.md). */
@@ -108,11 +111,20 @@ typedef struct sadmm_settings {
     bool certify;                /* report the certificate of every step (of its last sub-step); default false */
     bool recover_wrenches;       /* compute the contact wrench of every body; default true */
 
-    double baumgarte;            /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2 */
+    double baumgarte;            /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2. Bodies
+                                    are moved by it and get no velocity that stays (docs/algorithm.md, section 6), but
+                                    on CUDA and in islands with joints */
     double slop;                 /* penetration left alone, m, in [0, 1]; default 1e-5 */
     double correction_speed;     /* cap of the corrective speed of contacts along their normals, m/s, and of joints
                                     along each coordinate, m/s or rad/s; in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
+
+    int hits;                    /* worlds on ref and cpu: bodies in flight that hit something, faster than
+                                    restitution_threshold and with restitution (of either shape), do so at the moment
+                                    of their first touch within the (sub-)step, so many times each at most; one that
+                                    would be hit more often is left to the solve, and so is what rests on something,
+                                    has joints, or hits a mesh (docs/algorithm.md, section 6). In
+                                    [0, SADMM_MOST_HITS = 64]; 0: all is; default 16. CUDA takes it for 0 */
 
     int threads;                 /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have
                                     enough to do, no more than there are processors (0: than OMP_NUM_THREADS, where that

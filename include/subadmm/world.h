@@ -314,7 +314,7 @@ typedef struct sadmm_step_report {
     int32_t bodies;                /* dynamic bodies */
     int32_t joints;                /* joints that took part (joint.h): enabled, with something locked or acting */
     int32_t couplings;             /* couplings that took part (coupling.h): enabled, with gains */
-    int32_t contacts;              /* contact points of the step */
+    int32_t contacts;              /* contact points of the solve; hits taken at their moment are none */
     int32_t pairs;                 /* shape pairs with at least one contact */
     int iterations;                /* done; with a stop rule on CUDA (below): by the island that did most */
     double iterations_mean;        /* over islands. The same, but where whole steps are made on CUDA with a stop rule
@@ -369,7 +369,8 @@ typedef struct sadmm_contact {
  * before it, they are lost with it (0). Waits for steps; the error of one is left for the next call that returns a
  * status. */
 SADMM_API int32_t sadmm_world_contact_count(sadmm_world *world);
-/* Copy contacts [first, first + count) of the last step. Errors: INVALID_ARGUMENT (range), OUT_OF_MEMORY, DEVICE. */
+/* Copy contacts [first, first + count) of the last step. Hits taken at their moment (settings.hits) are the last ones, a
+ * point each, with a gap of 0 and the impulse of the hit. Errors: INVALID_ARGUMENT (range), OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts);
 /* Of the same contacts the natural map, m/s (docs/algorithm.md, section 5): how far each is from its law. The largest
  * of them and of the joints' is the certificate's ncp_max. Errors: INVALID_ARGUMENT (range), UNAVAILABLE (the last step

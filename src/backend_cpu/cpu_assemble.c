@@ -162,7 +162,7 @@ static void assemble_errors(struct sadmm_context *c, const struct pair_block *bl
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
     const struct sadmm_settings settings = c->settings;
-    double errors[SADMM_MAX_POINTS][LANES];
+    double errors[SADMM_MAX_POINTS][LANES], held[SADMM_MAX_POINTS][LANES]; /* what is added to the former */
     int32_t count[LANES];
     for (int l = 0; l < LANES; ++l) {
         const struct sadmm_contact_pair *pair = block->pair[l] >= 0 ? &contacts->pairs[block->pair[l]] : NULL;
@@ -170,13 +170,15 @@ static void assemble_errors(struct sadmm_context *c, const struct pair_block *bl
         for (int k = 0; k < count[l]; ++k) {
             const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
             errors[k][l] = c->system->errors_given ? point->error : point->gap;
+            held[k][l] = point->error;
         }
-        for (int k = count[l]; k < block->slots; ++k) errors[k][l] = 0;
+        for (int k = count[l]; k < block->slots; ++k) errors[k][l] = held[k][l] = 0;
     }
     for (int k = 0; k < block->slots && !c->system->errors_given; ++k)
         for (int l = 0; l < LANES; ++l)
             errors[k][l] = contact_error(errors[k][l], settings.dt, settings.baumgarte, settings.slop,
-                                         settings.correction_speed);
+                                         settings.correction_speed) +
+                           held[k][l];
     for (int l = 0; l < LANES; ++l)
         if (count[l] > 0 && sadmm_pair_bounces(c->system, &contacts->pairs[block->pair[l]]))
             bounce(c, &contacts->pairs[block->pair[l]], l, errors);

@@ -249,6 +249,7 @@ static int run(int argc, char **argv)
     if ((code = cli_open_scene(spec, &scene)) != CLI_DONE) return code;
     if (o.method_given) sadmm_scene_set_method(&scene, o.method);
     if (o.iterations > 0) scene.def.settings.iterations = (int)o.iterations;
+    scene.def.settings.hits = 0; /* CUDA has none, and what is compared is solved */
     interrupts_expect();
     cli_protect_scene(spec);
     code = cli_open_json(o.json, &json);
@@ -263,7 +264,7 @@ const struct cli_command cli_check = {
     .summary = "compare every backend and precision with the literal one on a scene",
     .text =
         "Run: each table simulates the scene on its own. One step: contact problems of the literal run are frozen and\n"
-        "solved by each table with equal iterations. Kernels: the same with one. "
+        "solved by each table with equal iterations. Kernels: the same with one. Hits are left to the solve (settings.hits = 0).\n"
         "Exit status 1 when a difference exceeds its tolerance.\n",
     .options = options,
     .option_count = sizeof options / sizeof *options,

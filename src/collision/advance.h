@@ -128,6 +128,26 @@ SADMM_RARE real pieces_apart(const struct sadmm_geometry *a, const struct sadmm_
     return convex_separation(&pair, *normal) - pair.slack;
 }
 
+/* Of a ball and a triangle, in the frame of the mesh: between nearest points. */
+SADMM_INLINE real ball_from_triangle(real radius, vec3 centre, const double *hulls, const struct sadmm_geometry *b,
+                                     uint32_t child, vec3 *normal)
+{
+    struct gjk_simplex simplex;
+    struct mesh mesh;
+    int32_t corner[3], opposite[3];
+    vec3 v;
+    real length;
+    int k;
+    mesh_at(hulls, b->hull, &mesh);
+    mesh_corners(&mesh, (int32_t)child, corner, opposite);
+    simplex.count = 3;
+    for (k = 0; k < 3; ++k) simplex.p[k].w = v3_sub(mesh_vertex(&mesh, corner[k]), centre);
+    v = closest_on_triangle(&simplex);
+    length = v3_norm(v);
+    *normal = length > 0 ? v3_scale(v, 1 / length) : v3(0, 0, 1);
+    return length - radius;
+}
+
 /* No less than this are the two shapes apart, along the normal (from a to b, in the frame of b). child: of a mesh b. */
 SADMM_INLINE real shapes_apart(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
                                uint32_t child, const struct pair_pose *pose, vec3 *normal)
@@ -135,6 +155,8 @@ SADMM_INLINE real shapes_apart(const struct sadmm_geometry *a, const struct sadm
     const vec3 t = r3_vec3(pose->t);
     mat3 R;
     int k;
+    if (hulls && a->type == SADMM_SHAPE_SPHERE && b->type == SADMM_SHAPE_MESH)
+        return ball_from_triangle((real)a->size[0], t, hulls, b, child, normal);
     if (hulls && a->type != SADMM_SHAPE_PLANE && b->type > SADMM_SHAPE_BOX)
         return pieces_apart(a, b, hulls, child, pose, normal);
     if (a->type == SADMM_SHAPE_BOX) {
@@ -186,14 +208,15 @@ struct first_touch {
     bool missed;  /* nothing touches before the end of the step */
 };
 
-/* child: of a mesh b. */
+/* child: of a mesh b. from: when they do not touch yet, s. */
 SADMM_INLINE struct first_touch first_touch_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                               const double *hulls, uint32_t child, double gravity, double dt)
+                                               const double *hulls, uint32_t child, double from, double gravity,
+                                               double dt)
 {
     const double touch = ADVANCE_TOUCH * smaller_of(a->thin, b->thin),
                  falls = (fall_of(gravity, dt) + a->fall + b->fall) / dt, lever_a = proxy_lever(a),
                  lever_b = proxy_lever(b);
-    struct first_touch first = {0, false};
+    struct first_touch first = {from, false};
     struct sadmm_proxy turned;
     double normal[3];
     int move, k;
@@ -219,21 +242,24 @@ SADMM_INLINE struct first_touch first_touch_of(const struct sadmm_proxy *a, cons
 }
 
 SADMM_RARE struct first_touch first_touch_pooled(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                                 const double *hulls, uint32_t child, double gravity, double dt)
+                                                 const double *hulls, uint32_t child, double from, double gravity,
+                                                 double dt)
 {
-    return first_touch_of(a, b, hulls, child, gravity, dt);
+    return first_touch_of(a, b, hulls, child, from, gravity, dt);
 }
-SADMM_RARE struct first_touch first_touch_plain(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+SADMM_RARE struct first_touch first_touch_plain(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double from,
                                                 double gravity, double dt)
 {
-    return first_touch_of(a, b, NULL, 0, gravity, dt);
+    return first_touch_of(a, b, NULL, 0, from, gravity, dt);
 }
 
 /* hulls: NULL where a compiler is to leave out what needs the pool. */
 SADMM_INLINE struct first_touch pair_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                                 const double *hulls, uint32_t child, double gravity, double dt)
+                                                 const double *hulls, uint32_t child, double from, double gravity,
+                                                 double dt)
 {
-    return hulls ? first_touch_pooled(a, b, hulls, child, gravity, dt) : first_touch_plain(a, b, gravity, dt);
+    return hulls ? first_touch_pooled(a, b, hulls, child, from, gravity, dt)
+                 : first_touch_plain(a, b, from, gravity, dt);
 }
 
 #endif

@@ -66,21 +66,6 @@ static void update_share(void *argument, int thread, int threads)
     update->candidates->kernels->place_slots(update->candidates, update->input, begin, end, update->renew);
 }
 
-/* Things that do not change while the shapes stay what they are. */
-static bool may_meet(const struct sadmm_collision_input *input, uint32_t a, uint32_t b)
-{
-    const struct sadmm_shape *sa = &input->shapes[a], *sb = &input->shapes[b];
-    return sa->body != sb->body && (sa->category & sb->mask) && (sb->category & sa->mask);
-}
-
-static uint64_t ordered(const struct sadmm_candidates *c, uint64_t key)
-{
-    uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
-    const int rank_low = geometry_rank(c->proxies[low].geometry.type),
-              rank_high = geometry_rank(c->proxies[high].geometry.type);
-    return rank_high < rank_low ? ordered_key(high, low) : key;
-}
-
 /* Keys to order (slot of a, slot of b); slots need few bits, so squeeze them together for the sort. */
 static bool sort_pairs(struct sadmm_pair_list *list, struct sadmm_pair_list *scratch, size_t slots)
 {
@@ -145,7 +130,8 @@ static bool finish_found(struct sadmm_candidates *c, const struct sadmm_collisio
     size_t n = 0;
     for (size_t i = 0; i < c->found.count; ++i) {
         uint64_t key = c->found.keys[i];
-        if (may_meet(input, (uint32_t)(key >> 32), (uint32_t)key)) c->found.keys[n++] = ordered(c, key);
+        if (sadmm_pair_may_meet(input, (uint32_t)(key >> 32), (uint32_t)key))
+            c->found.keys[n++] = sadmm_pair_in_order(c, key);
     }
     c->found.count = n;
     if (!sort_pairs(&c->found, &c->merged, c->slot_count)) return false;

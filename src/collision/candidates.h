@@ -12,6 +12,7 @@
 
 #include "broad_phase.h"
 #include "collision.h"
+#include "keys.h"
 #include "proxy.h"
 #include "seams.h"
 #include "swept_box.h"
@@ -31,7 +32,8 @@ enum {
     SLOT_LEFT = 2, /* its box left the larger one, or the entry changed */
     SLOT_PLANE = 4,
     SLOT_REFUSED = 8, /* sadmm_collision_check_shape says why */
-    SLOT_SEAMS = 16   /* its neighbours may be others (seams.h) */
+    SLOT_SEAMS = 16,  /* its neighbours may be others (seams.h) */
+    SLOT_BOUNCES = 32 /* it has restitution */
 };
 
 struct sadmm_collision_kernels;
@@ -75,6 +77,31 @@ void sadmm_candidates_free(struct sadmm_candidates *c);
 /* Bring proxies, boxes and the list up to date. After a failure the next call starts from scratch. */
 sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sadmm_collision_input *input, int threads,
                                      struct sadmm_error *error);
+
+/* Things that do not change while the shapes stay what they are. */
+static inline bool sadmm_pair_may_meet(const struct sadmm_collision_input *input, uint32_t a, uint32_t b)
+{
+    const struct sadmm_shape *sa = &input->shapes[a], *sb = &input->shapes[b];
+    return sa->body != sb->body && (sa->category & sb->mask) && (sb->category & sa->mask);
+}
+
+/* Of two bodies that do not meet by the caller's will. */
+static inline bool sadmm_pair_is_disabled(const struct sadmm_collision_input *input, uint64_t shapes)
+{
+    const struct sadmm_shape *a = &input->shapes[shapes >> 32], *b = &input->shapes[shapes & UINT32_MAX];
+    return input->disabled_body_pair_count &&
+           find_key(input->disabled_body_pairs, (int64_t)input->disabled_body_pair_count,
+                    unordered_key((uint32_t)a->body, (uint32_t)b->body)) >= 0;
+}
+
+/* Two slots as a pair: the lower (type, slot) first. */
+static inline uint64_t sadmm_pair_in_order(const struct sadmm_candidates *c, uint64_t key)
+{
+    const uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
+    const int rank_low = geometry_rank(c->proxies[low].geometry.type),
+              rank_high = geometry_rank(c->proxies[high].geometry.type);
+    return rank_high < rank_low ? ordered_key(high, low) : key;
+}
 
 /* Do the two shapes of a pair in the list come together within this step, as far as their boxes tell (bounds.h)? */
 SADMM_INLINE bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input,

@@ -9,9 +9,10 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "config.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
-#include "config.h"
+#include "flyers.h"
 #include "kernels.h"
 #include "pipeline.h"
 
@@ -54,6 +55,7 @@ void sadmm_collision_destroy(struct sadmm_collision *collision)
 {
     if (!collision) return;
     sadmm_candidates_free(&collision->candidates);
+    sadmm_box_row_free(&collision->row);
     sadmm_contact_set_free(&collision->spare);
     sadmm_contact_set_free(&collision->between);
     for (size_t i = 0; i < collision->part_count; ++i) sadmm_contact_set_free(&collision->parts[i]);
@@ -168,16 +170,32 @@ static void exchange(struct sadmm_contact_set *a, struct sadmm_contact_set *b)
     *b = swap;
 }
 
+static sadmm_status look(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                         struct sadmm_error *error)
+{
+    return sadmm_candidates_update(&collision->candidates, input, thread_count(input, input->shape_count), error);
+}
+
+sadmm_status sadmm_collision_look_ahead(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                                        struct sadmm_error *error)
+{
+    collision->looked_ahead = collision->row.made = false;
+    TRY(look(collision, input, error));
+    collision->looked_ahead = true;
+    return SADMM_OK;
+}
+
+void sadmm_collision_look_again(struct sadmm_collision *collision) { collision->looked_ahead = false; }
+
 /* The new set into `out`, which then takes the place of `contacts`. */
 static sadmm_status find_into(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                               struct sadmm_contact_set *out, struct sadmm_contact_set *contacts,
                               struct sadmm_error *error)
 {
-    sadmm_status status;
     int threads;
 
-    status = sadmm_candidates_update(&collision->candidates, input, thread_count(input, input->shape_count), error);
-    if (status != SADMM_OK) return status;
+    if (!collision->looked_ahead) TRY(look(collision, input, error));
+    collision->looked_ahead = false;
     if (collision->candidates.list.count > INT32_MAX / SADMM_MAX_POINTS)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu pairs of shapes may touch: at most %d can be indexed",
                           collision->candidates.list.count, (int)(INT32_MAX / SADMM_MAX_POINTS));

@@ -83,6 +83,9 @@ struct sadmm_collision_input {
     /* Pair overrides, both sorted by key = (low slot << 32) | high slot. */
     const uint64_t *disabled_body_pairs; size_t disabled_body_pair_count;      /* body slots */
     const uint64_t *friction_pairs; const double *friction_values; size_t friction_pair_count; /* shape slots */
+    /* By body slot: a body's motion begins so long after the step's start, s: it was hit then; its orientation is the
+     * one that it has at that moment. NULL: all are 0. */
+    const double *since;
     double gravity; /* its size, m/s^2: a body at rest just outside the margin falls gravity x dt^2 in its first step */
 };
 

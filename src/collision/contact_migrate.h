@@ -101,8 +101,15 @@ SADMM_INLINE double contact_radius(const struct sadmm_proxy *a, const struct sad
 /* Shapes that overlap by more than this share of the thinner one touch at no point that goes anywhere. */
 #define ROLLING_DEPTH 0.05
 
-/* Do the pair's points go on as they went since the last step? Both bodies moved by means, the manifold is of the same
- * kind, and it pressed: what hits in this step hits as it is found. points: of the set that `before` is of. */
+/* Did both bodies move by means, and is the manifold of the same kind as before? */
+SADMM_INLINE bool contact_kind_rolls(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                     const struct sadmm_contact_pair *before, int32_t count)
+{
+    return (a->mean != 0) & (b->mean != 0) & (before->count == count) & (count <= ROLLING_POINTS);
+}
+
+/* Do the pair's points go on as they went since the last step? They did then, and pressed: what hits in this step hits
+ * as it is found. points: of the set that `before` is of. */
 SADMM_INLINE bool contact_rolls(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                 const struct sadmm_contact_pair *before, const struct sadmm_contact_point *points,
                                 int32_t count)
@@ -110,7 +117,7 @@ SADMM_INLINE bool contact_rolls(const struct sadmm_proxy *a, const struct sadmm_
     const double deep = ROLLING_DEPTH * smaller_of(a->thin, b->thin);
     bool presses = false;
     int32_t k;
-    if (!((a->mean != 0) & (b->mean != 0) & (before->count == count) & (count <= ROLLING_POINTS))) return false;
+    if (!contact_kind_rolls(a, b, before, count)) return false;
     for (k = before->first; k < before->first + count; ++k) {
         if (points[k].gap < -deep) return false;
         presses = presses || sadmm_normal_impulse(before, &points[k]) > 0;

@@ -67,15 +67,15 @@ struct inner_ball {
     bool of_b;
 };
 
-/* a, b: the pair. ball, its proxy: of b where of_b. child: of a mesh. ahead: when, if it does not hit. False: nothing
- * is near. */
+/* a, b: the pair. ball, its proxy: of b where of_b. child: of a mesh. from: when the pair does not touch yet; ahead: when
+ * the ball is looked at if it does not hit. False: nothing is near. */
 SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                    const struct sadmm_proxy *ball, bool of_b, const double *hulls, uint32_t child,
-                                   double gravity, double dt, double ahead, struct inner_ball *found)
+                                   double from, double gravity, double dt, double ahead, struct inner_ball *found)
 {
     const bool swapped = of_b && a->geometry.type != SADMM_SHAPE_PLANE;
     const struct sadmm_proxy *first = swapped || !of_b ? ball : a, *second = swapped ? a : of_b ? ball : b;
-    const struct first_touch touch = pair_first_touch(first, second, hulls, child, gravity, dt);
+    const struct first_touch touch = pair_first_touch(first, second, hulls, child, from, gravity, dt);
     const double at = touch.missed ? ahead : touch.ahead;
     const struct pair_pose pose = proxies_pose(first, second, at, dt), own = proxies_pose(a, b, at, dt);
     const struct manifold_point *point;
@@ -235,15 +235,15 @@ SADMM_INLINE bool inner_is_deep(const struct sadmm_proxy *a, const struct sadmm_
 
 /* Of one body's ball. */
 SADMM_INLINE void inner_ball_add(const struct sadmm_proxy *a, const struct sadmm_proxy *b, bool of_b,
-                                 const double *hulls, uint32_t child, bool remembers, double gravity, double dt,
-                                 struct manifold *m)
+                                 const double *hulls, uint32_t child, bool remembers, double from, double gravity,
+                                 double dt, struct manifold *m)
 {
     struct sadmm_proxy proxy;
     struct inner_ball ball;
     real along;
     bool alone;
     if (inner_is_heavy(of_b ? b : a, of_b ? a : b) || !inner_ball_of(of_b ? b : a, hulls, &proxy) ||
-        !inner_ball_meets(a, b, &proxy, of_b, hulls, child, gravity, dt, m->ahead, &ball))
+        !inner_ball_meets(a, b, &proxy, of_b, hulls, child, from, gravity, dt, m->ahead, &ball))
         return;
     along = v3_dot(ball.normal, m->normal);
     alone = ball.hits && relative_speed(a->velocity, b->velocity) * dt > INNER_BALL_ALONE * (double)ball.radius;
@@ -275,30 +275,35 @@ SADMM_INLINE void inner_on_surface(const struct sadmm_proxy *a, const struct sad
 }
 
 SADMM_INLINE void inner_balls_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                 uint32_t child, bool remembers, double gravity, double dt, struct manifold *m)
+                                 uint32_t child, bool remembers, struct first_touch touch, double gravity, double dt,
+                                 struct manifold *m)
 {
     int of_b; /* a loop: compilers are not to make it twice */
     remembers &= !inner_forgets(a, b, dt);
-    for (of_b = 0; of_b < 2; ++of_b) inner_ball_add(a, b, of_b, hulls, child, remembers, gravity, dt, m);
+    for (of_b = 0; of_b < 2 && !touch.missed; ++of_b)
+        inner_ball_add(a, b, of_b, hulls, child, remembers, touch.ahead, gravity, dt, m);
     inner_on_surface(a, b, m);
 }
 SADMM_RARE void inner_balls_pooled(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                   uint32_t child, bool remembers, double gravity, double dt, struct manifold *m)
+                                   uint32_t child, bool remembers, struct first_touch touch, double gravity, double dt,
+                                   struct manifold *m)
 {
-    inner_balls_of(a, b, hulls, child, remembers, gravity, dt, m);
+    inner_balls_of(a, b, hulls, child, remembers, touch, gravity, dt, m);
 }
 SADMM_RARE void inner_balls_plain(const struct sadmm_proxy *a, const struct sadmm_proxy *b, bool remembers,
-                                  double gravity, double dt, struct manifold *m)
+                                  struct first_touch touch, double gravity, double dt, struct manifold *m)
 {
-    inner_balls_of(a, b, NULL, 0, remembers, gravity, dt, m);
+    inner_balls_of(a, b, NULL, 0, remembers, touch, gravity, dt, m);
 }
 
-/* To the manifold of a pair. remembers: its cache is of the last step; hulls: NULL as of pair_first_touch. */
+/* To the manifold of a pair. remembers: its cache is of the last step; touch: of the pair, and so none of the balls in it
+ * is earlier; hulls: NULL as of pair_first_touch. */
 SADMM_INLINE void inner_balls_add(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                  uint32_t child, bool remembers, double gravity, double dt, struct manifold *m)
+                                  uint32_t child, bool remembers, struct first_touch touch, double gravity, double dt,
+                                  struct manifold *m)
 {
-    if (hulls) inner_balls_pooled(a, b, hulls, child, remembers, gravity, dt, m);
-    else inner_balls_plain(a, b, remembers, gravity, dt, m);
+    if (hulls) inner_balls_pooled(a, b, hulls, child, remembers, touch, gravity, dt, m);
+    else inner_balls_plain(a, b, remembers, touch, gravity, dt, m);
 }
 
 /* Is the centre of mass of a's body behind the triangle of a mesh b, over it? Other triangles may be what the body

@@ -13,6 +13,69 @@ struct old_pairs {
 };
 static const struct old_pairs no_pairs = {0, 0};
 
+/* Bodies that were hit within the step: the later of both moments. Before it the pair was never where it is taken to
+ * come from: it is looked for in what is left of the step, and what overlaps at the start alone does not overlap. */
+static double since_of(const struct sadmm_collision_input *input, const struct sadmm_proxy *a,
+                       const struct sadmm_proxy *b)
+{
+    return input->since ? larger_of(input->since[a->body], input->since[b->body]) : 0;
+}
+
+/* The shape in a step that begins `since` seconds later and is as much shorter, placed halfway through that. */
+static void begin_later(const struct sadmm_collision_input *input, const struct sadmm_proxy *p, double since,
+                        struct sadmm_proxy *out)
+{
+    const double hit = input->since[p->body], on = turn_ahead(turning_rate(p->angular), input->dt - since);
+    struct sadmm_proxy own = *p, turned;
+    own.ahead -= hit; /* it turns from there */
+    *out = *proxy_at(&own, since + on - hit, 0, &turned);
+    out->ahead = on;
+    for (int k = 0; k < 3; ++k) {
+        out->com[k] += since * p->velocity[k];
+        out->x[k] = out->com[k] + out->arm[k];
+    }
+}
+
+/* As proxy_at of such a pair: its motion is taken back to the start of the whole step. */
+SADMM_RARE const struct sadmm_proxy *proxy_at_later(const struct sadmm_collision_input *input,
+                                                    const struct sadmm_proxy *p, double since, double ahead,
+                                                    struct sadmm_proxy *out)
+{
+    const double left = input->dt - since, on = ahead == since + 0.5 * left ? 0.5 * left : ahead - since;
+    struct sadmm_proxy later, turned;
+    begin_later(input, p, since, &later);
+    *out = *proxy_at(&later, on, left, &turned);
+    out->ahead += since;
+    for (int k = 0; k < 3; ++k) {
+        out->com[k] = p->com[k];
+        out->x[k] = p->com[k] + out->arm[k];
+    }
+    return out;
+}
+
+/* A shape of a pair that was found `ahead` seconds into the step. */
+SADMM_ALWAYS_INLINE const struct sadmm_proxy *proxy_found_at(const struct sadmm_collision_input *input,
+                                                             const struct sadmm_proxy *p, double since, double ahead,
+                                                             struct sadmm_proxy *turned)
+{
+    return since > 0 ? proxy_at_later(input, p, since, ahead, turned) : proxy_at(p, ahead, input->dt, turned);
+}
+
+/* Where points part (`opens`, m/s), a gap below 0 at the start is that at `since`, and none below 0 by then: what it lacks
+ * is what forces and curvature add to the way. */
+#define SINCE_ROUNDING 1e-6
+SADMM_RARE void open_gap(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double since, const double normal[3],
+                         struct sadmm_contact_point *point)
+{
+    double opens = 0, across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0};
+    if (!(point->gap < -SINCE_ROUNDING * smaller_of(a->thin, b->thin))) return;
+    add_cross(normal, a->angular, 1, across_a);
+    add_cross(normal, b->angular, 1, across_b);
+    for (int k = 0; k < 3; ++k) opens += normal[k] * (b->velocity[k] - a->velocity[k]);
+    opens += dot3(across_b, point->arm_b) - dot3(across_a, point->arm_a);
+    if (opens > 0) point->gap = larger_of(point->gap + since * opens, DBL_MIN);
+}
+
 /* Write the manifold as a pair with its points; there is capacity. `before`: the pair that it goes on from, or NULL.
  * ratio: step_ratio of both sets. */
 SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
@@ -21,9 +84,10 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
                               const struct sadmm_contact_pair *before, struct old_pairs beside,
                               struct sadmm_contact_set *out)
 {
+    const double since = since_of(input, &c->proxies[a], &c->proxies[b]);
     struct sadmm_proxy turned[2];
-    const struct sadmm_proxy *pa = proxy_at(&c->proxies[a], m->ahead, input->dt, &turned[0]),
-                             *pb = proxy_at(&c->proxies[b], m->ahead, input->dt, &turned[1]);
+    const struct sadmm_proxy *pa = proxy_found_at(input, &c->proxies[a], since, m->ahead, &turned[0]),
+                             *pb = proxy_found_at(input, &c->proxies[b], since, m->ahead, &turned[1]);
     struct sadmm_contact_pair *pair = &out->pairs[out->pair_count++];
     const double friction = contact_friction(input->friction_pairs, input->friction_values,
                                              (int64_t)input->friction_pair_count, a, b, pa, pb);
@@ -34,12 +98,14 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
 
     rotate_to_world(pb->R, m->normal, normal);
     pair_motion_of(pa, pb, normal, m->ahead, input->dt, &motion);
-    const bool midway = is_midway(m->ahead, input->dt); /* what is found elsewhere has no half step left */
+    const bool midway =
+        since == 0 && is_midway(m->ahead, input->dt); /* what is found elsewhere has no half step left */
     migration_begin(pa, pb, midway ? before : NULL, last, ratio, m->count, normal, &rolling);
     contact_emit_pair(a, b, child, pa, pb, m, rolling.normal, friction, (int32_t)out->point_count, pair);
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count];
         contact_emit_point(pa, pb, &motion, &m->points[i], point);
+        if (since > 0) open_gap(pa, pb, since, normal, point);
         const bool carried = before && contact_carry(before, old->points, i, rolling.normal, friction, ratio, point);
         if (!carried && beside.first < beside.last)
             contact_carry_across(old->pairs, beside.first, beside.last, old->points, pair->revision, i, rolling.normal,
@@ -50,14 +116,6 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
             ++out->migrating;
         ++out->point_count;
     }
-}
-
-static bool is_disabled(const struct sadmm_collision_input *input, uint64_t shapes)
-{
-    const struct sadmm_shape *a = &input->shapes[shapes >> 32], *b = &input->shapes[shapes & UINT32_MAX];
-    return input->disabled_body_pair_count &&
-           find_key(input->disabled_body_pairs, (int64_t)input->disabled_body_pair_count,
-                    unordered_key((uint32_t)a->body, (uint32_t)b->body)) >= 0;
 }
 
 /* For one more manifold. */
@@ -122,7 +180,7 @@ SADMM_ALWAYS_INLINE bool keep(struct narrow_phase *n, uint32_t a, uint32_t b, ui
     return true;
 }
 
-/* Of a triangle: the other one is part of find_children alone. */
+/* Of a triangle, or a pair that was hit: the other one is part of find_children alone. */
 __attribute__((noinline)) static bool keep_triangle(struct narrow_phase *n, uint32_t a, uint32_t b, uint32_t triangle,
                                                     const struct manifold *m, const struct sadmm_contact_pair *before,
                                                     struct old_pairs beside)
@@ -144,33 +202,35 @@ static struct old_pairs find_beside(struct narrow_phase *n, uint64_t shapes)
 
 /* When a pair with a mesh that moves on first touches any triangle. */
 static double touch_any(const struct narrow_phase *n, const struct mesh *mesh, const struct sadmm_box3 *box,
-                          const struct sadmm_proxy *a, const struct sadmm_proxy *b)
+                        const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt)
 {
     double first = HUGE_VAL;
     struct mesh_walk walk;
     mesh_walk_begin(mesh, box, &walk);
     for (int32_t triangle = mesh_walk_next(mesh, &walk); triangle >= 0; triangle = mesh_walk_next(mesh, &walk))
-        first = smaller_of(mesh_first_touch(a, b, n->input->hulls, (uint32_t)triangle, n->input->gravity, n->input->dt),
-                           first);
+        first = smaller_of(mesh_first_touch(a, b, n->input->hulls, (uint32_t)triangle, n->input->gravity, dt), first);
     return first;
 }
 
-/* b: a mesh. By itself: find_children is as quick as it is because all of find_manifold is inlined into it, and what
- * keeps that. */
-__attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uint32_t a, uint32_t b)
+/* b: a mesh. pa, pb: the two in a step of dt that begins at `since`. By itself: find_children is as quick as it is because
+ * all of find_manifold is inlined into it, and what keeps that. */
+__attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uint32_t a, uint32_t b,
+                                                     const struct sadmm_proxy *pa, const struct sadmm_proxy *pb,
+                                                     double since, double dt)
 {
     const struct sadmm_collision_input *input = n->input;
-    const struct sadmm_proxy *pa = &n->candidates->proxies[a], *pb = &n->candidates->proxies[b];
-    struct pair_start start = pair_start_of(pa, pb, input->margin, input->gravity, input->dt);
+    const struct sadmm_proxy *whole_a = &n->candidates->proxies[a], *whole_b = &n->candidates->proxies[b];
+    struct pair_start start = pair_start_of(pa, pb, input->margin, input->gravity, dt);
     struct sadmm_box3 box;
     struct mesh_walk walk;
     struct mesh mesh;
     struct manifold m;
     mesh_at(input->hulls, pb->geometry.hull, &mesh);
-    mesh_reach(pa, pb, &n->candidates->boxes[a].box, input->margin, input->gravity, input->dt, input->dt, &box);
+    mesh_reach(whole_a, whole_b, &n->candidates->boxes[a].box, input->margin, input->gravity, input->dt, input->dt,
+               &box);
     if (start.moves_on) {
-        const double first = touch_any(n, &mesh, &box, pa, pb);
-        mesh_start_at(pa, pb, first, input->margin, input->gravity, input->dt, &start);
+        const double first = touch_any(n, &mesh, &box, pa, pb, dt);
+        mesh_start_at(pa, pb, first, input->margin, input->gravity, dt, &start);
     }
     const struct old_pairs beside = find_beside(n, ordered_key(a, b));
     mesh_walk_begin(&mesh, &box, &walk);
@@ -182,9 +242,33 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
         triangle_manifold(&pa->geometry, &pb->geometry, input->hulls, (uint32_t)triangle, &start.pose,
                           (real)start.limit, cache, &m);
         m.ahead = start.ahead;
-        if (pair_asks_balls(pa, pb, input->hulls, (uint32_t)triangle, &start, input->gravity, input->dt, &m))
-            inner_balls_add(pa, pb, input->hulls, (uint32_t)triangle, cache != 0, input->gravity, input->dt, &m);
+        if (pair_asks_balls(pa, pb, input->hulls, (uint32_t)triangle, &start, input->gravity, dt, &m))
+            inner_balls_add(pa, pb, input->hulls, (uint32_t)triangle, cache != 0, start.touch, input->gravity, dt, &m);
+        m.ahead += since;
         if (!keep_triangle(n, a, b, (uint32_t)triangle, &m, before, beside)) return false;
+    }
+    return true;
+}
+
+/* find_children of a pair that was hit within the step. */
+__attribute__((noinline)) static bool find_later(struct narrow_phase *n, uint32_t a, uint32_t b, double since)
+{
+    const struct sadmm_collision_input *input = n->input;
+    const double left = input->dt - since;
+    struct sadmm_proxy pa, pb;
+    struct manifold m;
+
+    begin_later(input, &n->candidates->proxies[a], since, &pa);
+    begin_later(input, &n->candidates->proxies[b], since, &pb);
+    const uint32_t children = pair_children(&pa.geometry, &pb.geometry);
+    if (children == 0) return find_triangles(n, a, b, &pa, &pb, since, left);
+    for (uint32_t child = 0; child < children; ++child) {
+        const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), child, &pa, &pb);
+        const struct pair_start start = pair_start_of(&pa, &pb, input->margin, input->gravity, left);
+        find_manifold(&pa, &pb, input->hulls, child, input->margin, input->gravity, left, &start,
+                      before ? contact_memory(before, &pa, &pb) : 0, &m);
+        m.ahead += since;
+        if (!keep_triangle(n, a, b, child, &m, before, no_pairs)) return false;
     }
     return true;
 }
@@ -195,9 +279,11 @@ static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
     const struct sadmm_collision_input *input = n->input;
     const struct sadmm_proxy *pa = &n->candidates->proxies[a], *pb = &n->candidates->proxies[b];
     const uint32_t children = pair_children(&pa->geometry, &pb->geometry);
+    const double since = since_of(input, pa, pb);
     struct manifold m;
 
-    if (children == 0) return find_triangles(n, a, b);
+    if (since > 0) return find_later(n, a, b, since);
+    if (children == 0) return find_triangles(n, a, b, pa, pb, 0, input->dt);
     for (uint32_t child = 0; child < children; ++child) {
         const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), child, pa, pb);
         const struct pair_start start = pair_start_of(pa, pb, input->margin, input->gravity, input->dt);
@@ -238,7 +324,8 @@ bool SADMM_COLLISION_KERNEL(narrow_phase)(const struct sadmm_candidates *c, cons
         const size_t last = end - begin < MOST_LISTED ? end : begin + MOST_LISTED,
                      count = list_meeting(c, input, begin, last, keys);
         for (size_t i = 0; i < count; ++i)
-            if (!is_disabled(input, keys[i]) && !find_children(&n, (uint32_t)(keys[i] >> 32), (uint32_t)keys[i]))
+            if (!sadmm_pair_is_disabled(input, keys[i]) &&
+                !find_children(&n, (uint32_t)(keys[i] >> 32), (uint32_t)keys[i]))
                 return false;
         begin = last;
     }

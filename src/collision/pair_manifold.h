@@ -175,6 +175,7 @@ struct pair_start {
     struct pair_pose pose;
     double ahead, limit;
     bool moves_on; /* the pair is one of those in advance.h */
+    struct first_touch touch; /* of one that moves on: pair_start_at; else nothing is known of it */
 };
 
 SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double margin,
@@ -185,6 +186,8 @@ SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const 
     start.ahead = proxy_ahead(a, b, speed, dt);
     start.limit = proxy_limit(a, b, speed, margin, gravity, dt);
     start.moves_on = advance_needed(a, b, start.ahead, dt);
+    start.touch.ahead = 0;
+    start.touch.missed = false;
     start.pose = turned_pose(a, b, start.ahead);
     return start;
 }
@@ -193,6 +196,7 @@ SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const 
 SADMM_INLINE void pair_start_at(const struct sadmm_proxy *a, const struct sadmm_proxy *b, struct first_touch first,
                                 double margin, double gravity, double dt, struct pair_start *start)
 {
+    start->touch = first;
     start->ahead = first.ahead;
     if (first.missed) start->limit = proxy_near_limit(a, b, margin, gravity, dt);
     start->pose = proxies_pose(a, b, start->ahead, dt);
@@ -215,12 +219,12 @@ SADMM_HOST_INLINE void find_manifold(const struct sadmm_proxy *a, const struct s
 {
     struct pair_start start = *midway;
     if (start.moves_on)
-        pair_start_at(a, b, pair_first_touch(a, b, hulls, child, gravity, dt), margin, gravity, dt, &start);
+        pair_start_at(a, b, pair_first_touch(a, b, hulls, child, 0, gravity, dt), margin, gravity, dt, &start);
     const struct pair_pose pose = start.pose; /* pair_manifold's own stays in registers */
     pair_manifold(&a->geometry, &b->geometry, hulls, child, &pose, (real)start.limit, cache, m);
     m->ahead = start.ahead;
     if (start.moves_on || inner_is_asked(a, b, gravity, dt, m))
-        inner_balls_add(a, b, hulls, child, cache != 0, gravity, dt, m);
+        inner_balls_add(a, b, hulls, child, cache != 0, start.touch, gravity, dt, m);
 }
 
 /* ---- meshes: their triangles have one pose in common -------------------------------------------------------------- */
@@ -229,7 +233,7 @@ SADMM_HOST_INLINE void find_manifold(const struct sadmm_proxy *a, const struct s
 SADMM_INLINE double mesh_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *blocks,
                                      uint32_t child, double gravity, double dt)
 {
-    const struct first_touch first = pair_first_touch(a, b, blocks, child, gravity, dt);
+    const struct first_touch first = pair_first_touch(a, b, blocks, child, 0, gravity, dt);
     return first.missed ? HUGE_VAL : first.ahead;
 }
 

@@ -2,6 +2,7 @@
 #ifndef SADMM_COLLISION_PIPELINE_H
 #define SADMM_COLLISION_PIPELINE_H
 
+#include "box_row.h"
 #include "candidates.h"
 
 struct sadmm_collision {
@@ -10,6 +11,8 @@ struct sadmm_collision {
      * set that they replace. */
     struct sadmm_contact_set spare, between;
     bool can_undo;
+    bool looked_ahead; /* the candidates are those of the next find */
+    struct sadmm_box_row row; /* of their boxes, made when it is asked for (flyers.h) */
     /* One a thread beyond the first; its first thread writes to the new set itself. */
     struct sadmm_contact_set *parts;
     size_t part_count, part_capacity;

@@ -106,7 +106,8 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     }
     geometry = &input->geometries[shape->geometry];
     plane = geometry->type == SADMM_SHAPE_PLANE;
-    kind = (unsigned char)((plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT) | seams);
+    kind = (unsigned char)((plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT) | seams |
+                           (shape->restitution > 0 ? SLOT_BOUNCES : 0));
     proxy_place(shape, geometry, body, turn, input->dt, input->margin, input->gravity, &c->proxies[slot],
                 &c->boxes[slot].box);
     c->boxes[slot].of_plane = plane;
@@ -141,7 +142,9 @@ void SADMM_COLLISION_KERNEL(place_slots)(struct sadmm_candidates *c, const struc
         last = end - begin < TURNED_AT_ONCE ? end : begin + TURNED_AT_ONCE;
         for (size_t slot = begin; slot < last && slot < input->shape_count; ++slot) {
             const struct sadmm_shape *shape = &input->shapes[slot];
-            if (sadmm_shape_collides(shape)) turns[slot - begin] = proxy_turn_of(shape, &input->bodies[shape->body], input->dt);
+            if (!sadmm_shape_collides(shape)) continue;
+            const double since = input->since ? input->since[shape->body] : 0;
+            turns[slot - begin] = proxy_turn_since(shape, &input->bodies[shape->body], since, input->dt);
         }
         for (size_t slot = begin; slot < last; ++slot) update_slot(c, input, slot, &turns[slot - begin], renew);
     }

@@ -40,17 +40,23 @@ struct proxy_turn {
     quat body, shape;   /* to the world */
 };
 
-SADMM_INLINE struct proxy_turn proxy_turn_of(const struct sadmm_shape *shape, const struct sadmm_collision_body *body,
-                                             double dt)
+/* since: the body's orientation is the one that it has then, s after the step's start. */
+SADMM_INLINE struct proxy_turn proxy_turn_since(const struct sadmm_shape *shape,
+                                                const struct sadmm_collision_body *body, double since, double dt)
 {
     const bool moves = sadmm_body_moves(body->system_body);
     const quat start = q_load(body->orientation);
     struct proxy_turn turn;
     turn.rate = moves ? turning_rate(body->velocity + 3) : 0;
-    turn.ahead = moves ? turn_ahead(turn.rate, dt) : 0;
-    turn.body = moves ? turned(start, body->velocity + 3, turn.ahead) : start;
+    turn.ahead = moves ? since + turn_ahead(turn.rate, dt - since) : 0;
+    turn.body = moves ? turned(start, body->velocity + 3, turn.ahead - since) : start;
     turn.shape = q_normalize(q_mul(turn.body, q_load(shape->orientation)));
     return turn;
+}
+SADMM_INLINE struct proxy_turn proxy_turn_of(const struct sadmm_shape *shape, const struct sadmm_collision_body *body,
+                                             double dt)
+{
+    return proxy_turn_since(shape, body, 0, dt);
 }
 
 /* The shape's box (bounds.h). Not of a plane. */

@@ -114,6 +114,7 @@ static const struct sadmm_field settings_list[] = {
     REAL(sadmm_settings, slop),
     REAL(sadmm_settings, correction_speed),
     REAL(sadmm_settings, restitution_threshold),
+    INT32(sadmm_settings, hits),
     INT32(sadmm_settings, threads),
 };
 TABLE(sadmm_settings_fields, "settings", settings_list);

@@ -1,5 +1,6 @@
 /* Manifolds to contacts: world terms, and the last step's impulses by feature. Eight threads take a candidate, one a
- * point; the first one writes the pair as well. */
+ * point; the first one writes the pair as well. Pairs that roll, or were found elsewhere than halfway, are made again by
+ * a kernel of their own: what they need would cost the others registers. */
 #include "view.h"
 
 /* Time steps of this set and of the one before; fetched first, so that nothing waits for them later. */
@@ -65,8 +66,8 @@ static __device__ __forceinline__ emit_in_place emit_source_of(const collision_v
     return {*a, *b, {point.position, point.separation, feature}, *old, head};
 }
 
-/* The point goes on to the step's end, and its normal (core/model/rolling.h). By itself: few do. */
-static __device__ __noinline__ void migrate(const collision_view &v, const struct sadmm_proxy *a,
+/* The point goes on to the step's end, and its normal (core/model/rolling.h). */
+static __device__ __forceinline__ void migrate(const collision_view &v, const struct sadmm_proxy *a,
                                             const struct sadmm_proxy *b, const struct sadmm_contact_pair *before,
                                             double ratio, int32_t count, int32_t lane, int32_t at, double normal[3],
                                             struct sadmm_contact_point *point)
@@ -80,40 +81,60 @@ static __device__ __noinline__ void migrate(const collision_view &v, const struc
     for (int k = 0; k < 3; ++k) normal[k] = pair.normal[k];
 }
 
-/* Point `lane` of a candidate, and its pair into the new set by the first lane; place: pairs << 32 | points before it.
- * Points go out by the warp or by the lane, which the kernel knows. */
+/* Has a candidate to be made again? Old points are not looked at: of those that are, some do not roll. */
 template <class Source>
-static __device__ __forceinline__ struct sadmm_contact_point emit_point(const collision_view &v, const step_lengths &dt,
-                                                                        int32_t lane, const emit_start &start,
-                                                                        const Source &source, uint64_t place)
+static __device__ __forceinline__ bool is_made_again(const emit_start &start, const Source &source, double dt)
+{
+    const struct sadmm_proxy *a = &source.a, *b = &source.b;
+    if (!is_midway(source.head.ahead, dt)) return true;
+    if (start.count > ROLLING_POINTS) return false;
+    return contact_is_curved(a, b, start.count) ||
+           (start.match >= 0 && contact_kind_rolls(a, b, &source.old, start.count));
+}
+
+/* A pair, but for its normal and its points. */
+template <class Source>
+static __device__ __forceinline__ void emit_pair(const collision_view &v, const emit_start &start,
+                                                 const Source &source, const double normal[3], double friction,
+                                                 int32_t at, int32_t first)
 {
     const struct candidate own = start.own;
-    const int32_t at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
+    struct sadmm_contact_pair pair;
+    contact_emit_pair(own.a, own.b, own.child, &source.a, &source.b, &source.head, normal, friction, first, &pair);
+    store_wide(pair, &v.after.pairs[at]);
+    v.after.keys[at] = ordered_key(own.a, own.b);
+}
+
+template <class Source>
+static __device__ __forceinline__ double friction_of(const collision_view &v, const candidate &own,
+                                                     const Source &source)
+{
+    return contact_friction(v.friction_pairs, v.friction_values, v.friction_count, own.a, own.b, &source.a, &source.b);
+}
+
+/* Point `lane` of candidate i as it is found halfway, and its pair into the new set by the first lane; place: pairs << 32 |
+ * points before it. Points go out by the warp or by the lane, which the kernel knows. */
+template <class Source>
+static __device__ __forceinline__ struct sadmm_contact_point emit_point(const collision_view &v, const step_lengths &dt,
+                                                                        int64_t i, int32_t lane,
+                                                                        const emit_start &start, const Source &source,
+                                                                        uint64_t place)
+{
     const struct sadmm_proxy *pa = &source.a, *pb = &source.b;
-    const double friction =
-        contact_friction(v.friction_pairs, v.friction_values, v.friction_count, own.a, own.b, pa, pb);
+    const double friction = friction_of(v, start.own, source);
     double normal[3];
+    rotate_to_world(pb->R, source.head.normal, normal);
+
     struct sadmm_contact_point point;
-    const struct sadmm_contact_pair *before = start.match >= 0 ? &source.old : nullptr;
-    if (is_midway(source.head.ahead, dt.now)) {
-        struct pair_motion motion;
-        rotate_to_world(pb->R, source.head.normal, normal);
-        pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
-        contact_emit_point(pa, pb, &motion, &source.point, &point);
-        if (contact_may_migrate(pa, pb, before, v.before.points, source.head.count))
-            migrate(v, pa, pb, before, step_ratio(dt.now, dt.before), source.head.count, lane, first + lane, normal,
-                    &point);
-    } else {
-        contact_emit_turned(pa, pb, source.head.normal, source.head.ahead, dt.now, &source.point, normal, &point);
-    }
-    if (before)
+    struct pair_motion motion;
+    pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
+    contact_emit_point(pa, pb, &motion, &source.point, &point);
+    if (start.match >= 0)
         contact_carry(&source.old, wide_at(v.before.points, 0), lane, normal, friction,
                       step_ratio(dt.now, dt.before), &point);
     if (lane > 0) return point;
-    struct sadmm_contact_pair pair;
-    contact_emit_pair(own.a, own.b, own.child, pa, pb, &source.head, normal, friction, first, &pair);
-    store_wide(pair, &v.after.pairs[at]);
-    v.after.keys[at] = ordered_key(own.a, own.b);
+    if (is_made_again(start, source, dt.now)) v.again[atomicAdd(v.candidate_count + COUNT_AGAIN, 1ull)] = (int32_t)i;
+    emit_pair(v, start, source, normal, friction, (int32_t)(place >> 32), (int32_t)(uint32_t)place);
     return point;
 }
 
@@ -151,7 +172,7 @@ emit_kernel(const __grid_constant__ collision_view v)
     if (there && lane == 0) v.pair_of[i] = (int32_t)(place >> 32);
     struct sadmm_contact_point point, *to = nullptr;
     if (there && lane < start.count) {
-        point = emit_point(v, dt, lane, start, emit_source_of(v, start, i, lane), place);
+        point = emit_point(v, dt, i, lane, start, emit_source_of(v, start, i, lane), place);
         to = point_place(v, lane, place);
     }
     store_of_warp(point, to, &shared.of[threadIdx.x / 32]);
@@ -216,7 +237,50 @@ emit_few_kernel(const __grid_constant__ collision_view v)
         before += sum_sizes(i - k < SIZES_A_WORD ? word & ((UINT32_C(1) << 8 * (i - k)) - 1) : word);
     }
     if (lane == 0) v.pair_of[i] = (int32_t)(before >> 32);
-    if (has_point) store_wide(emit_point(v, dt, lane, start, source, before), point_place(v, lane, before));
+    if (has_point) store_wide(emit_point(v, dt, i, lane, start, source, before), point_place(v, lane, before));
+}
+
+/* ---- pairs that roll, or were found elsewhere than halfway -------------------------------------------------------- */
+
+static __device__ __forceinline__ void emit_again(const collision_view &v, const step_lengths &dt, int32_t lane,
+                                                  const emit_start &start, const emit_in_place &source, int32_t at,
+                                                  int32_t first)
+{
+    const struct sadmm_proxy *pa = &source.a, *pb = &source.b;
+    const struct sadmm_contact_pair *before = start.match >= 0 ? &source.old : nullptr;
+    const double friction = friction_of(v, start.own, source), ratio = step_ratio(dt.now, dt.before);
+    double normal[3];
+    struct sadmm_contact_point point;
+    if (is_midway(source.head.ahead, dt.now)) {
+        struct pair_motion motion;
+        rotate_to_world(pb->R, source.head.normal, normal);
+        pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
+        contact_emit_point(pa, pb, &motion, &source.point, &point);
+        if (contact_may_migrate(pa, pb, before, v.before.points, start.count))
+            migrate(v, pa, pb, before, ratio, start.count, lane, first + lane, normal, &point);
+    } else {
+        contact_emit_turned(pa, pb, source.head.normal, source.head.ahead, dt.now, &source.point, normal, &point);
+    }
+    if (before) contact_carry(before, wide_at(v.before.points, 0), lane, normal, friction, ratio, &point);
+    if (lane == 0) emit_pair(v, start, source, normal, friction, at, first);
+    store_wide(point, &v.after.points[first + lane]);
+}
+
+static __global__ void __launch_bounds__(AGAIN_THREADS)
+emit_again_kernel(const __grid_constant__ collision_view v)
+{
+    follow_if(v.early);
+    const int64_t thread = collision_thread(AGAIN_THREADS), stride = (int64_t)gridDim.x * AGAIN_THREADS;
+    const int64_t count = (int64_t)v.candidate_count[COUNT_AGAIN];
+    if (usable_candidates(v) == 0 || v.after.counts->points > v.point_capacity) return;
+    for (int64_t j = thread; j < count * AGAIN_LANES; j += stride) {
+        const int64_t i = v.again[j / AGAIN_LANES];
+        const step_lengths dt = lengths_of(v);
+        const emit_start start = emit_start_of(v, i);
+        const int32_t at = v.pair_of[i], first = v.after.pairs[at].first;
+        for (int32_t k = (int32_t)(j % AGAIN_LANES); k < start.count; k += AGAIN_LANES)
+            emit_again(v, dt, k, start, emit_source_of(v, start, i, k), at, first);
+    }
 }
 
 /* ---- points that slide over a mesh: a kernel of its own where there are any ------------------------------------- */
@@ -251,6 +315,7 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) carry_kernel(const _
 void COLLISION(matching_kernels)(struct collision_kernels *kernels)
 {
     kernels->emit = {emit_kernel, COLLISION_THREADS, sizeof(struct emit_pieces), "contacts"};
+    kernels->emit_again = {emit_again_kernel, AGAIN_THREADS, 0, "contacts that roll"};
     kernels->carry = {carry_kernel, COLLISION_THREADS, 0, "impulses from triangle to triangle"};
     kernels->emit_few = {emit_few_kernel, EMIT_CANDIDATES * POINT_LANES, sizeof(struct emit_sums), "contacts"};
 }

@@ -144,17 +144,19 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
 
 /* What a kernel does for a candidate. */
 enum narrow_how {
-    NARROW_PLAIN,         /* there are no hulls or meshes */
-    NARROW_AT_ONCE,       /* of worlds with hulls what is little work; the others are listed */
-    NARROW_LISTED,        /* those */
+    NARROW_PLAIN_AT_ONCE, /* of worlds without hulls and meshes what is little work; the others are listed */
+    NARROW_PLAIN_LISTED,  /* those */
+    NARROW_AT_ONCE,       /* the same of worlds with hulls */
+    NARROW_LISTED,
     NARROW_MESHES_AT_ONCE, /* the same of worlds with meshes: further code, which would slow down the others */
     NARROW_MESHES_LISTED,
     NARROW_ALL_AT_ONCE,   /* the same again, of worlds with smooth bodies */
     NARROW_ALL_LISTED
 };
 static __device__ constexpr bool with_meshes(int how) { return how >= NARROW_MESHES_AT_ONCE; }
-static __device__ constexpr bool is_at_once(int how) { return how != NARROW_PLAIN && (how - NARROW_AT_ONCE) % 2 == 0; }
-static __device__ constexpr bool is_listed(int how) { return how != NARROW_PLAIN && !is_at_once(how); }
+static __device__ constexpr bool with_hulls(int how) { return how >= NARROW_AT_ONCE; }
+static __device__ constexpr bool is_at_once(int how) { return how % 2 == NARROW_PLAIN_AT_ONCE; }
+static __device__ constexpr bool is_listed(int how) { return !is_at_once(how); }
 static __device__ constexpr bool with_smooth(int how) { return how >= NARROW_ALL_AT_ONCE; }
 
 /* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. walk: what has
@@ -186,7 +188,7 @@ static __device__ void hulls_from(const collision_view &v, const struct collisio
     m->ahead = start.ahead;
     hull_manifold_from(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk, m);
     if (pair_asks_balls(a, b, v.hulls, 0, &start, step.gravity, step.dt, m))
-        inner_balls_add(a, b, v.hulls, 0, cache != 0, step.gravity, step.dt, m);
+        inner_balls_add(a, b, v.hulls, 0, cache != 0, start.touch, step.gravity, step.dt, m);
 }
 
 /* As hulls_at_once, of a pair without hulls, meshes and smooth bodies. */
@@ -246,7 +248,7 @@ static __device__ bool narrow_triangle(const collision_view &v, const struct col
     else
         triangle_manifold(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
     if (pair_asks_balls(a, b, v.hulls, child, &start, step.gravity, step.dt, m))
-        inner_balls_add(a, b, v.hulls, child, cache != 0, step.gravity, step.dt, m);
+        inner_balls_add(a, b, v.hulls, child, cache != 0, start.touch, step.gravity, step.dt, m);
     return true;
 }
 
@@ -298,16 +300,16 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     struct manifold m;
     if (on_mesh) {
         if (!narrow_triangle<HOW>(v, step, pa, pb, start, own.child, before >= 0 ? cache : 0, walk, &m)) return false;
-    } else if (is_at_once(HOW) && b.geometry.type == SADMM_SHAPE_HULL) {
+    } else if (with_hulls(HOW) && is_at_once(HOW) && b.geometry.type == SADMM_SHAPE_HULL) {
         if (!hulls_at_once(v, step, pa, pb, start, before >= 0 ? cache : 0, walk, &m)) return false;
-    } else if (is_listed(HOW) && b.geometry.type == SADMM_SHAPE_HULL && walk->end != GJK_FAR) {
+    } else if (with_hulls(HOW) && b.geometry.type == SADMM_SHAPE_HULL && walk->end != GJK_FAR) {
         hulls_from(v, step, pa, pb, start, before >= 0 ? cache : 0, walk, &m);
     } else if (with_smooth(HOW) && is_at_once(HOW) && geometry_is_smooth(&b.geometry)) {
         if (!smooth_at_once(v, step, pa, pb, start, &m)) return false;
     } else if (is_at_once(HOW)) {
         if (!plain_at_once(step, pa, pb, start, before >= 0 ? cache : 0, &m)) return false;
     } else {
-        find_manifold(pa, pb, is_listed(HOW) ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt, &start,
+        find_manifold(pa, pb, with_hulls(HOW) ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt, &start,
                       before >= 0 ? cache : 0, &m);
     }
     store_manifold(v, i, m, before);

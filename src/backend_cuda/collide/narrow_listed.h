@@ -1,10 +1,10 @@
-/* The narrow phase of worlds with convex hulls, meshes or smooth bodies: two kernels each, apart from those of
- * other worlds, which would be slower with all that this needs of registers and stack.
+/* The narrow phase: two kernels each of plain worlds, of those with convex hulls, with meshes, with smooth bodies, which
+ * would be slower with all that the others need of registers and stack.
  *
- * Most pairs with a hull take little: they go on as they were, or are too far apart. The few others (a twentieth in a
- * heap) take ten times as long, and a warp with one of them would wait for it: so they are listed, and done together, in
- * as many warps as run at once: no two of them go the same way for long. They go on from where the walk of the distance,
- * which said that they are near, has ended. The list has no order; what is found does not depend on it. The kernel after
+ * Most pairs take little: they are slow, and those with a hull go on as they were, or are too far apart. The few others (a
+ * twentieth in a heap of hulls) take ten times as long, and a warp with one of them would wait for it: so they are listed,
+ * and done together, in as many warps as run at once: no two of them go the same way for long. Those with a hull go on
+ * from where the walk of the distance, which said that they are near, has ended. The list has no order; what is found does not depend on it. The kernel after
  * them is not let begin (device/early.h): terrain took 1 % longer where it was.
  */
 #ifndef SADMM_CUDA_COLLIDE_NARROW_LISTED_H
@@ -23,7 +23,7 @@ at_once_kernel(const __grid_constant__ collision_view v)
     if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND && !narrow_candidate<FOR, HOW>(v, i, &walk)) {
         const unsigned long long at = atomicAdd(v.candidate_count + COUNT_LISTED, 1ull);
         v.listed[at] = (int32_t)i;
-        v.walks[at] = walk;
+        if (with_hulls(HOW)) v.walks[at] = walk;
     }
 }
 
@@ -40,7 +40,7 @@ listed_kernel(const __grid_constant__ collision_view v)
                   warps = all < most ? all : most, count = (int64_t)v.candidate_count[COUNT_LISTED],
                   wanted = (count + warps - 1) / warps, lanes = wanted < width ? wanted : width,
                   i = blockIdx.x * lanes + threadIdx.x;
-    if (threadIdx.x < lanes && i < count) narrow_candidate<FOR, HOW>(v, v.listed[i], &v.walks[i]);
+    if (threadIdx.x < lanes && i < count) narrow_candidate<FOR, HOW>(v, v.listed[i], with_hulls(HOW) ? &v.walks[i] : nullptr);
 }
 
 #endif

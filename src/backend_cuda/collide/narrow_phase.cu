@@ -1,19 +1,12 @@
-/* Candidates to manifolds: the last step's pair, for its cache, then the pair's manifold in the frame of b. */
+/* The narrow phase of worlds without convex hulls, meshes and smooth bodies. */
 #define SADMM_WITHOUT_SMOOTH
-#include "narrow.h"
-
-template <int FOR>
-static __global__ void __launch_bounds__(NARROW_THREADS, NARROW_BLOCKS)
-narrow_kernel(const __grid_constant__ collision_view v)
-{
-    follow_if(v.early);
-    const int64_t i = collision_thread(NARROW_THREADS);
-    if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND) narrow_candidate<FOR, NARROW_PLAIN>(v, i, nullptr);
-}
+#include "narrow_listed.h"
 
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels)
 {
-    kernels->narrow = {narrow_kernel<NARROW_ONE>, NARROW_THREADS, 0, "narrow phase"};
-    kernels->narrow_first = {narrow_kernel<NARROW_FIRST>, NARROW_THREADS, 0, "narrow phase"};
-    kernels->narrow_again = {narrow_kernel<NARROW_AGAIN>, NARROW_THREADS, 0, "narrow phase"};
+    struct narrow_kernels *k = &kernels->plain;
+    k->at_once = {at_once_kernel<NARROW_ONE, NARROW_PLAIN_AT_ONCE>, NARROW_THREADS, 0, "narrow phase"};
+    k->at_once_first = {at_once_kernel<NARROW_FIRST, NARROW_PLAIN_AT_ONCE>, NARROW_THREADS, 0, "narrow phase"};
+    k->at_once_again = {at_once_kernel<NARROW_AGAIN, NARROW_PLAIN_AT_ONCE>, NARROW_THREADS, 0, "narrow phase"};
+    k->listed = {listed_kernel<NARROW_ANY, NARROW_PLAIN_LISTED>, NARROW_THREADS, 0, "narrow phase of listed pairs"};
 }

@@ -2,7 +2,7 @@
  * after the narrow phase, launched where shapes have neighbours, so that other worlds' kernels need nothing for it. */
 #include "narrow.h"
 
-static __device__ struct manifold load_manifold(const collision_view &v, int64_t i)
+static __device__ __forceinline__ struct manifold load_manifold(const collision_view &v, int64_t i)
 {
     const struct found_manifold &from = v.manifolds[i];
     const found_head head = load_wide(&from.head);
@@ -21,11 +21,15 @@ static __device__ struct manifold load_manifold(const collision_view &v, int64_t
 static __global__ void __launch_bounds__(NARROW_THREADS) seam_kernel(const __grid_constant__ collision_view v)
 {
     wait_if(v.early);
-    const int64_t i = collision_thread(NARROW_THREADS);
-    if (i >= usable_candidates(v) || v.sizes[i] == 0) return;
-    const struct candidate own = candidate_of(v, v.candidates[i]);
-    const uint32_t *first = v.seams.first;
-    if (first[own.a] == first[own.a + 1] && first[own.b] == first[own.b + 1]) return;
+    /* What takes the time are rounds to memory: what can be asked for together is. */
+    const int64_t i = collision_thread(NARROW_THREADS), readable = i < v.candidate_capacity ? i : 0;
+    const uint64_t key = v.candidates[readable];
+    const uint8_t size = v.sizes[readable];
+    if (i >= usable_candidates(v) || size == 0) return;
+    const struct candidate own = candidate_of(v, key);
+    const uint32_t *first = v.seams.first, a = first[own.a], a_end = first[own.a + 1], b = first[own.b],
+                   b_end = first[own.b + 1];
+    if (a == a_end && b == b_end) return;
     const struct manifold m = load_manifold(v, i);
     if (seam_hides(&v.seams, v.proxies, v.hulls, own.a, own.b, own.child, &m)) v.sizes[i] = 0;
 }

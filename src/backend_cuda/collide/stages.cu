@@ -62,7 +62,7 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     const size_t candidates = (size_t)c->candidate_capacity;
     TRY(reserve(c, CANDIDATES, candidates, sizeof *v->candidates, error));
     TRY(reserve(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
-    if (v->hulls) TRY(reserve(c, LISTED, candidates, sizeof *v->listed, error));
+    TRY(reserve(c, LISTED, candidates, sizeof *v->listed, error));
     if (v->hulls) TRY(reserve(c, WALKS, candidates, sizeof *v->walks, error));
     if (v->mesh_count > 0) TRY(reserve(c, MESH_PAIRS, candidates, sizeof *v->mesh_pairs, error));
     if (v->mesh_count > 0) TRY(reserve(c, TOUCHES, candidates, sizeof *v->touches, error));
@@ -70,6 +70,7 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, MATCHES, candidates, sizeof *v->matches, error));
     TRY(reserve(c, PAIR_OF, candidates, sizeof *v->pair_of, error));
     TRY(reserve(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
+    TRY(reserve(c, EMIT_AGAIN, candidates, sizeof *v->again, error));
     TRY(reserve(c, PLACES, candidates + 1, sizeof *v->places, error));
     v->found = in<uint64_t>(c, CANDIDATES);
     v->listed = in<int32_t>(c, LISTED);
@@ -80,6 +81,7 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     v->matches = in<int32_t>(c, MATCHES);
     v->pair_of = in<int32_t>(c, PAIR_OF);
     v->sizes = in<uint8_t>(c, SIZES);
+    v->again = in<int32_t>(c, EMIT_AGAIN);
     v->places = in<uint64_t>(c, PLACES);
     v->candidate_capacity = (int32_t)c->candidate_capacity;
     v->point_capacity = (int32_t)c->point_capacity;
@@ -181,8 +183,8 @@ static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_er
     const struct collision_kernels *k = &c->kernels;
     const int64_t candidates = (int64_t)v->candidate_capacity + SIZES_BEYOND;
     const bool one = v->substeps == 1, first = v->substep == 0;
-    if (!v->hulls) return launch(c, one ? k->narrow : first ? k->narrow_first : k->narrow_again, candidates, error);
-    const struct narrow_kernels *with = c->smooth           ? &k->with_smooth
+    const struct narrow_kernels *with = !v->hulls           ? &k->plain
+                                        : c->smooth         ? &k->with_smooth
                                         : v->mesh_count > 0 ? &k->with_meshes
                                                             : &k->with_hulls;
     if (v->mesh_count > 0)
@@ -209,6 +211,8 @@ static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_e
     TRY(narrow_phase(c, error));
     if (v->seams.first) TRY(launch(c, c->kernels.seams, v->candidate_capacity, error));
     TRY(emit_contacts(c, error));
+    TRY(launch(c, c->kernels.emit_again,
+               std::min<int64_t>((int64_t)v->candidate_capacity * AGAIN_LANES, AGAIN_BLOCKS * AGAIN_THREADS), error));
     if (v->mesh_count == 0) return SADMM_OK;
     return launch(c, c->kernels.carry, (int64_t)v->candidate_capacity * POINT_LANES, error);
 }

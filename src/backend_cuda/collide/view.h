@@ -69,6 +69,9 @@ enum {
     RANK_CHUNK = 1024,       /* ... and how many are staged at a time */
     EMIT_CANDIDATES = 32,    /* of a block */
     POINT_LANES = SADMM_MANIFOLD_POINTS,
+    AGAIN_THREADS = 32,      /* contacts that are made again: long chains, on as many multiprocessors as there are, ... */
+    AGAIN_LANES = 2,         /* ... two lanes a candidate, since few have more points, ... */
+    AGAIN_BLOCKS = 4096,     /* ... and so many blocks at most, that go on to others: as a rule there are none */
     MORTON_BITS = 10         /* an axis: finer cells would part no more bodies, and sorting costs by the bit */
 };
 
@@ -192,7 +195,7 @@ struct collision_view {
     int32_t *parents;                              /* of nodes; -1: the root */
     int32_t *arrivals;                             /* at inner nodes, bottom up */
 
-    unsigned long long *candidate_count;           /* found, whether they fit or not; listed; mesh_pairs (COUNT_) */
+    unsigned long long *candidate_count;           /* found, whether they fit or not; listed; mesh_pairs; again (COUNT_) */
     uint64_t *mesh_pairs;                          /* first_candidate of pairs with a mesh, of which there may be as many as
                                                       candidates; as they come */
     double *touches;                               /* by candidate, of triangles and pairs that are fast: mesh_first_touch */
@@ -206,6 +209,7 @@ struct collision_view {
     int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
     int32_t *pair_of;                              /* by candidate: its pair in the new set; without: the next one */
     uint8_t *sizes;                                /* points by candidate; 0 beyond the last, SIZES_BEYOND of them */
+    int32_t *again;                                /* candidates whose contacts are made again; as they come */
     uint64_t *places;                              /* exclusive sums of pairs << 32 | points */
 
     struct collision_set before, after;
@@ -252,7 +256,7 @@ static __device__ __forceinline__ uint32_t candidates_of(const collision_view &v
 }
 
 /* Counters. */
-enum { COUNT_FOUND, COUNT_LISTED, COUNT_MESH_PAIRS, COUNTERS };
+enum { COUNT_FOUND, COUNT_LISTED, COUNT_MESH_PAIRS, COUNT_AGAIN, COUNTERS };
 
 /* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */
 static __device__ __forceinline__ int32_t usable_candidates(const collision_view &v)
@@ -291,7 +295,7 @@ struct collision_launch {
     const char *name;
 };
 
-/* The narrow phase where some pairs are much more work than others (narrow_listed.h). */
+/* The narrow phase (narrow_listed.h). */
 struct narrow_kernels {
     struct collision_launch at_once, at_once_first, at_once_again, listed;
     struct collision_launch touch, touch_first, touch_again; /* with meshes (touch.h) */
@@ -301,8 +305,8 @@ struct narrow_kernels {
 struct collision_kernels {
     struct collision_launch place[2], place_first[2], place_again[2]; /* of few shapes, of many (by_warp_from) */
     struct collision_launch grid, build, refit, clear, walk, tiles, small_tiles, rank,
-        narrow, narrow_first, narrow_again, expand, expand_first, seams, emit, emit_few, carry;
-    struct narrow_kernels with_hulls, with_meshes, with_smooth; /* in the place of `narrow` where there are any */
+        expand, expand_first, seams, emit, emit_few, emit_again, carry;
+    struct narrow_kernels plain, with_hulls, with_meshes, with_smooth; /* each where there are any that the last has not */
     int expand_warps; /* expand is launched for */
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);

@@ -32,14 +32,19 @@ template <class T> static __device__ __forceinline__ T load_wide(const T *from)
     return out;
 }
 
-template <class T> static __device__ __forceinline__ void store_wide(const T &from, T *to)
+/* The first BYTES of a record. */
+template <size_t BYTES, class T> static __device__ __forceinline__ void store_first(const T &from, T *to)
 {
-    enum { PIECES = sizeof(T) / sizeof(wide_piece) };
-    static_assert(sizeof(T) % sizeof(wide_piece) == 0, "whole pieces");
+    enum { PIECES = BYTES / sizeof(wide_piece) };
+    static_assert(BYTES % sizeof(wide_piece) == 0 && BYTES <= sizeof(T), "whole pieces");
     wide_piece pieces[PIECES];
-    memcpy(pieces, &from, sizeof from);
+    memcpy(pieces, &from, BYTES);
 #pragma unroll
     for (int k = 0; k < (int)PIECES; ++k) ((wide_piece *)to)[k] = pieces[k];
+}
+template <class T> static __device__ __forceinline__ void store_wide(const T &from, T *to)
+{
+    store_first<sizeof(T)>(from, to);
 }
 
 /* Rows of eight numbers: of a body's velocity, its b, a rigid one's A. */

@@ -53,6 +53,7 @@ static __device__ __forceinline__ bool any_touched(const cuda_view &v)
 /* Component `lane` of what contacts that rolled in the last step give it in this one. */
 static __device__ __forceinline__ void add_owed(const cuda_view &v, int32_t body, int32_t lane, double wrench[6])
 {
+    if (!(v.step.before[body].rolls & ROLLING_OWES)) return;
 #pragma unroll
     for (int k = 0; k < 6; ++k)
         if (k == lane) wrench[k] += rolling_wrench(&v.step.before[body], v.model.settings->dt, k);

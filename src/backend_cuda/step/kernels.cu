@@ -209,14 +209,21 @@ static __device__ __forceinline__ bool rolls_again(const cuda_view &v)
     return v.step.limits && v.islands.again[AGAIN_ROLLS];
 }
 
-/* What contacts that roll give body i to take along, which has been moved. */
-static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, bool restored)
+/* Has the momentum of body i's island been restored? */
+static __device__ __forceinline__ bool is_restored(const cuda_view &v, int32_t i)
+{
+    return v.joints.count > 0 && !v.joints.apart && v.joints.touch[joined_label(v, i)] & ISLAND_RESTORED;
+}
+
+/* What contacts that roll give body i to take along, which has been moved; -1: none. LANES threads a body, each with
+ * every eighth of its sides. Every lane of the warp comes here. */
+static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, int32_t lane)
 {
     const double dt = v.model.settings->dt;
-    const int32_t slot = v.graph.slot_of[i];
-    struct sadmm_rigid *next = &v.step.after[i];
-    double owed[6] = {}, stiffness[6] = {};
-    for (int32_t at = v.graph.offsets[slot]; at < v.graph.offsets[slot + 1]; ++at) {
+    const int32_t slot = i >= 0 ? v.graph.slot_of[i] : 0, end = i >= 0 ? v.graph.offsets[slot + 1] : 0;
+    const bool restored = i >= 0 && is_restored(v, i);
+    double sums[12] = {}, *owed = sums, *stiffness = sums + 6;
+    for (int32_t at = i >= 0 ? v.graph.offsets[slot] + lane : 0; at < end; at += LANES) {
         const int32_t code = v.graph.incident[at], side = code & 1;
         if (code / 2 >= v.contacts.pair_capacity) continue; /* rows */
         const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];
@@ -232,12 +239,8 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
                             sadmm_normal_impulse(pair, point), dt, stiffness);
         }
     }
-    rolling_moved(v.step.before[i].position, next->position, owed);
-    rolling_judge(next->inertia, dt, stiffness);
-    for (int k = 0; k < 6; ++k) {
-        next->owed[k] = owed[k];
-        next->stiffness[k] = stiffness[k];
-    }
+    sum_lanes<12>(sums);
+    if (i >= 0 && lane == 0) rolling_keep(&v.step.after[i], v.step.before[i].position, dt, owed, stiffness);
 }
 
 /* Body i, where its island has joints as they let it go; else again, if need be. */
@@ -247,7 +250,27 @@ static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_
     if (joined && !v.joints.is_direct[i]) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
     if (bits & ISLAND_JOINED) move_joined(v, i);
     else if (again) move_again(v, i);
-    if (rolls_again(v) && v.islands.touch[i] & TOUCH_ROLLS) keep_rolling(v, i, bits & ISLAND_RESTORED);
+}
+
+/* Does a contact of body i roll? */
+static __device__ __forceinline__ bool body_rolls(const cuda_view &v, int32_t i)
+{
+    return i < v.model.bodies && v.islands.touch[i] & TOUCH_ROLLS;
+}
+
+/* The bodies of a warp, of which each lane has moved one, i. Every lane of it comes here. */
+static __device__ __forceinline__ void keep_rolling_of_warp(const cuda_view &v, int32_t i)
+{
+    const int32_t lane = (int32_t)(threadIdx.x % WARP), group = lane / LANES;
+    __syncwarp(0xffffffffu); /* lanes see what others have moved */
+    for (unsigned left = __ballot_sync(0xffffffffu, body_rolls(v, i)); left != 0;) {
+        unsigned own = left;
+        for (int k = 0; k < WARP / LANES; ++k) {
+            if (k < group) own &= own - 1;
+            left &= left - 1;
+        }
+        keep_rolling(v, own ? i - lane + __ffs((int)own) - 1 : -1, lane % LANES);
+    }
 }
 
 /* Are there bodies to be moved again (move.h)? */
@@ -309,6 +332,10 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
         move_once_more(v, (int32_t)own, again, joined);
     if (joined) end_joints(v, (int32_t)t);
     if (any) __syncthreads(); /* threads of a block start bodies that others of it have moved */
+    if (rolls_again(v)) {
+        keep_rolling(v, lane < LANES && body_rolls(v, (int32_t)i) ? (int32_t)i : -1, lane % LANES);
+        __syncthreads();
+    }
     if (t == 0) {
         control->stamps[STAMP_END] = nanoseconds();
         control->totals = totals_of(v, args);
@@ -324,6 +351,21 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
 /* ---- commit ---------------------------------------------------------------------------------------------------- */
 
 static __device__ double double_of(unsigned long long bits) { return __longlong_as_double((long long)bits); }
+
+/* Threads a body: in small worlds as many as keep what it rolls by; in others, where that would be a burden when nothing
+ * rolls, one. */
+static __host__ __device__ inline int32_t commit_lanes(int32_t bodies) { return all_early(bodies) ? LANES : 1; }
+
+static __device__ __forceinline__ void commit_bodies(const cuda_view &v, int32_t thread, bool joined)
+{
+    const int32_t lanes = commit_lanes(v.model.bodies), i = thread / lanes, lane = thread % lanes;
+    const bool again = moves_again(v), rolls = rolls_again(v);
+    if (lane == 0 && (again || joined) && i < v.model.bodies) move_once_more(v, i, again, joined);
+    if (!rolls) return;
+    if (lanes == 1) return keep_rolling_of_warp(v, i);
+    __syncwarp(0xffffffffu);
+    keep_rolling(v, body_rolls(v, i) ? i : -1, lane);
+}
 
 /* Blocks of bodies (args.most_bodies of them) where some may have to be moved again; blocks of joints that bodies are
  * moved by; the last one's first thread reports, beside them. */
@@ -341,8 +383,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
             if (joined) end_joints(v, i - body_blocks * STEP_THREADS);
             return;
         }
-        const bool again = on && moves_again(v);
-        if ((again || joined || (on && rolls_again(v))) && i < v.model.bodies) move_once_more(v, i, again, joined);
+        if (on) commit_bodies(v, i, joined);
         return;
     }
     if (threadIdx.x > 0) return;
@@ -414,7 +455,7 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *er
     args.checks = c->checks;
     args.count = c->settings.iterations;
     const int64_t joints = moved_last(c), bodies = c->view.step.limits || joints ? c->view.model.bodies : 0;
-    args.most_bodies = (int32_t)((bodies + STEP_THREADS - 1) / STEP_THREADS);
+    args.most_bodies = (int32_t)((bodies * commit_lanes((int32_t)bodies) + STEP_THREADS - 1) / STEP_THREADS);
     const int64_t blocks = args.most_bodies + (joints + STEP_THREADS - 1) / STEP_THREADS + 1;
     return CUDA(launch_early)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
 }

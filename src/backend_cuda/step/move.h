@@ -68,7 +68,7 @@ static __device__ __forceinline__ void store_moved(const cuda_view &v, int32_t i
     rolling_forget(&next);
     next.mean = mean;
     steady_keep(&steady, &before.body, &next, dt);
-    store_wide(next, &v.step.after[i]);
+    store_first<offsetof(struct sadmm_rigid, owed)>(next, &v.step.after[i]); /* nothing is owed yet */
     v.step.steady_after[i] = steady;
 }
 

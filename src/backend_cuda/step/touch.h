@@ -210,39 +210,66 @@ static __device__ __forceinline__ pair_ends fetch_ends(const struct sadmm_contac
     return ends;
 }
 
+/* What leads of bodies at a contact close: its normal and point, halfway through the step. */
+static __device__ __forceinline__ void add_way(const cuda_view &v, const lead_body sides[2], const double normal[3],
+                                               const double arm_a[3], const double arm_b[3],
+                                               const struct sadmm_contact_point *point, bool rolls,
+                                               struct lead_touch *touch)
+{
+    const double dt = v.model.settings->dt, slop = v.model.settings->slop;
+    const double leads[2] = {-lead_along(normal, sides[0].lead, arm_a), lead_along(normal, sides[1].lead, arm_b)},
+                 size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)},
+                 speed = lead_along(normal, sides[1].velocity, arm_b) - lead_along(normal, sides[0].velocity, arm_a);
+    if (lead_is_still(size, dt, slop)) return;
+    const struct lead_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, rolls};
+    lead_add_way(touch, gap, leads, size, dt, slop);
+}
+
+/* Of the lane's points that roll. By itself, with all that it needs: few do, and the others should not pay in registers.
+ * Bits of the island and of both bodies, a byte each. */
+template <bool WHOLE>
+static __device__ __noinline__ int add_rolling_ways(const cuda_view &v, pair_ends ends, int32_t first, int32_t count,
+                                                    int32_t lane)
+{
+    struct lead_touch touch = {TOUCH_ROLLS, {TOUCH_ROLLS, TOUCH_ROLLS}};
+    lead_body sides[2] = {};
+    for (int s = 0; s < 2; ++s)
+        if (ends.body[s] >= 0) sides[s] = load_lead_body<WHOLE>(v, ends.body[s]);
+    for (int32_t k = first + lane; k < first + count; k += v.contacts.lanes) {
+        const struct sadmm_contact_point *point = &v.raw.points[k];
+        if (!point->migrates) continue;
+        const struct rolling_halfway at = rolling_halfway_of(ends.normal, point, &v.raw.migrations[k]);
+        add_way(v, sides, at.normal, at.arm_a, at.arm_b, point, true, &touch);
+    }
+    return touch.island | touch.body[0] << 8 | touch.body[1] << 16;
+}
+
 /* What leads of a pair's bodies close, by its points, every v.contacts.lanes-th from `lane` on; returns all bits. */
 template <bool WHOLE>
 static __device__ __forceinline__ int add_ways(const cuda_view &v, const pair_ends &ends, int32_t first, int32_t count,
                                                 int32_t lane)
 {
-    const double dt = v.model.settings->dt, slop = v.model.settings->slop, *n = ends.normal;
     struct lead_touch touch = {0, {0, 0}};
-    int rolls = 0;
+    bool rolls = false;
     lead_body sides[2] = {};
 #pragma unroll
     for (int s = 0; s < 2; ++s)
         if (ends.body[s] >= 0) sides[s] = load_lead_body<WHOLE>(v, ends.body[s]);
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
         const struct sadmm_contact_point *point = wide_at(v.raw.points, (size_t)(first + k));
-        const struct rolling_halfway at =
-            rolling_halfway_of(n, point, sadmm_migration_of(v.raw.points, v.raw.migrations, first + k));
-        const double leads[2] = {-lead_along(at.normal, sides[0].lead, at.arm_a),
-                                 lead_along(at.normal, sides[1].lead, at.arm_b)},
-                     size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)},
-                     speed = lead_along(at.normal, sides[1].velocity, at.arm_b) -
-                             lead_along(at.normal, sides[0].velocity, at.arm_a);
-        if (point->migrates) rolls = TOUCH_ROLLS;
-        if (lead_is_still(size, dt, slop)) continue;
-        const struct lead_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)},
-                                     point->migrates != 0};
-        lead_add_way(&touch, gap, leads, size, dt, slop);
+        if (point->migrates) rolls = true;
+        else add_way(v, sides, ends.normal, point->arm_a, point->arm_b, point, false, &touch);
     }
-    const int all = touch.island | touch.body[0] | touch.body[1] | rolls;
+    const int rolling = rolls ? add_rolling_ways<WHOLE>(v, ends, first, count, lane) : 0;
+    touch.island |= rolling & 0xff;
+    touch.body[0] |= rolling >> 8 & 0xff;
+    touch.body[1] |= rolling >> 16 & 0xff;
+    const int all = touch.island | touch.body[0] | touch.body[1];
     if (all == 0) return 0;
 #pragma unroll
     for (int s = 0; s < 2; ++s)
         if (ends.body[s] >= 0)
-            add_touch(v.islands, ends.body[s], v.graph.label[ends.body[s]], touch.island | touch.body[s] | rolls);
+            add_touch(v.islands, ends.body[s], v.graph.label[ends.body[s]], touch.island | touch.body[s]);
     return all;
 }
 

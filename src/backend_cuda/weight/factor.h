@@ -29,40 +29,32 @@ struct eight_sides {
     int32_t code;                  /* of the lane's own, or -1 */
     pair_bodies bodies;
     solver_real load, response;    /* of a pair */
+    int alone;                     /* bits of a, b of a pair: nothing else touches it */
     solver_real number[2][LANES];  /* numbers lane and lane + LANES of arm_sums */
 };
 
-/* weight_most of a pair. */
-static __device__ __forceinline__ double most_of(const model_view &model, const body_view &bodies,
-                                                 const graph_view &graph, const contact_view &contacts,
-                                                 const pair_bodies &pair, int32_t p)
+/* weight_most of pair p. By itself: few bodies are alone, and the others should not pay in registers. */
+static __device__ __noinline__ double most_of(const body_view &bodies, const contact_view &contacts, int alone,
+                                           int32_t p)
 {
-    const int32_t joined[2] = {pair.body_a, pair.body_b};
-    double mass[2] = {0, 0};
-    int constraints[2] = {0, 0};
-#pragma unroll
-    for (int side = 0; side < 2; ++side) {
-        if (!is_dynamic(model, joined[side])) continue;
-        const int32_t slot = graph.slot_of[joined[side]];
-        constraints[side] = graph.offsets[slot + 1] - graph.offsets[slot];
-        mass[side] = mass_of(bodies, (size_t)joined[side]);
-    }
+    const pair_bodies pair = contacts.bodies[p];
+    const double mass[2] = {alone & 1 ? mass_of(bodies, (size_t)pair.body_a) : 0,
+                            alone & 2 ? mass_of(bodies, (size_t)pair.body_b) : 0};
+    const int constraints[2] = {alone & 1, alone >> 1};
     return weight_most(constraints, mass, (int)contacts.difference[p].w);
 }
 
 /* B of the pair of the lane's side. Both of its sides work it out; the one at its first dynamic body keeps it. */
 static __device__ __forceinline__ double weigh_side(const model_view &model, const body_view &bodies,
-                                                    const graph_view &graph, const contact_view &contacts,
-                                                    const weight_view &weights, const eight_sides &sides,
-                                                    const cuda_island &island, bool first)
+                                                    const contact_view &contacts, const weight_view &weights,
+                                                    const eight_sides &sides, const cuda_island &island, bool first)
 {
     const int32_t p = sides.code / 2;
     const double load = (double)sides.load, response = (double)sides.response;
     const bool a = is_dynamic(model, sides.bodies.body_a), both = a && is_dynamic(model, sides.bodies.body_b);
-    const double scale = island.rescale,
+    const double most = sides.alone ? most_of(bodies, contacts, sides.alone, p) : HUGE_VAL, scale = island.rescale,
                  taken = scale > 0 ? weights.weight[p]
-                                   : weight_of_pair(&island.weights, load,
-                                                    most_of(model, bodies, graph, contacts, sides.bodies, p), response),
+                                   : weight_of_pair(&island.weights, load, most, response),
                  B = scale > 0 ? taken * scale : taken;
     if (sides.code & 1 && a) return B;
     contacts.inv_s[p] = (solver_real)(both ? B / 2 : B);
@@ -101,6 +93,14 @@ static __device__ __forceinline__ void add_normals(const contact_view &contacts,
     });
 }
 
+/* Has a body one constraint? */
+static __device__ __forceinline__ bool is_alone(const model_view &model, const graph_view &graph, int32_t body)
+{
+    if (!is_dynamic(model, body)) return false;
+    const int32_t slot = graph.slot_of[body];
+    return graph.offsets[slot + 1] - graph.offsets[slot] == 1;
+}
+
 /* Those from place `begin` on. Every lane of the warp comes here. */
 static __device__ __forceinline__ eight_sides fetch_sides(const model_view &model, const graph_view &graph,
                                                           const contact_view &contacts, const weight_view &weights,
@@ -123,6 +123,8 @@ static __device__ __forceinline__ eight_sides fetch_sides(const model_view &mode
         out.number[0][j] = pair ? arms[0] : (solver_real)0;
         out.number[1][j] = pair && more ? arms[LANES] : (solver_real)0;
     }
+    /* Asked for after all that does not wait for the bodies. */
+    out.alone = !own ? 0 : is_alone(model, graph, out.bodies.body_a) | is_alone(model, graph, out.bodies.body_b) << 1;
     return out;
 }
 
@@ -141,7 +143,7 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
         const bool rows = !CLOSED && sides.code >= 0 && sides.code >= 2 * v.contacts.pair_capacity;
         const double B = sides.code < 0 || rows
                              ? 0
-                             : weigh_side(v.model, v.bodies, v.graph, v.contacts, v.weights, sides, island, first);
+                             : weigh_side(v.model, v.bodies, v.contacts, v.weights, sides, island, first);
         if (rows) add_weighted_rows(v.rows, sides.code / 2 - v.contacts.pair_capacity, sides.code & 1, C);
         else if (!three && sides.code >= 0) add_normals(v.contacts, sides.code, B, C);
 #pragma unroll

@@ -39,7 +39,8 @@ struct sadmm_contact_pair {
 struct sadmm_contact_point {
     double arm_a[3], arm_b[3]; /* from the centre of mass, m, world; arm_a is 0 when a is static (same for b) */
     double gap;                /* m (world level) */
-    double error;              /* e, m/s: given at the problem level; at the world level see math/contact.h */
+    double error;              /* e, m/s: given at the problem level; at the world level what is added to that of
+                                  math/contact.h: a push that bodies are to be moved by alone (solve/push.h), mostly 0 */
     double impulse[3];         /* lambda on b, world frame, N s: warm start in, solution out */
     uint32_t feature;
     uint32_t migrates; /* 1: the set's `migrations` has an entry of it, 0: none */

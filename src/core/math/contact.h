@@ -14,6 +14,15 @@ SADMM_INLINE double contact_error(double gap, double dt, double baumgarte, doubl
     return gap >= 0 ? speed : pushed;
 }
 
+/* How much of gravity, which gives `pull` m/s a step, takes back the velocity that a push of this speed leaves. The push
+ * shrinks by a share of itself each step, as the overlap does. Up to 1 gravity slows bodies down by as much: they follow
+ * it, and have no velocity when nothing overlaps any more; what friction alone slows down ends within d / (2 mu), d the
+ * overlap. */
+SADMM_INLINE double contact_push_takes(double speed, double baumgarte, double pull)
+{
+    return pull > 0 ? baumgarte * speed / pull : INFINITY;
+}
+
 /* Does a contact that approaches (negative) touch within the step, faster than the threshold of restitution? */
 SADMM_INLINE int contact_hits(double gap, double approach, double dt, double threshold)
 {

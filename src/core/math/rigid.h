@@ -39,6 +39,9 @@ SADMM_INLINE int rigid_is_isotropic(vec3 inertia)
     return hi - lo <= 4 * SADMM_EPSILON * hi;
 }
 
+/* Below this rate of convergence sweeps (rigid_mean_spin) are faster than Newton's method. */
+#define RIGID_SLOW 0.02
+
 /* Solve M x = r for a general 3x3 M (rows) by Cramer's rule. */
 SADMM_INLINE vec3 m3_solve(mat3 m, vec3 r)
 {
@@ -73,73 +76,115 @@ SADMM_INLINE vec3 rigid_angular_velocity(quat q, vec3 inertia, vec3 momentum)
     return m3_mul(R, v3(body.x / inertia.x, body.y / inertia.y, body.z / inertia.z));
 }
 
-/* tan(x) / x of half an angle, of 1 rad at most: far from where it has none. Series below 0.1 rad: its next term is under
- * 1e-17. */
-SADMM_INLINE real rigid_half_tangent(real angle)
+/* tan(x) / x by y = x^2: that of half an angle of 0.5 rad at most, to rounding (its continued fraction). */
+SADMM_INLINE real rigid_half_tangent(real y)
 {
-    const double x = angle < 1 ? 0.5 * (double)angle : 0.5, y = x * x;
-    if (x > 0.05) return (real)(tan(x) / x);
-    return (real)(1 + y * (1 / 3. + y * (2 / 15. + y * (17 / 315. + y * (62 / 2835. + y * (1382 / 155925.))))));
+    const real z = y < (real)0.0625 ? y : (real)0.0625;
+    return (10395 - z * (1260 - 21 * z)) / (10395 - z * (4725 - z * (210 - z)));
 }
 
-/* The mean angular velocity m, in the body's frame, of h of motion without torque from angular velocity w and momentum
- * p = I w,
+/* The mean angular velocity m, in the body's frame, of h of motion without torque from angular velocity w:
  *
- *     I m - p + h/2 m x I m = 0,
+ *     I m - I w + h/2 m x I m = 0,    c = h/2 ((I_z - I_y) / I_x, (I_x - I_z) / I_y, (I_y - I_x) / I_z).
  *
- * by iteration, which comes near, then by Newton's method. The turn by 2 atan(h |m| / 2) about m takes p to 2 I m - p,
- * which has the same energy; longer by rigid_half_tangent, h makes it the turn of the angle that a body goes by in that
- * time about an axis that stays. */
-SADMM_INLINE vec3 rigid_mean_spin(vec3 inertia, vec3 w, vec3 p, real h)
+ * Two sweeps over its equations take the error down by (|c| |w|)^3. Where that is slow they come near, and Newton's method
+ * closes in. */
+SADMM_INLINE vec3 rigid_mean_spin(vec3 w, vec3 c)
 {
-    const vec3 inverse = v3(1 / inertia.x, 1 / inertia.y, 1 / inertia.z);
-    const real turn = h * v3_max_abs(w);
+    const real rate = v3_max_abs(c) * v3_max_abs(w), faster = rate * rate * rate;
+    real error = 1;
     vec3 m = w;
     int k;
-    for (k = 0; k < 2; ++k) {
-        const vec3 g = v3_cross(m, v3(inertia.x * m.x, inertia.y * m.y, inertia.z * m.z));
-        m = v3(w.x - h / 2 * (g.x * inverse.x), w.y - h / 2 * (g.y * inverse.y), w.z - h / 2 * (g.z * inverse.z));
-    }
-    for (k = 0; k < 8; ++k) {
-        const vec3 Im = v3(inertia.x * m.x, inertia.y * m.y, inertia.z * m.z), g = v3_cross(m, Im);
-        const vec3 f = v3_madd(v3_sub(Im, p), h / 2, g);
-        real step, size;
-        vec3 dm;
-        mat3 J; /* I + h/2 ([m]x I - [I m]x) */
-        J.r[0] = v3(inertia.x, h / 2 * (-m.z * inertia.y + Im.z), h / 2 * (m.y * inertia.z - Im.y));
-        J.r[1] = v3(h / 2 * (m.z * inertia.x - Im.z), inertia.y, h / 2 * (-m.x * inertia.z + Im.x));
-        J.r[2] = v3(h / 2 * (-m.y * inertia.x + Im.y), h / 2 * (m.x * inertia.y - Im.x), inertia.z);
-        dm = m3_solve(J, f);
-        m = v3_sub(m, dm);
-        step = v3_max_abs(dm), size = v3_max_abs(m);
-        if (!(turn * step * step > SADMM_EPSILON * size * size)) break; /* the next one would be rounding */
+    do {
+        for (k = 0; k < 2; ++k) {
+            m.x = w.x - c.x * (m.y * m.z);
+            m.y = w.y - c.y * (m.z * m.x);
+            m.z = w.z - c.z * (m.x * m.y);
+        }
+        error *= faster;
+    } while (error > SADMM_EPSILON && rate < (real)RIGID_SLOW);
+    for (k = 0; k < 8 && error > SADMM_EPSILON; ++k) {
+        const vec3 f = v3(m.x - w.x + c.x * (m.y * m.z), m.y - w.y + c.y * (m.z * m.x), m.z - w.z + c.z * (m.x * m.y));
+        vec3 d;
+        mat3 J;
+        J.r[0] = v3(1, c.x * m.z, c.x * m.y);
+        J.r[1] = v3(c.y * m.z, 1, c.y * m.x);
+        J.r[2] = v3(c.z * m.y, c.z * m.x, 1);
+        d = m3_solve(J, f);
+        m = v3_sub(m, d);
+        error = rate * v3_norm2(d) / v3_norm2(m);
     }
     return m;
 }
 
-/* dt of motion without torque of a body whose moments differ, in pieces of at most half a radian, in which Newton's
- * method closes in at once. The angular momentum in space is as it was, to rounding, and so is the energy. */
-SADMM_CALLED struct rigid_spin rigid_tumble(struct rigid_spin from, vec3 inertia, real dt)
+/* Of a body whose moments differ, in its own frame: where it is turned to, that as a matrix, how fast it turns. */
+struct rigid_tumbling {
+    quat orientation;
+    mat3 R;
+    vec3 own;
+};
+
+/* No less than the square of a body's angular velocity (own: in its frame) at any time of its motion without torque: by
+ * energy and angular momentum, which stay. Of one that turns about the axis of the least or the largest moment it is that
+ * square. Times `scale`, which is returned by itself. */
+SADMM_INLINE real rigid_rate2_scaled(vec3 inertia, real energy2, real momentum2, real *scale)
 {
-    const real turn = v3_norm(from.angular) * dt;
-    const int pieces = turn > (real)0.5 ? (int)real_min(turn * 2 + 1, (real)4096) : 1;
-    const real h = dt / (real)pieces;
-    mat3 R = q_matrix(from.orientation);
-    vec3 w = m3_tmul(R, from.angular), p = v3(inertia.x * w.x, inertia.y * w.y, inertia.z * w.z);
-    const vec3 momentum = m3_mul(R, p);
+    const real lo = real_min(inertia.x, real_min(inertia.y, inertia.z)),
+               hi = real_max(inertia.x, real_max(inertia.y, inertia.z));
+    *scale = lo * hi;
+    return (lo + hi) * energy2 - momentum2;
+}
+SADMM_INLINE real rigid_rate2(vec3 inertia, vec3 own)
+{
+    const vec3 p = v3(inertia.x * own.x, inertia.y * own.y, inertia.z * own.z);
+    real scale, rate2 = rigid_rate2_scaled(inertia, v3_dot(p, own), v3_norm2(p), &scale);
+    return rate2 / scale;
+}
+
+/* How many pieces a motion without torque is made in: of half a radian at most, in which Newton's method closes in at
+ * once. The way back is made in as many. */
+SADMM_INLINE int rigid_pieces(vec3 inertia, real energy2, real momentum2, real dt)
+{
+    real scale, square = dt * dt * rigid_rate2_scaled(inertia, energy2, momentum2, &scale);
+    return 4 * square > scale ? (int)real_min(2 * real_sqrt(square / scale) + 1, (real)4096) : 1;
+}
+
+/* dt of motion without torque by the midpoint rule: the turn by 2 atan(h |m| / 2) about the mean m takes w to 2 m - w, which
+ * has the same energy and in space the same angular momentum, to rounding. h is longer than the time by as much as makes
+ * that the turn of the angle by which a body goes about a principal axis. By -dt it goes back to where it was. */
+SADMM_CALLED struct rigid_tumbling rigid_tumble_on(struct rigid_tumbling from, vec3 inertia, real dt)
+{
+    const vec3 inverse = v3(1 / inertia.x, 1 / inertia.y, 1 / inertia.z),
+               p = v3(inertia.x * from.own.x, inertia.y * from.own.y, inertia.z * from.own.z);
+    const real energy2 = v3_dot(p, from.own), momentum2 = v3_norm2(p);
+    const int pieces = rigid_pieces(inertia, energy2, momentum2, dt);
+    const real half = dt / (real)(2 * pieces), rate2 = energy2 / momentum2 * energy2,
+               stretched = half * rigid_half_tangent(half * half * rate2);
+    const vec3 c = v3(stretched * ((inertia.z - inertia.y) * inverse.x), stretched * ((inertia.x - inertia.z) * inverse.y),
+                      stretched * ((inertia.y - inertia.x) * inverse.z));
     int k;
     for (k = 0; k < pieces; ++k) {
-        const real stretched = h * rigid_half_tangent(h * v3_norm(w));
-        const vec3 m = rigid_mean_spin(inertia, w, p, stretched);
+        const vec3 m = rigid_mean_spin(from.own, c);
         quat step;
-        step.w = 1;
-        step.x = stretched / 2 * m.x, step.y = stretched / 2 * m.y, step.z = stretched / 2 * m.z;
+        step.w = 1, step.x = stretched * m.x, step.y = stretched * m.y, step.z = stretched * m.z;
         from.orientation = q_normalize(q_mul(from.orientation, step));
-        R = q_matrix(from.orientation);
-        p = m3_tmul(R, momentum);
-        w = v3(p.x / inertia.x, p.y / inertia.y, p.z / inertia.z);
+        from.own = v3_sub(v3_scale(m, 2), from.own);
     }
-    from.angular = m3_mul(R, w);
+    from.R = q_matrix(from.orientation);
+    return from;
+}
+
+/* The same in the world's frame; what does not turn stays as it is. */
+SADMM_CALLED struct rigid_spin rigid_tumble(struct rigid_spin from, vec3 inertia, real dt)
+{
+    struct rigid_tumbling t;
+    if (v3_max_abs(from.angular) == 0) return from;
+    t.orientation = from.orientation;
+    t.R = q_matrix(from.orientation);
+    t.own = m3_tmul(t.R, from.angular);
+    t = rigid_tumble_on(t, inertia, dt);
+    from.orientation = t.orientation;
+    from.angular = m3_mul(t.R, t.own);
     return from;
 }
 

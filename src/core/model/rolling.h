@@ -21,18 +21,29 @@
 /* (omega dt)^2, half a radian a step: from there to 1 frictionless rocking is no longer stable by itself. */
 #define ROLLING_STIFF 0.25
 
+/* What a body takes along from contacts that rolled. Few have any of it, so that it is not read, or cleared, where a bit
+ * does not say that it is there: records of bodies are what large worlds move. */
+enum rolling_kept { ROLLING_OWES = 1, ROLLING_IS_STIFF = 2 };
+
 /* Does rocking have to be taken out of the body? */
-SADMM_INLINE bool rolling_is_stiff(const struct sadmm_rigid *body)
-{
-    return body->stiffness[0] + body->stiffness[1] + body->stiffness[2] > 0;
-}
+SADMM_INLINE bool rolling_is_stiff(const struct sadmm_rigid *body) { return (body->rolls & ROLLING_IS_STIFF) != 0; }
 
 /* Nothing of the last step counts: its state was set. */
-SADMM_INLINE void rolling_forget(struct sadmm_rigid *body)
+SADMM_INLINE void rolling_forget(struct sadmm_rigid *body) { body->rolls = body->mean = 0; }
+
+/* What is not of account becomes 0. */
+SADMM_INLINE void rolling_clear(struct sadmm_rigid *body)
 {
     int k;
-    for (k = 0; k < 6; ++k) body->owed[k] = body->stiffness[k] = 0;
-    body->mean = 0;
+    for (k = 0; k < 6 && !(body->rolls & ROLLING_OWES); ++k) body->owed[k] = 0;
+    for (k = 0; k < 6 && !(body->rolls & ROLLING_IS_STIFF); ++k) body->stiffness[k] = 0;
+}
+
+/* Adds to b what the body is owed, N s, N m s. */
+SADMM_INLINE void rolling_pay(const struct sadmm_rigid *body, double b[6])
+{
+    int k;
+    for (k = 0; k < 6 && body->rolls & ROLLING_OWES; ++k) b[k] += body->owed[k];
 }
 
 /* A contact halfway through the step. migration: NULL, then it is what it is. */
@@ -53,18 +64,40 @@ SADMM_INLINE struct rolling_halfway rolling_halfway_of(const double normal[3], c
 }
 
 /* Part of what contacts give the body in a step of dt. */
-SADMM_INLINE double rolling_wrench(const struct sadmm_rigid *before, double dt, int k) { return before->owed[k] / dt; }
+SADMM_INLINE double rolling_wrench(const struct sadmm_rigid *before, double dt, int k)
+{
+    return before->rolls & ROLLING_OWES ? before->owed[k] / dt : 0;
+}
 
-/* What it comes to for a body with these principal moments: nothing where the step resolves the rocking. */
-SADMM_INLINE void rolling_judge(const double inertia[3], double dt, double stiffness[6])
+/* Is the stiffness of a body with these principal moments more than the step resolves? */
+SADMM_INLINE bool rolling_is_unresolved(const double inertia[3], double dt, const double stiffness[6])
 {
     const double least = inertia[0] < inertia[1] ? (inertia[0] < inertia[2] ? inertia[0] : inertia[2])
                                                  : (inertia[1] < inertia[2] ? inertia[1] : inertia[2]),
                  /* of one contact the larger eigenvalue is half of the trace */
         most = (stiffness[0] + stiffness[1] + stiffness[2]) / 2;
+    return dt * dt * most > ROLLING_STIFF * least;
+}
+
+/* The body's contacts begin to be added up, where they have not. */
+SADMM_INLINE void rolling_begin(struct sadmm_rigid *body)
+{
+    if (body->rolls) return;
+    rolling_clear(body);
+    body->rolls = ROLLING_OWES | ROLLING_IS_STIFF;
+}
+
+/* Sums over its contacts, which may be the body's own; from: where it was as the step began. */
+SADMM_INLINE void rolling_keep(struct sadmm_rigid *body, const double from[3], double dt, double owed[6],
+                               const double stiffness[6])
+{
     int k;
-    if (dt * dt * most > ROLLING_STIFF * least) return;
-    for (k = 0; k < 6; ++k) stiffness[k] = 0;
+    rolling_moved(from, body->position, owed);
+    body->rolls = ROLLING_OWES | (rolling_is_unresolved(body->inertia, dt, stiffness) ? ROLLING_IS_STIFF : 0);
+    for (k = 0; k < 6; ++k) {
+        body->owed[k] = owed[k];
+        body->stiffness[k] = stiffness[k];
+    }
 }
 
 #endif

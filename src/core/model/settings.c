@@ -28,6 +28,7 @@ sadmm_settings sadmm_settings_default(void)
         .slop = 1e-5,
         .correction_speed = 1,
         .restitution_threshold = 0.1,
+        .hits = 16,
         .threads = 0,
     };
     return s;
@@ -62,6 +63,7 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
         {"iterations", s->iterations, 1, 1000000},
         {"direct_points", s->direct_points, 0, SADMM_MOST_DIRECT_POINTS},
         {"check_period", s->check_period, 1, 1000000},
+        {"hits", s->hits, 0, SADMM_MOST_HITS},
         {"threads", s->threads, 0, 1024},
     };
     const struct {
@@ -137,7 +139,7 @@ sadmm_settings sadmm_settings_of_substep(const sadmm_settings *whole)
     ONE(residual_tolerance) ONE(certificate_tolerance) ONE(certificate_momentum_tolerance) ONE(check_period)     \
     ONE(measure_residuals) ONE(certify) ONE(recover_wrenches)                                                    \
     ONE(baumgarte) ONE(slop) ONE(correction_speed) ONE(restitution_threshold)                                    \
-    ONE(threads)
+    ONE(hits) ONE(threads)
 
 /* A struct with too few initialisers is an error here: no new member can be left out of the list. */
 #pragma GCC diagnostic push

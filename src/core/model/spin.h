@@ -25,11 +25,29 @@ SADMM_INLINE struct rigid_spin spin_halfway(const struct sadmm_rigid *body, doub
     return rigid_drift(spin_start(body), v3_load(body->inertia), dt / 2);
 }
 
-/* The same for what A and b are of: where moments are equal, the start. */
-SADMM_INLINE struct rigid_spin spin_of_system(const struct sadmm_rigid *body, double dt)
+/* The same for what A and b are of: where moments are equal, the start. With its matrix, and the angular momentum. */
+struct spin_system {
+    quat orientation;
+    mat3 R;
+    vec3 angular, momentum; /* world */
+};
+
+SADMM_INLINE struct spin_system spin_of_system(const struct sadmm_rigid *body, double dt)
 {
-    const struct rigid_spin start = spin_start(body);
-    return rigid_is_isotropic(v3_load(body->inertia)) ? start : rigid_tumble(start, v3_load(body->inertia), dt / 2);
+    const vec3 inertia = v3_load(body->inertia);
+    struct spin_system out;
+    struct rigid_tumbling t;
+    out.orientation = t.orientation = q_load(body->orientation);
+    out.angular = v3_load(body->velocity + 3);
+    out.R = t.R = q_matrix(t.orientation);
+    t.own = m3_tmul(t.R, out.angular);
+    out.momentum = m3_mul(t.R, v3(inertia.x * t.own.x, inertia.y * t.own.y, inertia.z * t.own.z));
+    if (rigid_is_isotropic(inertia) || v3_max_abs(t.own) == 0) return out;
+    t = rigid_tumble_on(t, inertia, dt / 2);
+    out.orientation = t.orientation;
+    out.R = t.R;
+    out.angular = m3_mul(t.R, t.own);
+    return out;
 }
 
 /* Velocities of the start with the spin halfway, to first order, which is enough to compare a solution with (leads). */

@@ -31,10 +31,11 @@ struct sadmm_rigid {
     double wrench[6];       /* external, N, N m, world */
     double gravity_scale;   /* of the settings' gravity */
     double damping[2];      /* linear, angular, 1/s (forces.h) */
+    int32_t mean;           /* it moved by the mean of its velocities before the last step and after it */
+    int32_t rolls;          /* which of owed and stiffness are of account: enum rolling_kept; the others may be anything */
+    int32_t reserved[2];
     double owed[6];         /* of the last step's contacts that rolled, N s, N m s, world (rolling.h) */
     double stiffness[6];    /* against rocking that no step resolves, N m: xx, yy, zz, xy, xz, yz, world (rolling.h) */
-    int32_t mean;           /* it moved by the mean of its velocities before the last step and after it */
-    int32_t reserved[3];
 };
 
 /* What is remembered of a body's last steps (steady.h). */
@@ -63,6 +64,7 @@ struct sadmm_system {
     bool errors_given;               /* points carry e (problem level) instead of a gap */
     bool first;                      /* no step came before: where there are no impulses, none are known */
     struct sadmm_rows *rows;         /* constraints given by Jacobian rows; NULL: none */
+    const int32_t *islands;          /* (body_count) as sadmm_islands finds them; NULL: not known yet */
 };
 
 /* Constraints given by rows. */

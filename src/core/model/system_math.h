@@ -24,7 +24,7 @@ SADMM_INLINE sym3 sadmm_stiffness(const struct sadmm_rigid *body, double dt)
 }
 
 /* Its inertia with that; b, which is made of this angular velocity, along with it: what is added resists changes alone. */
-SADMM_RARE sym3 sadmm_stiffened(const struct sadmm_rigid *body, vec3 angular, double dt, sym3 I, double b[6])
+SADMM_INLINE sym3 sadmm_stiffened(const struct sadmm_rigid *body, vec3 angular, double dt, sym3 I, double b[6])
 {
     const sym3 more = sadmm_stiffness(body, dt);
     v3_store(v3_add(v3_load(b + 3), s3_mul(more, angular)), b + 3);
@@ -33,28 +33,27 @@ SADMM_RARE sym3 sadmm_stiffened(const struct sadmm_rigid *body, vec3 angular, do
 
 /* Eq. (1) of a rigid body: A = diag(m I, world inertia) halfway through the step (spin: spin_of_system) and b = A v +
  * dt (m g + f, tau), with damping (forces.h), and what contacts that roll owe it. Returns the inertia; *mass: of A. */
-SADMM_INLINE sym3 sadmm_rigid_body_at(const struct sadmm_rigid *body, struct rigid_spin spin,
+SADMM_INLINE sym3 sadmm_rigid_body_at(const struct sadmm_rigid *body, const struct spin_system *spin,
                                       const struct sadmm_settings *settings, double *mass, double b[6])
 {
     const double dt = settings->dt;
-    const vec3 inertia = v3_load(body->inertia);
     const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
-    const vec3 momentum = rigid_angular_momentum(spin.orientation, inertia, spin.angular);
     for (int k = 0; k < 3; ++k) {
         const double gained = dt * forces_gravity(body, settings->gravity, k);
         b[k] = body->mass * (linear.keep * body->velocity[k] + gained) + dt * body->wrench[k];
     }
-    v3_store(v3_madd(v3_scale(momentum, angular.keep), dt, v3_load(body->wrench + 3)), b + 3);
-    for (int k = 0; k < 6; ++k) b[k] += body->owed[k];
+    v3_store(v3_madd(v3_scale(spin->momentum, angular.keep), dt, v3_load(body->wrench + 3)), b + 3);
+    rolling_pay(body, b);
     *mass = linear.mass * body->mass;
-    const sym3 I = rigid_world_inertia(q_matrix(spin.orientation), v3_scale(inertia, angular.mass));
-    return rolling_is_stiff(body) ? sadmm_stiffened(body, spin.angular, dt, I, b) : I;
+    const sym3 I = rigid_world_inertia(spin->R, v3_scale(v3_load(body->inertia), angular.mass));
+    return rolling_is_stiff(body) ? sadmm_stiffened(body, spin->angular, dt, I, b) : I;
 }
 
 SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double *mass,
                                    double b[6])
 {
-    return sadmm_rigid_body_at(body, spin_of_system(body, settings->dt), settings, mass, b);
+    const struct spin_system spin = spin_of_system(body, settings->dt);
+    return sadmm_rigid_body_at(body, &spin, settings, mass, b);
 }
 
 /* b of the motion less c, of a rigid body: b - A c. */
@@ -166,12 +165,11 @@ SADMM_INLINE struct sadmm_impact_body sadmm_impact_body_of(const struct sadmm_sy
     }
     if (i < 0) return out;
     const struct sadmm_rigid *body = &system->rigid[i];
-    const struct rigid_spin spin = spin_of_system(body, dt);
-    const mat3 R = q_matrix(spin.orientation);
+    const struct spin_system spin = spin_of_system(body, dt);
     const vec3 inertia = v3_load(body->inertia);
     const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
     const vec3 heavy = v3_scale(inertia, angular.mass);
-    const sym3 inverse = rigid_world_inertia(R, v3(1 / heavy.x, 1 / heavy.y, 1 / heavy.z));
+    const sym3 inverse = rigid_world_inertia(spin.R, v3(1 / heavy.x, 1 / heavy.y, 1 / heavy.z));
     out.linear = v3_scale(v3_load(body->velocity), linear.keep / linear.mass);
     out.angular = v3_scale(spin.angular, angular.keep / angular.mass);
     out.push = v3_scale(v3_madd(v3_scale(v3_load(settings->gravity), body->gravity_scale), 1 / body->mass,
@@ -253,7 +251,8 @@ SADMM_INLINE double sadmm_contact_e_plain(const struct sadmm_system *system, con
 {
     return system->errors_given ? point->error
                                 : contact_error(point->gap, settings->dt, settings->baumgarte, settings->slop,
-                                                settings->correction_speed);
+                                                settings->correction_speed) +
+                                      point->error;
 }
 
 /* e of a pair's k-th point. `points`: the pair's. */

@@ -25,10 +25,11 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
     if (!bodies) memcpy(b, system->b + 6 * first, 6 * count * sizeof *b);
     for (size_t i = 0; i < count && !bodies; ++i) pack(system->A + 36 * (first + i), A + PACKED6 * i);
     for (size_t i = 0; i < count && bodies; ++i) {
-        const struct rigid_spin spin = spin_of_system(&bodies[first + i], settings->dt);
+        const struct spin_system spin = spin_of_system(&bodies[first + i], settings->dt);
         double mass;
-        const sym3 I = sadmm_rigid_body_at(&bodies[first + i], spin, settings, &mass, b + 6 * i);
+        const sym3 I = sadmm_rigid_body_at(&bodies[first + i], &spin, settings, &mass, b + 6 * i);
         q_store(spin.orientation, leads[first + i].halfway);
+        v3_store(spin.angular, leads[first + i].spin);
         pack_rigid(mass, I, A + PACKED6 * i);
         if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (first + i), b + 6 * i);
     }
@@ -50,9 +51,8 @@ void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const doub
 {
     for (size_t i = 0; i < count; ++i) {
         struct sadmm_lead *out = &leads[i];
-        double before[6];
-        spin_before(&bodies[i], settings->dt, before);
-        lead_own(before, velocity + 6 * i, out->lead);
+        lead_own(bodies[i].velocity, velocity + 6 * i, out->lead);
+        for (int k = 0; k < 3; ++k) out->lead[3 + k] = (velocity[6 * i + 3 + (size_t)k] - out->spin[k]) / 2;
         out->kind = LEAD_OWN;
         out->linear = size3(out->lead);
         out->angular = size3(out->lead + 3);

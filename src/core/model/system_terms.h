@@ -18,7 +18,7 @@ struct sadmm_lead {
     double linear, angular;             /* size3 of its parts */
     double moves_linear, moves_angular; /* lead_speed_part: m/s, rad/s */
     double rest;                        /* lead_rest_speed, m/s */
-    double halfway[4];                  /* the body's orientation in the middle of the step: sadmm_body_terms */
+    double halfway[4], spin[3];         /* what A and b are of (spin.h): sadmm_body_terms */
     enum lead_kind kind;                /* what becomes of it: LEAD_OWN, until contacts are known */
     int touch;                          /* forces_touch (forces.h) */
 };

@@ -10,7 +10,9 @@
 static int32_t readable_contacts(const sadmm_world *world)
 {
     if (!world->contacts_readable) return 0;
-    return world->resident.contacts_behind ? world->report.contacts : (int32_t)world->contacts.point_count;
+    return world->resident.contacts_behind
+               ? world->report.contacts
+               : (int32_t)(world->contacts.point_count + world->start.hit_count - world->start.hit_first);
 }
 
 int32_t sadmm_world_contact_count(sadmm_world *world)
@@ -34,12 +36,12 @@ static size_t pair_of(const struct sadmm_contact_set *contacts, int32_t point)
     return low;
 }
 
-/* As the caller numbers them. */
-static int32_t triangle_of(const sadmm_world *world, const struct sadmm_contact_pair *pair)
+/* As the caller numbers them. shape: b of the pair. */
+static int32_t triangle_of(const sadmm_world *world, int32_t shape, uint32_t child)
 {
-    if (world->geometries[world->shapes[pair->shape_b].geometry].type != SADMM_SHAPE_MESH) return -1;
-    const int32_t *source = world->block_shapes[pair->shape_b].mesh->source;
-    return source ? source[pair->child] : (int32_t)pair->child;
+    if (world->geometries[world->shapes[shape].geometry].type != SADMM_SHAPE_MESH) return -1;
+    const int32_t *source = world->block_shapes[shape].mesh->source;
+    return source ? source[child] : (int32_t)child;
 }
 
 void sadmm_world_contact_position(const sadmm_world *world, const struct sadmm_contact_pair *pair,
@@ -60,24 +62,40 @@ double sadmm_world_contact_speed(const sadmm_world *world, const struct sadmm_co
     return -v3_dot(x, v3_load(pair->normal));
 }
 
+static void read_common(const sadmm_world *world, int32_t shape_a, int32_t shape_b, const double normal[3],
+                        const double impulse[3], double dt, sadmm_contact *out)
+{
+    out->shape_a = sadmm_world_shape_id(world, shape_a);
+    out->shape_b = sadmm_world_shape_id(world, shape_b);
+    out->body_a = sadmm_world_body_id(world, world->shapes[shape_a].body);
+    out->body_b = sadmm_world_body_id(world, world->shapes[shape_b].body);
+    for (int k = 0; k < 3; ++k) {
+        out->normal[k] = normal[k];
+        out->impulse[k] = impulse[k];
+        out->force[k] = impulse[k] / dt;
+    }
+}
+
+static void read_hit(const sadmm_world *world, const struct sadmm_world_hit *hit, double dt, sadmm_contact *out)
+{
+    read_common(world, hit->shape_a, hit->shape_b, hit->normal, hit->impulse, dt, out);
+    memcpy(out->position, hit->position, sizeof out->position);
+    out->gap = 0;
+    out->friction = hit->friction;
+    out->feature = hit->feature;
+    out->triangle = triangle_of(world, hit->shape_b, hit->child);
+}
+
 static void read_contact(const sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t index,
                          double dt, sadmm_contact *out)
 {
     const struct sadmm_contact_point *point = &world->contacts.points[index];
-    out->shape_a = sadmm_world_shape_id(world, pair->shape_a);
-    out->shape_b = sadmm_world_shape_id(world, pair->shape_b);
-    out->body_a = sadmm_world_body_id(world, world->shapes[pair->shape_a].body);
-    out->body_b = sadmm_world_body_id(world, world->shapes[pair->shape_b].body);
-    for (int k = 0; k < 3; ++k) {
-        out->normal[k] = pair->normal[k];
-        out->impulse[k] = point->impulse[k];
-        out->force[k] = point->impulse[k] / dt;
-    }
+    read_common(world, pair->shape_a, pair->shape_b, pair->normal, point->impulse, dt, out);
     sadmm_world_contact_position(world, pair, point, out->position);
     out->gap = point->gap;
     out->friction = pair->friction;
     out->feature = point->feature;
-    out->triangle = triangle_of(world, pair);
+    out->triangle = triangle_of(world, pair->shape_b, pair->child);
 }
 
 static sadmm_status check_range(sadmm_world *world, int32_t first, int32_t count)
@@ -98,8 +116,14 @@ sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t cou
     TRY(sadmm_check_given(contacts, "contacts", &world->error));
     TRY(sadmm_world_pull_contacts(world));
     const double dt = sadmm_settings_of_substep(&world->step_settings).dt;
+    const int32_t points = (int32_t)world->contacts.point_count;
     size_t p = pair_of(&world->contacts, first);
     for (int32_t k = first; k < first + count; ++k) {
+        if (k >= points) {
+            read_hit(world, &world->start.hits[world->start.hit_first + (size_t)(k - points)], dt,
+                     &contacts[k - first]);
+            continue;
+        }
         while (k >= world->contacts.pairs[p].first + world->contacts.pairs[p].count) ++p;
         read_contact(world, &world->contacts.pairs[p], k, dt, &contacts[k - first]);
     }
@@ -116,7 +140,9 @@ sadmm_status sadmm_world_contact_errors(sadmm_world *world, int32_t first, int32
     if (world->certified_step != world->report.step)
         return sadmm_fail(&world->error, SADMM_ERROR_UNAVAILABLE,
                           "errors of contacts: the last step had none measured; settings.certify asks for them");
-    memcpy(errors, world->certificate_workspace.contact_errors + first, (size_t)count * sizeof *errors);
+    for (int32_t k = first; k < first + count; ++k) /* hits are solved by themselves, to rounding */
+        errors[k - first] =
+            k < (int32_t)world->contacts.point_count ? world->certificate_workspace.contact_errors[k] : 0;
     return SADMM_OK;
 }
 

@@ -109,6 +109,33 @@ static sadmm_status list_pairs(sadmm_world *world, size_t *count)
     return SADMM_OK;
 }
 
+static int compare_shapes(const struct sadmm_touch *touch, int32_t a, int32_t b)
+{
+    const uint32_t slot_a = (uint32_t)a + 1, slot_b = (uint32_t)b + 1;
+    if (touch->a.slot != slot_a) return touch->a.slot < slot_a ? -1 : 1;
+    return touch->b.slot == slot_b ? 0 : touch->b.slot < slot_b ? -1 : 1;
+}
+
+/* Hits taken at their moment, where no contact says that the two touch: into their place. */
+static bool add_hits(sadmm_world *world, struct sadmm_touches *touching)
+{
+    for (size_t k = 0; k < world->start.hit_count; ++k) {
+        const struct sadmm_world_hit *hit = &world->start.hits[k];
+        size_t low = 0, high = touching->count;
+        while (low < high) {
+            const size_t middle = low + (high - low) / 2;
+            if (compare_shapes(&touching->list[middle], hit->shape_a, hit->shape_b) < 0) low = middle + 1;
+            else high = middle;
+        }
+        if (low < touching->count && compare_shapes(&touching->list[low], hit->shape_a, hit->shape_b) == 0) continue;
+        if (!add(world, touching, hit->shape_a, hit->shape_b, world->contacts.pair_count)) return false;
+        const struct sadmm_touch last = touching->list[touching->count - 1];
+        memmove(touching->list + low + 1, touching->list + low, (touching->count - 1 - low) * sizeof last);
+        touching->list[low] = last;
+    }
+    return true;
+}
+
 static sadmm_status list_touching(sadmm_world *world)
 {
     struct sadmm_touches *touching = &world->events.touching_now;
@@ -122,7 +149,7 @@ static sadmm_status list_touching(sadmm_world *world)
             continue; /* two shapes may have several pairs, one after the other */
         if (!add(world, touching, shapes.a, shapes.b, p)) return sadmm_fail_memory(&world->error, "events");
     }
-    return SADMM_OK;
+    return add_hits(world, touching) ? SADMM_OK : sadmm_fail_memory(&world->error, "events");
 }
 
 static sadmm_status list_inside(sadmm_world *world)
@@ -200,10 +227,28 @@ static bool any_begun(const struct sadmm_touches *before, const struct sadmm_tou
     return false;
 }
 
+/* The same of their hits in the step: the first one is where they have begun to touch. */
+static void describe_hits(const sadmm_world *world, const struct sadmm_touch *touch, sadmm_event *event)
+{
+    bool first = true;
+    for (size_t k = 0; k < world->start.hit_count; ++k) {
+        const struct sadmm_world_hit *hit = &world->start.hits[k];
+        if (compare_shapes(touch, hit->shape_a, hit->shape_b) != 0) continue;
+        for (int i = 0; i < 3; ++i) event->impulse[i] += hit->impulse[i];
+        if (!first) continue;
+        first = false;
+        memcpy(event->position, hit->position, sizeof event->position);
+        memcpy(event->normal, hit->normal, sizeof event->normal);
+        event->speed = hit->speed;
+    }
+}
+
 static void push_begun(sadmm_world *world, sadmm_event_type type, const struct sadmm_touch *touch)
 {
     sadmm_event *event = push(world, type, touch);
-    if (type == SADMM_EVENT_CONTACT_BEGUN) describe(world, touch->pair, event);
+    if (type != SADMM_EVENT_CONTACT_BEGUN) return;
+    if (touch->pair < world->contacts.pair_count) describe(world, touch->pair, event);
+    describe_hits(world, touch, event);
 }
 
 /* Both lists are in order; `before` becomes `now`. */

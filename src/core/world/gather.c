@@ -173,6 +173,7 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
         .friction_values = world->friction_pairs.values,
         .friction_pair_count = sadmm_pair_table_count(&world->friction_pairs),
         .gravity = gravity_size(settings.gravity),
+        .since = world->hit_since,
     };
     return input;
 }

@@ -244,6 +244,7 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     if (steps <= 0) return;
     world->resident.done = done->done;
     world->resident.bodies_behind = world->resident.contacts_behind = true;
+    world->start.hit_count = world->start.hit_first = 0; /* it takes none by themselves */
     world->resident.joints_behind = world->resident.joint_count > 0;
     world->stepped = world->contacts_readable = true;
     world->plan = done->plan;

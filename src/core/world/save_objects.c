@@ -6,6 +6,7 @@
 #include "collision/mesh.h"
 #include "core/base/memory.h"
 #include "core/base/utf8.h"
+#include "core/model/rolling.h"
 #include "save.h"
 
 /* A member that is added has to be listed below. */
@@ -82,6 +83,7 @@ void sadmm_archive_settings(struct sadmm_archive *archive, sadmm_settings *s)
     SADMM_ARCHIVE(archive, s->slop);
     SADMM_ARCHIVE(archive, s->correction_speed);
     SADMM_ARCHIVE(archive, s->restitution_threshold);
+    SADMM_ARCHIVE(archive, s->hits);
     SADMM_ARCHIVE(archive, s->threads);
     if (archive->reading && archive->status == SADMM_OK)
         sadmm_archive_expect(archive, sadmm_settings_validate(s, archive->error) == SADMM_OK, "settings");
@@ -134,7 +136,9 @@ static bool body_fits(const sadmm_world *world, const struct sadmm_world_body *b
         (!sadmm_all_finite(body->target.position, 3) ||
          sadmm_check_orientation("orientation", body->target.orientation, ignored, error) != SADMM_OK))
         return false;
-    if (!sadmm_all_finite(rigid->owed, 6) || !sadmm_all_finite(rigid->stiffness, 6)) return false;
+    if (!sadmm_all_finite(rigid->owed, 6) || !sadmm_all_finite(rigid->stiffness, 6) ||
+        (rigid->rolls & ~(ROLLING_OWES | ROLLING_IS_STIFF)))
+        return false;
     return sadmm_all_finite(&rigid->gravity_scale, 1) && sadmm_all_finite(rigid->damping, 2) && sadmm_all_finite(body->steady.change, 6) &&
            body->steady.dt >= 0 && sadmm_all_finite(&body->steady.dt, 1) && body->steady.streak[0] >= 0 &&
            body->steady.streak[1] >= 0 && sadmm_all_finite(body->contact_wrench, 6);
@@ -148,6 +152,7 @@ static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size
     if (!body->alive) return;
     SADMM_ARCHIVE(archive, body->type);
     SADMM_ARCHIVE(archive, body->environment);
+    rolling_clear(&body->rigid); /* equal worlds have equal saves */
     SADMM_ARCHIVE(archive, body->rigid);
     SADMM_ARCHIVE(archive, body->contact_wrench);
     SADMM_ARCHIVE(archive, body->steady);

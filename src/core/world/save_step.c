@@ -89,6 +89,30 @@ static void archive_contacts(struct sadmm_archive *archive, sadmm_world *world)
         sadmm_archive_expect(archive, contacts_fit(world), "contacts");
 }
 
+/* Hits that can be read. */
+static bool hits_fit(const sadmm_world *world)
+{
+    if (world->start.hit_first > world->start.hit_count) return false;
+    for (size_t k = 0; k < world->start.hit_count; ++k) {
+        const struct sadmm_world_hit *hit = &world->start.hits[k];
+        const struct sadmm_contact_pair pair = {.shape_b = hit->shape_b, .child = hit->child};
+        if (!shape_fits(world, hit->shape_a) || !shape_fits(world, hit->shape_b) || !child_fits(world, &pair) ||
+            !sadmm_all_finite(hit->position, 3) || !sadmm_all_finite(hit->normal, 3) ||
+            !sadmm_all_finite(hit->impulse, 3))
+            return false;
+    }
+    return true;
+}
+
+static void archive_hits(struct sadmm_archive *archive, sadmm_world *world)
+{
+    struct sadmm_step_start *start = &world->start;
+    _Static_assert(sizeof *start->hits == 168, "no padding");
+    sadmm_archive_array(archive, &start->hits, &start->hit_count, &start->hit_capacity, sizeof *start->hits, INT32_MAX);
+    SADMM_ARCHIVE(archive, start->hit_first);
+    if (archive->reading && archive->status == SADMM_OK) sadmm_archive_expect(archive, hits_fit(world), "hits");
+}
+
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 
 static bool rows_fit(const sadmm_world *world)
@@ -212,5 +236,6 @@ void sadmm_archive_step(struct sadmm_archive *archive, sadmm_world *world)
     sadmm_archive_array(archive, &start->impulse, &numbers, &start->impulse_capacity, sizeof(double), INT32_MAX);
     if (archive->reading)
         sadmm_archive_expect(archive, !readable || numbers == 3 * world->contacts.point_count, "the start of a step");
+    archive_hits(archive, world);
     if (readable) archive_rows(archive, world);
 }

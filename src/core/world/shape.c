@@ -130,6 +130,7 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     shape->revision = ++world->shape_revisions;
     ++world->shape_count;
     world->sensor_count += def->sensor;
+    world->bouncing_count += def->restitution > 0;
     sadmm_world_reshaped(world);
     sadmm_slots_take(&world->shapes_taken, slot);
     sadmm_link_add(world, link_at, &body->first_shape, (uint32_t)slot + 1);
@@ -182,6 +183,7 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
     ++world->shape_generations[slot];
     --world->shape_count;
     world->sensor_count -= world->shapes[slot].sensor;
+    world->bouncing_count -= world->shapes[slot].restitution > 0;
     sadmm_link_remove(world, link_at, &world->bodies[world->shapes[slot].body].first_shape, (uint32_t)slot + 1);
     sadmm_slots_release(&world->shapes_taken, slot);
     sadmm_pair_table_forget(&world->friction_pairs, (uint32_t)slot);
@@ -265,6 +267,7 @@ sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id i
     if (!shape) return SADMM_ERROR_STALE_ID;
     TRY(check_material("", friction, restitution, error));
     TRY(sadmm_world_take_back(world));
+    world->bouncing_count += (restitution > 0) - (shape->restitution > 0);
     shape->friction = friction;
     shape->restitution = restitution;
     return SADMM_OK;

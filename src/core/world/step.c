@@ -31,6 +31,7 @@ static sadmm_status find_contacts(sadmm_world *world, int substep)
 {
     struct sadmm_collision_input input = sadmm_world_collision_input(world, substep);
     input.team = &world->team;
+    world->hit_since = NULL;
     return (substep > 0 ? sadmm_collision_find_again : sadmm_collision_find)(world->collision, &input,
                                                                              &world->contacts, &world->error);
 }
@@ -155,6 +156,7 @@ struct host_step {
     bool unconverged;      /* one of them has not met a stop rule */
     int32_t limited;       /* islands, most of any */
     int32_t direct;        /* islands solved directly in this sub-step */
+    int32_t pushed;        /* bodies moved out of overlaps in this sub-step */
     int64_t islands_above; /* likewise, but of the last sub-step; -1: no stop rule */
     double ms[SADMM_PHASE_COUNT];
 };
@@ -182,6 +184,27 @@ static sadmm_status solve_direct(struct host_step *step)
                               &step->direct, &world->error);
 }
 
+/* Which islands are pushed apart without a velocity (core/solve/push.h). */
+static sadmm_status choose_pushes(struct host_step *step, double depth)
+{
+    sadmm_world *world = step->world;
+    step->pushed = 0;
+    /* a backend that makes steps by itself has pushes in velocities, and the host is to make the same ones */
+    if (depth <= step->settings.slop || world->kernels->resident) return SADMM_OK;
+    if (!world->push) world->push = sadmm_push_create();
+    if (!world->push) return sadmm_fail_memory(&world->error, "bodies that overlap");
+    TRY(sadmm_push_choose(world->push, &step->system, &step->settings, world->plan.threads, &world->error));
+    step->pushed = sadmm_push_count(world->push);
+    return SADMM_OK;
+}
+
+static sadmm_status solve_pushes(struct host_step *step)
+{
+    if (step->pushed == 0) return SADMM_OK;
+    return sadmm_push_solve(step->world->push, step->world->kernels, &step->system, &step->settings,
+                            &step->world->error);
+}
+
 static sadmm_status make_plan(struct host_step *step)
 {
     sadmm_world *world = step->world;
@@ -194,6 +217,7 @@ static sadmm_status make_plan(struct host_step *step)
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
     TRY(keep_start(world, &depth));
+    TRY(choose_pushes(step, depth));
     if (world->joined) sadmm_joined_begin(world->joined);
     if (world->plan.warm_start) TRY(solve_joined(step, false));
     step->depth = depth > step->depth ? depth : step->depth;
@@ -223,6 +247,7 @@ static void keep_rolling(sadmm_world *world, const struct sadmm_contact_pair *pa
         if (body[s] < 0) continue;
         struct sadmm_rigid *next = &world->next[body[s]];
         const double *arm = s ? point->arm_b : point->arm_a;
+        rolling_begin(next);
         rolling_owe(pair->normal, arm, at.normal, s ? at.arm_b : at.arm_a, point->impulse, s ? 1 : -1, next->owed);
         rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->gap), migration->radius, push, dt,
                         next->stiffness);
@@ -246,8 +271,7 @@ static void keep_rolling_contacts(sadmm_world *world, double dt)
                 keep_rolling(world, &contacts->pairs[p], k, dt);
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_rigid *next = &world->next[i];
-        rolling_moved(world->start.rigid[i].position, next->position, next->owed);
-        rolling_judge(next->inertia, dt, next->stiffness);
+        if (next->rolls) rolling_keep(next, world->start.rigid[i].position, dt, next->owed, next->stiffness);
     }
 }
 
@@ -270,6 +294,7 @@ static sadmm_status integrate(struct host_step *step)
     }
     TRY(sadmm_world_move_driven(world, &step->settings));
     sadmm_world_move_targets(world, step->settings.dt);
+    if (step->pushed > 0) sadmm_push_move(world->push, step->settings.dt, world->next);
     keep_rolling_contacts(world, step->settings.dt);
     add_substep(step);
     return check_next(world);
@@ -284,6 +309,7 @@ static sadmm_status find_wrenches(const struct host_step *step)
     for (size_t i = 0; i < (size_t)world->dynamic_count; ++i)
         for (int k = 0; k < 6; ++k)
             world->wrench[6 * i + (size_t)k] += rolling_wrench(&world->start.rigid[i], step->settings.dt, k);
+    sadmm_world_add_hit_wrenches(world, &step->settings);
     return SADMM_OK;
 }
 
@@ -292,8 +318,13 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     sadmm_world *world = step->world;
     switch (stage->kind) {
     case SADMM_STAGE_GATHER: return sadmm_world_gather(world);
-    case SADMM_STAGE_FIND: return find_contacts(world, step->stages.substep);
+    case SADMM_STAGE_FIND:
+        TRY(sadmm_world_take_hits(world, step->stages.substep));
+        TRY(find_contacts(world, step->stages.substep));
+        sadmm_world_open_gaps(world);
+        return SADMM_OK;
     case SADMM_STAGE_PLAN: return make_plan(step);
+    case SADMM_STAGE_SOLUTION: TRY(solve_stage(step, stage)); return solve_pushes(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
     case SADMM_STAGE_WRENCHES: return find_wrenches(step);
     case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;

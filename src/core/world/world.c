@@ -59,6 +59,7 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_certificate_workspace_free(&world->certificate_workspace);
     sadmm_joined_destroy(world->joined);
     sadmm_direct_destroy(world->direct);
+    sadmm_push_destroy(world->push);
     sadmm_rows_free(&world->start.rows);
     sadmm_rows_free(&world->last_start.rows);
     for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
@@ -71,6 +72,7 @@ void sadmm_world_destroy(sadmm_world *world)
     struct sadmm_pair_table *const pairs[] = {&world->disabled_pairs, &world->joined_pairs, &world->friction_pairs};
     for (size_t i = 0; i < sizeof taken / sizeof *taken; ++i) sadmm_slots_destroy(taken[i]);
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; ++i) sadmm_pair_table_free(pairs[i]);
+    sadmm_world_free_hits(world);
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->block_shapes,
                       world->shape_links, world->filtered_pairs, world->joints, world->couplings, world->gears,
                       world->joint_sources, world->joint_labels, world->joint_touch, world->joint_number,

@@ -3,6 +3,7 @@
  *   slots, links, pair_table, block_pool, ids, report   lists and names
  *   driven                           kinematic bodies in a step
  *   gather                           what a step reads
+ *   hits                             hits of bodies in flight, each at its moment
  *   coupling_step                    what couplings keep from step to step
  *   joint_act                        a joint in a step
  *   gear_rows, joint_rows            gears and joints as constraint rows
@@ -30,6 +31,7 @@
 #include "core/solve/certificate.h"
 #include "core/solve/direct.h"
 #include "core/solve/joined.h"
+#include "core/solve/push.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
 #include "links.h"
@@ -125,8 +127,25 @@ struct sadmm_world_gear {
     int64_t set_at;
 };
 
-/* What the last step started from, for contacts, freeze and the certificate. */
+/* A point of a hit that a step has taken at its moment (hits.c). */
+struct sadmm_world_hit {
+    int32_t shape_a, shape_b; /* slots */
+    uint32_t child, feature;
+    double position[3], normal[3]; /* m; unit, from a to b; world */
+    double impulse[3];             /* on b, N s */
+    double arm[2][3];              /* from the centres of mass of a's and b's bodies, m */
+    int32_t dynamic[2], driven[2]; /* their numbers in the step, -1: none */
+    double speed;                  /* of approach, m/s */
+    double friction;
+};
+
+struct sadmm_hits;
+
+/* What the last step started from, for contacts, freeze and the certificate. Bodies that were hit: from where they would
+ * have started with the velocity that they have after it. */
 struct sadmm_step_start {
+    struct sadmm_world_hit *hits;              /* of the step, in the order of time within each sub-step */
+    size_t hit_count, hit_capacity, hit_first; /* hit_first: the first one of the last sub-step */
     struct sadmm_rigid *rigid; /* dynamic bodies */
     double *velocity;          /* dynamic bodies x 6: the warm start */
     double *impulse;           /* points x 3: the warm start */
@@ -166,6 +185,7 @@ struct sadmm_world {
     struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */
     size_t shape_slots, shape_capacity, shape_generation_capacity, geometry_capacity;
     int32_t shape_count, sensor_count; /* sensors: of these */
+    int32_t bouncing_count; /* shapes with restitution */
     struct sadmm_slot_set shapes_taken;
     struct sadmm_link *shape_links;    /* by slot: the shapes of a body */
     size_t shape_link_capacity;
@@ -282,6 +302,9 @@ struct sadmm_world {
         size_t pair_capacity;
     } events;
 
+    struct sadmm_hits *hits; /* made with the first pair that is fast */
+    const double *hit_since; /* by body slot: when it was hit last in the (sub-)step at hand, s; NULL: none was */
+
     const struct sadmm_kernels *kernels; /* chosen at the first step */
     struct sadmm_context *context;
     char why[SADMM_WHY_SIZE];
@@ -289,6 +312,7 @@ struct sadmm_world {
     int64_t certified_step; /* the step that the workspace's contacts are of, as report.step counts; -1: of none */
     struct sadmm_joined *joined; /* made with the first joint */
     struct sadmm_direct *direct; /* made with the first island that is solved directly */
+    struct sadmm_push *push;     /* made with the first overlap */
     sadmm_step_report report;
 };
 
@@ -334,6 +358,19 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
 struct sadmm_system sadmm_world_system(sadmm_world *world);
 /* SADMM_ERROR_NON_FINITE that names a dynamic body. */
 sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
+
+/* ---- hits.c ---- */
+
+/* Hits of bodies in flight in the sub-step at hand, each at its moment: `start` and the bodies as collision sees them
+ * become what they are after them. */
+sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep);
+/* Pairs that were followed to the end of the sub-step touch no more in it: planes laid through their contacts may say
+ * that they do, where surfaces are round or turn. Their gaps are what the bodies close by themselves, at least, so that
+ * such contacts act only on what others push together. After contacts are found. */
+void sadmm_world_open_gaps(sadmm_world *world);
+/* What the (sub-)step's hits give bodies, beside its contacts. */
+void sadmm_world_add_hit_wrenches(sadmm_world *world, const sadmm_settings *settings);
+void sadmm_world_free_hits(sadmm_world *world);
 
 /* ---- coupling_step.c ---- */
 

@@ -1,0 +1,68 @@
+/* When two shapes in flight first touch within a step, by their own motions, rotation included.
+ *
+ * By conservative advancement: no point of either comes closer along the normal of the distance than the centres of mass
+ * and the rotations allow, so that the pair is moved on by what that takes, and again from there. Near the touch the
+ * points that approach are followed to where their separation is 0. Host alone, in double. */
+#ifndef SADMM_COLLISION_FIRST_TOUCH_H
+#define SADMM_COLLISION_FIRST_TOUCH_H
+
+#include "collision.h"
+#include "manifold.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A body's motion within a step: its centre of mass is at position + t velocity + t^2/2 acceleration, and it turns from
+ * `orientation`, which it has at `at`, by the rate `turn`; `spin`: the angular velocity that impacts see. Where its moments
+ * differ, by that as a body does that no torque acts on (math/rigid.h): `spin` is what it has at `at`, and `sway` what its
+ * angular velocity differs from `turn` by at most. */
+struct sadmm_flight {
+    double position[3], velocity[3], acceleration[3];
+    double orientation[4], turn[3], spin[3];
+    double inertia[3], sway; /* 0: it turns by `turn` */
+    double at, since;        /* s; before `since` the motion is another one */
+};
+
+struct sadmm_flight_pose {
+    double position[3], orientation[4], velocity[3], spin[3];
+};
+
+/* Of the body, t s after the step's start. */
+void sadmm_flight_at(const struct sadmm_flight *flight, double t, struct sadmm_flight_pose *pose);
+
+/* A shape on a body that flies. */
+struct sadmm_flying_shape {
+    const struct sadmm_shape *shape;
+    const struct sadmm_geometry *geometry;
+    const struct sadmm_flight *flight;
+};
+
+/* Two of them, in the order of pairs (geometry_rank); child: of the pair. */
+struct sadmm_flying_pair {
+    struct sadmm_flying_shape a, b;
+    const double *hulls;
+    uint32_t child;
+    double threshold; /* points that approach slower than this are left out, m/s */
+    bool lost;        /* out: it took too many looks to tell */
+};
+
+/* Where they touch. */
+struct sadmm_first_touch {
+    double time;      /* s after the step's start */
+    double normal[3]; /* world, from a to b */
+    int count;
+    double point[SADMM_MANIFOLD_POINTS][3]; /* m, world */
+    uint32_t feature[SADMM_MANIFOLD_POINTS];
+};
+
+/* False: no point touches in [from, to] that approaches fast enough. Points of the result: all that touch then. */
+bool sadmm_first_touch_of(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_first_touch *touch);
+
+/* The first of all children of the pair, none of which is a mesh; `child`: which. */
+bool sadmm_first_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_first_touch *touch);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

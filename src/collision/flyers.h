@@ -1,0 +1,50 @@
+/* Which shapes a step's hits may be between: candidates of contact finding before their manifolds, and what else a body
+ * comes near once a hit has changed its way. */
+#ifndef SADMM_COLLISION_FLYERS_H
+#define SADMM_COLLISION_FLYERS_H
+
+#include "bounds.h"
+#include "collision.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What a body is to hits, by world body slot. */
+enum sadmm_flyer { SADMM_FLYER_NONE, SADMM_FLYER_FIXED, SADMM_FLYER_DYNAMIC };
+
+struct sadmm_pair_list;
+
+/* Candidates of the step; sadmm_collision_find then does not look for them again. */
+sadmm_status sadmm_collision_look_ahead(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                                        struct sadmm_error *error);
+
+/* Bodies have other velocities since: it does. */
+void sadmm_collision_look_again(struct sadmm_collision *collision);
+
+/* Bodies that a contact of the last set presses on become SADMM_FLYER_NONE. After look_ahead. */
+void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const struct sadmm_contact_set *contacts,
+                                  unsigned char *flyers);
+
+/* The pairs of shapes, as (a << 32 | b) in the order of pairs, that approach faster than the threshold, at least as far
+ * as their velocities and boxes tell, and of which either has restitution: what has none comes as far as the surface in
+ * the step in which it is found, as the solve has it. After look_ahead. False: out of memory. */
+bool sadmm_collision_list_fast(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                               double threshold, struct sadmm_pair_list *list);
+/* Do both of a pair take part, one of them at least as a dynamic body? */
+bool sadmm_collision_may_hit(const struct sadmm_collision *collision, const unsigned char *flyers, uint64_t key);
+
+/* What its contacts have in common. */
+void sadmm_collision_pair_law(const struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                              uint64_t key, double *friction, double *restitution);
+
+/* A shape has another box from now on, the one that it sweeps from a hit on. False: out of memory. */
+bool sadmm_collision_set_box(struct sadmm_collision *collision, uint32_t slot, const struct sadmm_box3 *swept);
+/* The shapes of flyers whose boxes meet that of a shape, after set_box of it, as list_fast gives pairs, in any order. */
+bool sadmm_collision_list_near(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                               const unsigned char *flyers, uint32_t slot, struct sadmm_pair_list *list);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

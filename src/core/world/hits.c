@@ -1,0 +1,711 @@
+/* Hits of bodies in flight, each at its moment; not those on meshes.
+ *
+ * A solve knows one velocity of a body in a step. What is hit within it by a body that was just hit, or hit twice, asks
+ * for several. So before contacts are found, bodies that no contact carries are followed along their ways: pairs that
+ * approach faster than the threshold of restitution are taken one after the other, in the order of the time at which
+ * they first touch, each with the law of impact there (core/math/hit.h), and what the two come near from then on is
+ * looked for again. A body is then given the start from which it would be where it is, with the velocity that it has:
+ *
+ *     x~ = x(t) - t v~ - t^2/2 a,      v~ = v(t)+ - t a
+ *
+ * and what follows, contact finding, solve and motion, sees an ordinary state; a pair's motion begins at the last hit of
+ * either (`since`, collision.h). What rests on something, or has joints, is left to the solve, and so is, from the
+ * sub-step's start, what would be hit more often than settings.hits times in it.
+ *
+ * Order: by time, then by the pair's slots: results do not depend on threads. */
+#include <math.h>
+#include <string.h>
+
+#include "collision/broad_phase.h"
+#include "collision/first_touch.h"
+#include "collision/flyers.h"
+#include "collision/geometry.h"
+#include "core/base/memory.h"
+#include "core/math/hit.h"
+#include "core/math/rigid.h"
+#include "core/model/forces.h"
+#include "core/model/spin.h"
+#include "world_internal.h"
+
+/* A body that takes part. */
+struct flyer {
+    int32_t slot, dynamic; /* dynamic: -1 if it is not */
+    int32_t driven;        /* -1 if it is not */
+    struct sadmm_rigid start;
+    struct sadmm_flight flight;
+    uint32_t hits; /* that it has had: what was foreseen before the last one does not hold */
+    bool too_many; /* there would be more than it may have */
+};
+
+/* A hit that is foreseen. */
+struct foreseen {
+    uint64_t key; /* shapes, in the order of pairs */
+    uint32_t child;
+    int32_t flyer[2];
+    uint32_t hits[2];
+    struct sadmm_first_touch touch;
+};
+
+struct sadmm_hits {
+    unsigned char *flyers; /* enum sadmm_flyer, by body slot */
+    int32_t *index;        /* by body slot: its flyer + 1, 0: none yet */
+    double *since;         /* by body slot */
+    struct flyer *list;
+    struct foreseen *foreseen;
+    int32_t *queue;                     /* a heap of these, the next one first */
+    struct sadmm_pair_list fast, pairs; /* of the sub-step; of a shape that was hit */
+    size_t flyer_capacity, index_capacity, since_capacity, count, capacity, foreseen_count, foreseen_capacity,
+        queue_count, queue_capacity;
+};
+
+/* What a sub-step's hits are worked out with. */
+struct taking {
+    sadmm_world *world;
+    struct sadmm_hits *hits;
+    struct sadmm_collision_input input;
+    sadmm_settings settings;
+};
+
+/* ---- the queue --------------------------------------------------------------------------------------------------- */
+
+static bool comes_first(const struct sadmm_hits *h, int32_t x, int32_t y)
+{
+    const struct foreseen *a = &h->foreseen[x], *b = &h->foreseen[y];
+    return a->touch.time < b->touch.time || (a->touch.time == b->touch.time && a->key < b->key);
+}
+
+static bool add_to_queue(struct sadmm_hits *h, int32_t item)
+{
+    if (!sadmm_grow(&h->queue, &h->queue_capacity, h->queue_count, h->queue_count + 1, sizeof *h->queue)) return false;
+    size_t at = h->queue_count++;
+    for (; at > 0 && comes_first(h, item, h->queue[(at - 1) / 2]); at = (at - 1) / 2)
+        h->queue[at] = h->queue[(at - 1) / 2];
+    h->queue[at] = item;
+    return true;
+}
+
+static int32_t take_from_queue(struct sadmm_hits *h)
+{
+    const int32_t first = h->queue[0], last = h->queue[--h->queue_count];
+    size_t at = 0;
+    for (size_t child; (child = 2 * at + 1) < h->queue_count; at = child) {
+        if (child + 1 < h->queue_count && comes_first(h, h->queue[child + 1], h->queue[child])) ++child;
+        if (!comes_first(h, h->queue[child], last)) break;
+        h->queue[at] = h->queue[child];
+    }
+    h->queue[at] = last;
+    return first;
+}
+
+/* ---- ways -------------------------------------------------------------------------------------------------------- */
+
+/* v after the step over v at its start but for what forces add, along the body's centre of mass. */
+static double kept(const struct sadmm_rigid *body, double dt)
+{
+    const struct forces_damping linear = forces_damping_of(body, 0, dt);
+    return linear.keep / linear.mass;
+}
+
+/* The acceleration that the step gives its velocity. */
+static void accelerate(const struct sadmm_rigid *body, const sadmm_settings *settings, double acceleration[3])
+{
+    double free[6];
+    forces_free(body, body->velocity, settings->gravity, settings->dt, free);
+    for (int k = 0; k < 3; ++k) acceleration[k] = (free[k] - body->velocity[k]) / settings->dt;
+}
+
+/* dt I^-1 torque, as damping lets it be. */
+static vec3 torque_gain(const struct sadmm_rigid *body, quat q, double dt)
+{
+    const double share = dt / forces_damping_of(body, 1, dt).mass;
+    return v3_scale(rigid_angular_velocity(q, v3_load(body->inertia), v3_load(body->wrench + 3)), share);
+}
+
+/* What torques and damping make of an angular velocity in a step (core/model/system_math.h: b over A); and back. */
+static vec3 spin_after(const struct sadmm_rigid *body, quat q, vec3 before, double dt)
+{
+    const struct forces_damping angular = forces_damping_of(body, 1, dt);
+    return v3_add(v3_scale(before, angular.keep / angular.mass), torque_gain(body, q, dt));
+}
+static vec3 spin_without(const struct sadmm_rigid *body, quat q, vec3 after, double dt)
+{
+    const struct forces_damping angular = forces_damping_of(body, 1, dt);
+    return v3_scale(v3_sub(after, torque_gain(body, q, dt)), angular.mass / angular.keep);
+}
+
+/* Of equal moments: as the step takes its lead back (math/lead.h). */
+static void turn_evenly(struct sadmm_flight *flight, quat q, vec3 before, vec3 after, double at)
+{
+    q_store(q, flight->orientation);
+    v3_store(after, flight->spin);
+    v3_store(v3_sub(after, v3_scale(v3_sub(after, before), 0.5)), flight->turn);
+    flight->at = at;
+}
+
+/* The most by which a body's angular velocity differs from that halfway: it changes by ((I_y - I_z) / I_x w_y w_z, ...) in
+ * the body's frame, w no larger than rigid_rate2 says. */
+static double sway_of(vec3 inertia, struct rigid_spin halfway, double dt)
+{
+    const vec3 w = m3_tmul(q_matrix(halfway.orientation), halfway.angular),
+               share = v3((inertia.y - inertia.z) / inertia.x, (inertia.z - inertia.x) / inertia.y,
+                          (inertia.x - inertia.y) / inertia.z);
+    const double rate2 = rigid_rate2(inertia, w);
+    return fmin(dt / 2 * v3_max_abs(share) * rate2, 2 * sqrt(rate2));
+}
+
+/* Of others: as the step turns it about the middle (core/model/spin.h). */
+static void turn_freely(struct sadmm_flight *flight, vec3 inertia, struct rigid_spin halfway, double dt)
+{
+    q_store(halfway.orientation, flight->orientation);
+    v3_store(halfway.angular, flight->spin);
+    v3_store(halfway.angular, flight->turn);
+    v3_store(inertia, flight->inertia);
+    flight->sway = sway_of(inertia, halfway, dt);
+    flight->at = dt / 2;
+}
+
+static void turn_from_start(struct flyer *f, double dt)
+{
+    const struct sadmm_rigid *start = &f->start;
+    const vec3 inertia = v3_load(start->inertia);
+    if (rigid_is_isotropic(inertia)) {
+        const struct rigid_spin spin = spin_start(start);
+        turn_evenly(&f->flight, spin.orientation, spin.angular, spin_after(start, spin.orientation, spin.angular, dt), 0);
+    } else {
+        struct rigid_spin halfway = spin_halfway(start, dt);
+        halfway.angular = spin_after(start, halfway.orientation, halfway.angular, dt);
+        turn_freely(&f->flight, inertia, halfway, dt);
+    }
+}
+
+/* By its spin at t, which it has after what acts on it in the step, the one at its start. */
+static void turn_from_hit(struct flyer *f, double dt, double t, struct rigid_spin hit)
+{
+    const vec3 inertia = v3_load(f->start.inertia);
+    struct rigid_spin start = hit;
+    if (rigid_is_isotropic(inertia)) {
+        start.angular = spin_without(&f->start, hit.orientation, hit.angular, dt);
+        turn_evenly(&f->flight, hit.orientation, start.angular, hit.angular, t);
+        start.orientation = rigid_turn(hit.orientation, v3_load(f->flight.turn), -t);
+    } else {
+        start = rigid_tumble(hit, inertia, dt / 2 - t);
+        turn_freely(&f->flight, inertia, start, dt);
+        start.angular = spin_without(&f->start, start.orientation, start.angular, dt);
+        start = rigid_tumble(start, inertia, -dt / 2);
+    }
+    q_store(start.orientation, f->start.orientation);
+    v3_store(start.angular, f->start.velocity + 3);
+}
+
+static void fly_from_start(struct flyer *f, const sadmm_settings *settings)
+{
+    struct sadmm_flight *flight = &f->flight;
+    memset(flight, 0, sizeof *flight);
+    memcpy(flight->position, f->start.position, sizeof flight->position);
+    memcpy(flight->orientation, f->start.orientation, sizeof flight->orientation);
+    if (f->dynamic < 0 && f->driven < 0) return;
+    memcpy(flight->velocity, f->start.velocity, sizeof flight->velocity);
+    memcpy(flight->turn, f->start.velocity + 3, sizeof flight->turn);
+    memcpy(flight->spin, f->start.velocity + 3, sizeof flight->spin);
+    if (f->dynamic < 0) return;
+    accelerate(&f->start, settings, flight->acceleration);
+    turn_from_start(f, settings->dt);
+}
+
+/* The start from which a body would come to the pose at t with these velocities. */
+static void fly_from_hit(struct flyer *f, const sadmm_settings *settings, double t,
+                         const struct sadmm_flight_pose *pose, vec3 linear, vec3 spin)
+{
+    const double dt = settings->dt, s = t / dt, k = kept(&f->start, dt), share = 1 + s * (k - 1);
+    const struct rigid_spin hit = {q_load(pose->orientation), spin};
+    struct sadmm_rigid *start = &f->start;
+    double gained[3];
+    accelerate(start, settings, gained); /* dt a = (k - 1) v + what forces add */
+    for (int j = 0; j < 3; ++j) gained[j] = dt * gained[j] - (k - 1) * start->velocity[j];
+    v3_store(v3_scale(v3_madd(linear, -s, v3_load(gained)), 1 / share), start->velocity);
+    accelerate(start, settings, f->flight.acceleration);
+    for (int j = 0; j < 3; ++j)
+        start->position[j] = pose->position[j] - t * (start->velocity[j] + t / 2 * f->flight.acceleration[j]);
+    turn_from_hit(f, dt, t, hit);
+    memcpy(f->flight.position, start->position, sizeof f->flight.position);
+    memcpy(f->flight.velocity, start->velocity, sizeof f->flight.velocity);
+    f->flight.since = t;
+}
+
+/* The number of a body's flyer, -1: out of memory. */
+static int32_t flyer_of(struct taking *t, int32_t slot)
+{
+    struct sadmm_hits *h = t->hits;
+    const sadmm_world *world = t->world;
+    const int32_t system = world->collision_bodies[slot].system_body;
+    if (h->index[slot] > 0) return h->index[slot] - 1;
+    if (!sadmm_grow(&h->list, &h->capacity, h->count, h->count + 1, sizeof *h->list)) return -1;
+    struct flyer *f = &h->list[h->count];
+    memset(f, 0, sizeof *f);
+    f->slot = slot;
+    f->dynamic = system >= 0 ? system : -1;
+    f->driven = sadmm_body_is_driven(system) ? sadmm_driven(system) : -1;
+    f->start = system >= 0                    ? world->start.rigid[system]
+               : sadmm_body_is_driven(system) ? world->driven[f->driven].rigid
+                                              : world->bodies[slot].rigid;
+    fly_from_start(f, &t->settings);
+    h->index[slot] = (int32_t)++h->count;
+    return (int32_t)h->count - 1;
+}
+
+/* ---- what is foreseen -------------------------------------------------------------------------------------------- */
+
+static struct sadmm_flying_shape shape_of(const struct taking *t, uint32_t slot, const struct flyer *f)
+{
+    const struct sadmm_shape *shape = &t->world->shapes[slot];
+    const struct sadmm_flying_shape out = {shape, &t->world->geometries[shape->geometry], &f->flight};
+    return out;
+}
+
+/* When do two shapes hit each other, from `from` on? False: out of memory. */
+static bool foresee(struct taking *t, uint64_t key, double from)
+{
+    struct sadmm_hits *h = t->hits;
+    const uint32_t slot[2] = {(uint32_t)(key >> 32), (uint32_t)key};
+    const int32_t body[2] = {t->world->shapes[slot[0]].body, t->world->shapes[slot[1]].body};
+    const int32_t number[2] = {flyer_of(t, body[0]), flyer_of(t, body[1])};
+    if (number[0] < 0 || number[1] < 0) return false;
+    const struct flyer *a = &h->list[number[0]], *b = &h->list[number[1]];
+    struct sadmm_flying_pair pair = {
+        shape_of(t, slot[0], a), shape_of(t, slot[1], b), t->input.hulls, 0, t->settings.restitution_threshold, false};
+    struct sadmm_first_touch touch;
+    /* What the triangles of a mesh push along depends on those around them, which one touch by itself does not see: that
+     * is left to the solve. */
+    if (pair.b.geometry->type == SADMM_SHAPE_MESH) return true;
+    const bool found = sadmm_first_touch(&pair, from, t->settings.dt, &touch);
+    if (pair.lost) h->list[number[0]].too_many = h->list[number[1]].too_many = true;
+    if (!found) return true;
+    if (!sadmm_grow(&h->foreseen, &h->foreseen_capacity, h->foreseen_count, h->foreseen_count + 1, sizeof *h->foreseen))
+        return false;
+    h->foreseen[h->foreseen_count] =
+        (struct foreseen){key, pair.child, {number[0], number[1]}, {a->hits, b->hits}, touch};
+    return add_to_queue(h, (int32_t)h->foreseen_count++);
+}
+
+/* The box that a shape sweeps from a hit on. False: out of memory. */
+static bool set_box(struct taking *t, uint32_t slot, const struct flyer *f)
+{
+    const struct sadmm_shape *shape = &t->world->shapes[slot];
+    const struct sadmm_geometry *geometry = &t->world->geometries[shape->geometry];
+    const double dt = t->settings.dt, left = dt - f->flight.since, arm = v3_norm(v3_load(shape->position)),
+                 sags = left * left / 8 * v3_norm(v3_load(f->flight.acceleration)),
+                 reach = arm + geometry_radius(geometry) + sags;
+    struct sadmm_flight_pose from, to;
+    struct sadmm_box3 box;
+    sadmm_flight_at(&f->flight, f->flight.since, &from);
+    sadmm_flight_at(&f->flight, dt, &to);
+    for (int k = 0; k < 3; ++k) {
+        const double rounding = 8 * DBL_EPSILON * (fabs(from.position[k]) + fabs(to.position[k]) + reach);
+        box.lo[k] = fmin(from.position[k], to.position[k]) - reach - rounding;
+        box.hi[k] = fmax(from.position[k], to.position[k]) + reach + rounding;
+    }
+    return sadmm_collision_set_box(t->world->collision, slot, &box);
+}
+
+/* What a body that was hit comes near from there on; `except`: a body whose pairs with it are known. */
+static bool foresee_body(struct taking *t, int32_t number, int32_t except)
+{
+    const struct flyer f = t->hits->list[number];
+    const struct sadmm_world_body *body = &t->world->bodies[f.slot];
+    for (uint32_t name = body->first_shape; name; name = t->world->shape_links[name - 1].next) {
+        const uint32_t slot = name - 1;
+        if (t->world->shapes[slot].sensor) continue;
+        t->hits->pairs.count = 0;
+        if (!set_box(t, slot, &f) ||
+            !sadmm_collision_list_near(t->world->collision, &t->input, t->hits->flyers, slot, &t->hits->pairs))
+            return false;
+        for (size_t k = 0; k < t->hits->pairs.count; ++k) {
+            const uint64_t key = t->hits->pairs.keys[k];
+            const uint32_t other = (uint32_t)(key >> 32) == slot ? (uint32_t)key : (uint32_t)(key >> 32);
+            if (t->world->shapes[other].body != except && !foresee(t, key, f.flight.since)) return false;
+        }
+    }
+    return true;
+}
+
+/* ---- a hit ------------------------------------------------------------------------------------------------------- */
+
+static void hit_body_of(const struct flyer *f, const struct sadmm_flight_pose *pose, struct hit_body *out)
+{
+    memset(out, 0, sizeof *out);
+    out->linear = v3_load(pose->velocity);
+    out->angular = v3_load(pose->spin);
+    if (f->dynamic < 0) return;
+    const mat3 R = q_matrix(q_load(pose->orientation));
+    const double *I = f->start.inertia;
+    const sym3 inverse = rigid_world_inertia(R, v3(1 / I[0], 1 / I[1], 1 / I[2]));
+    out->inverse_mass = 1 / f->start.mass;
+    out->inverse_inertia.r[0] = v3(inverse.xx, inverse.xy, inverse.xz);
+    out->inverse_inertia.r[1] = v3(inverse.xy, inverse.yy, inverse.yz);
+    out->inverse_inertia.r[2] = v3(inverse.xz, inverse.yz, inverse.zz);
+}
+
+static void make_hit(const struct taking *t, const struct foreseen *item, const struct sadmm_flight_pose pose[2],
+                     struct hit *hit)
+{
+    const struct sadmm_first_touch *touch = &item->touch;
+    memset(hit, 0, sizeof *hit);
+    sadmm_collision_pair_law(t->world->collision, &t->input, item->key, &hit->friction, &hit->restitution);
+    hit->threshold = t->settings.restitution_threshold;
+    hit->frame.r[0] = v3_load(touch->normal);
+    v3_tangents(hit->frame.r[0], &hit->frame.r[1], &hit->frame.r[2]);
+    hit->count = touch->count;
+    for (int side = 0; side < 2; ++side) {
+        hit_body_of(&t->hits->list[item->flyer[side]], &pose[side], &hit->body[side]);
+        for (int k = 0; k < touch->count; ++k)
+            hit->arm[side][k] = v3_sub(v3_load(touch->point[k]), v3_load(pose[side].position));
+    }
+}
+
+/* Into `start`, for those who read what has happened. False: out of memory. */
+static bool record(struct taking *t, const struct foreseen *item, const struct hit *hit)
+{
+    struct sadmm_step_start *start = &t->world->start;
+    for (int k = 0; k < hit->count; ++k) {
+        if (!(hit->impulse[k].x > 0)) continue;
+        if (!sadmm_grow(&start->hits, &start->hit_capacity, start->hit_count, start->hit_count + 1,
+                        sizeof *start->hits))
+            return false;
+        struct sadmm_world_hit *out = &start->hits[start->hit_count++];
+        memset(out, 0, sizeof *out);
+        out->shape_a = (int32_t)(item->key >> 32);
+        out->shape_b = (int32_t)(uint32_t)item->key;
+        out->child = item->child;
+        out->feature = item->touch.feature[k];
+        memcpy(out->position, item->touch.point[k], sizeof out->position);
+        memcpy(out->normal, item->touch.normal, sizeof out->normal);
+        v3_store(hit_impulse(hit, k, 1), out->impulse);
+        for (int side = 0; side < 2; ++side) {
+            const struct flyer *f = &t->hits->list[item->flyer[side]];
+            v3_store(hit->arm[side][k], out->arm[side]);
+            out->dynamic[side] = f->dynamic;
+            out->driven[side] = f->driven;
+        }
+        out->speed = -(double)hit_velocity(hit, k).x;
+        out->friction = hit->friction;
+    }
+    return true;
+}
+
+/* What the hit leaves together and forces press on each other stays together: their ways would part and overlap again
+ * by what falls within the step. Apart by `along` at the start, along the normal. */
+static double overlap_of_held(const struct taking *t, const struct foreseen *item, const struct hit *hit,
+                              const vec3 linear[2], const vec3 spin[2])
+{
+    const struct sadmm_flight *a = &t->hits->list[item->flyer[0]].flight, *b = &t->hits->list[item->flyer[1]].flight;
+    const double time = item->touch.time, left = t->settings.dt - time,
+                 falls = -v3_dot(hit->frame.r[0], v3_sub(v3_load(b->acceleration), v3_load(a->acceleration)));
+    double parts = HUGE_VAL;
+    for (int k = 0; k < hit->count; ++k) {
+        const vec3 at_a = v3_add(linear[0], v3_cross(spin[0], hit->arm[0][k])),
+                   at_b = v3_add(linear[1], v3_cross(spin[1], hit->arm[1][k]));
+        parts = fmin(parts, v3_dot(hit->frame.r[0], v3_sub(at_b, at_a)));
+    }
+    return falls > 0 && parts < falls * left ? fmax(parts, 0) * time + falls * time * time / 2 : 0;
+}
+
+static void move_start(struct flyer *f, vec3 way)
+{
+    if (f->dynamic < 0) return;
+    for (int k = 0; k < 3; ++k) {
+        f->start.position[k] += v3_part(way, k);
+        f->flight.position[k] += v3_part(way, k);
+    }
+}
+
+static bool take_hit(struct taking *t, const struct foreseen item)
+{
+    struct flyer *f[2] = {&t->hits->list[item.flyer[0]], &t->hits->list[item.flyer[1]]};
+    struct sadmm_flight_pose pose[2];
+    struct hit hit;
+    vec3 linear[2], spin[2];
+    for (int side = 0; side < 2; ++side) sadmm_flight_at(&f[side]->flight, item.touch.time, &pose[side]);
+    make_hit(t, &item, pose, &hit);
+    hit_solve(&hit);
+    for (int side = 0; side < 2; ++side) hit_apply(&hit, side, &linear[side], &spin[side]);
+    if (!record(t, &item, &hit)) return false;
+    const double overlap = overlap_of_held(t, &item, &hit, linear, spin),
+                 mass = hit.body[0].inverse_mass + hit.body[1].inverse_mass;
+    for (int side = 0; side < 2; ++side) {
+        if (f[side]->dynamic < 0) continue;
+        ++f[side]->hits;
+        fly_from_hit(f[side], &t->settings, item.touch.time, &pose[side], linear[side], spin[side]);
+        move_start(f[side], v3_scale(hit.frame.r[0], (side ? 1 : -1) * overlap * hit.body[side].inverse_mass / mass));
+    }
+    const int32_t slot_a = f[0]->slot;
+    return (f[0]->dynamic < 0 || foresee_body(t, item.flyer[0], -1)) &&
+           (t->hits->list[item.flyer[1]].dynamic < 0 ||
+            foresee_body(t, item.flyer[1], t->hits->list[item.flyer[0]].dynamic < 0 ? -1 : slot_a));
+}
+
+static bool holds(const struct sadmm_hits *h, const struct foreseen *item)
+{
+    return h->list[item->flyer[0]].hits == item->hits[0] && h->list[item->flyer[1]].hits == item->hits[1];
+}
+
+/* ---- a sub-step's ------------------------------------------------------------------------------------------------ */
+
+/* May any body be hit? It moves by more than half of the threshold, or turns. */
+static bool any_fast(const sadmm_world *world, double threshold)
+{
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        const double *v = world->start.rigid[i].velocity;
+        if (4 * dot3(v, v) > threshold * threshold || size3(v + 3) > 1e-3) return true;
+    }
+    for (int32_t k = 0; k < 6 * world->start.driven_count; ++k)
+        if (world->start.driven[k] != 0) return true;
+    return false;
+}
+
+static bool reserve(struct sadmm_hits *h, size_t slots)
+{
+    return sadmm_grow(&h->flyers, &h->flyer_capacity, 0, slots, sizeof *h->flyers) &&
+           sadmm_grow(&h->index, &h->index_capacity, 0, slots, sizeof *h->index) &&
+           sadmm_grow(&h->since, &h->since_capacity, 0, slots, sizeof *h->since);
+}
+
+/* What loses most of its velocity within the step has no start from which it would come. */
+static unsigned char flyer_kind(const struct sadmm_world_body *body, double dt)
+{
+    if (!body->alive || body->type != SADMM_BODY_DYNAMIC) return SADMM_FLYER_FIXED;
+    return body->rigid.damping[0] * dt > 1 || body->rigid.damping[1] * dt > 1 ? SADMM_FLYER_NONE : SADMM_FLYER_DYNAMIC;
+}
+
+static void mark_bodies(struct taking *t)
+{
+    const sadmm_world *world = t->world;
+    unsigned char *flyers = t->hits->flyers;
+    for (size_t slot = 0; slot < world->body_slots; ++slot)
+        flyers[slot] = flyer_kind(&world->bodies[slot], t->settings.dt);
+    for (size_t k = 0; k < world->joint_slots; ++k) {
+        const struct sadmm_world_joint *joint = &world->joints[k];
+        for (int side = 0; joint->alive && side < 2; ++side)
+            if (joint->body[side] >= 0 && flyers[joint->body[side]] == SADMM_FLYER_DYNAMIC)
+                flyers[joint->body[side]] = SADMM_FLYER_NONE;
+    }
+    sadmm_collision_mark_pressed(world->collision, &world->contacts, flyers);
+}
+
+/* The orientation that a body has at its last hit, from which contact finding turns it by its velocity. */
+static void place_at_hit(const struct flyer *f, struct sadmm_collision_body *out)
+{
+    struct sadmm_flight_pose pose;
+    sadmm_flight_at(&f->flight, f->flight.since, &pose);
+    memcpy(out->orientation, pose.orientation, sizeof out->orientation);
+    if (f->flight.inertia[0] > 0) memcpy(out->velocity + 3, pose.spin, sizeof pose.spin);
+}
+
+/* What was hit begins the sub-step where it would have. */
+static void write_back(struct taking *t)
+{
+    sadmm_world *world = t->world;
+    const struct sadmm_hits *h = t->hits;
+    bool any = false;
+    for (size_t i = 0; i < h->count; ++i) {
+        const struct flyer *f = &h->list[i];
+        if (f->hits == 0) continue;
+        double *velocity = world->velocity + 6 * (size_t)f->dynamic;
+        struct sadmm_collision_body *out = &world->collision_bodies[f->slot];
+        any = true;
+        world->start.rigid[f->dynamic] = f->start;
+        for (int k = 0; k < 3; ++k) { /* it flies on: what contacts do not change is right from the start */
+            velocity[k] = f->start.velocity[k] + t->settings.dt * f->flight.acceleration[k];
+            velocity[3 + k] = f->flight.spin[k];
+        }
+        memcpy(world->start.velocity + 6 * (size_t)f->dynamic, velocity, 6 * sizeof *velocity);
+        memcpy(out->position, f->start.position, sizeof out->position);
+        memcpy(out->velocity, f->start.velocity, sizeof out->velocity);
+        place_at_hit(f, out);
+        h->since[f->slot] = f->flight.since;
+    }
+    if (!any) return;
+    world->hit_since = h->since;
+    sadmm_collision_look_again(world->collision);
+}
+
+/* May both be hit once more? */
+static bool may_hit(struct taking *t, const struct foreseen *item)
+{
+    bool may = true;
+    for (int side = 0; side < 2; ++side) {
+        struct flyer *f = &t->hits->list[item->flyer[side]];
+        if (f->hits < (uint32_t)t->settings.hits) continue;
+        f->too_many = true;
+        may = false;
+    }
+    return may;
+}
+
+static bool take_all(struct taking *t)
+{
+    struct sadmm_hits *h = t->hits;
+    bool ok = true;
+    for (size_t k = 0; ok && k < h->fast.count; ++k)
+        if (sadmm_collision_may_hit(t->world->collision, h->flyers, h->fast.keys[k]))
+            ok = foresee(t, h->fast.keys[k], 0);
+    while (ok && h->queue_count > 0) {
+        const struct foreseen *item = &h->foreseen[take_from_queue(h)];
+        if (holds(h, item) && may_hit(t, item)) ok = take_hit(t, *item);
+    }
+    return ok;
+}
+
+static void forget(sadmm_world *world)
+{
+    struct sadmm_hits *h = world->hits;
+    if (!h) return;
+    for (size_t i = 0; i < h->count; ++i) {
+        h->index[h->list[i].slot] = 0;
+        h->since[h->list[i].slot] = 0;
+    }
+    h->count = h->foreseen_count = h->queue_count = 0;
+    world->hit_since = NULL;
+}
+
+/* Bodies that would be hit too often take part no more; returns whether there are any. */
+static bool leave_out(struct taking *t)
+{
+    bool any = false;
+    for (size_t i = 0; i < t->hits->count; ++i) {
+        if (!t->hits->list[i].too_many || t->hits->list[i].dynamic < 0) continue;
+        t->hits->flyers[t->hits->list[i].slot] = SADMM_FLYER_NONE;
+        any = true;
+    }
+    return any;
+}
+
+/* The sub-step's candidates and which of them are fast. */
+static sadmm_status look_ahead(struct taking *t)
+{
+    sadmm_world *world = t->world;
+    TRY(sadmm_collision_look_ahead(world->collision, &t->input, &world->error));
+    if (sadmm_collision_list_fast(world->collision, &t->input, t->settings.restitution_threshold, &t->hits->fast))
+        return SADMM_OK;
+    sadmm_collision_look_again(world->collision);
+    return sadmm_fail_memory(&world->error, "hits");
+}
+
+/* Its hits, again without bodies that are hit too often; what rattles on and on has none. */
+enum { MOST_TIMES = 4 };
+static sadmm_status take_most(struct taking *t)
+{
+    sadmm_world *world = t->world;
+    for (int times = 0; times < MOST_TIMES; ++times) {
+        world->start.hit_count = world->start.hit_first;
+        TRY(look_ahead(t));
+        if (t->hits->fast.count == 0) return SADMM_OK;
+        if (times == 0) mark_bodies(t);
+        if (!take_all(t)) {
+            sadmm_collision_look_again(world->collision);
+            return sadmm_fail_memory(&world->error, "hits");
+        }
+        if (!leave_out(t)) {
+            write_back(t);
+            return SADMM_OK;
+        }
+        forget(world);
+    }
+    world->start.hit_count = world->start.hit_first;
+    sadmm_collision_look_again(world->collision);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep)
+{
+    struct taking t = {.world = world, .settings = sadmm_settings_of_substep(&world->def.settings)};
+    forget(world);
+    if (substep == 0) world->start.hit_count = 0;
+    world->start.hit_first = world->start.hit_count;
+    if (world->bouncing_count == 0 || t.settings.hits == 0 || world->kernels->backend == SADMM_BACKEND_CUDA ||
+        !any_fast(world, t.settings.restitution_threshold))
+        return SADMM_OK;
+    if (!world->hits) world->hits = (struct sadmm_hits *)sadmm_alloc(1, sizeof *world->hits);
+    if (!world->hits || !reserve(world->hits, world->body_slots)) return sadmm_fail_memory(&world->error, "hits");
+    t.hits = world->hits;
+    t.input = sadmm_world_collision_input(world, substep);
+    t.input.team = &world->team;
+    return take_most(&t);
+}
+
+/* How fast the two come closer at a point by their own motions, at the end of the sub-step, m/s. */
+static double approach_of(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point,
+                          const struct sadmm_flight *a, const struct sadmm_flight *b, double dt)
+{
+    double across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0}, speed = 0;
+    add_cross(pair->normal, a->spin, 1, across_a);
+    add_cross(pair->normal, b->spin, 1, across_b);
+    for (int k = 0; k < 3; ++k)
+        speed -= pair->normal[k] * (b->velocity[k] - a->velocity[k] + dt * (b->acceleration[k] - a->acceleration[k])) -
+                 across_a[k] * point->arm_a[k] + across_b[k] * point->arm_b[k];
+    return speed;
+}
+
+/* The flight of a shape's body, NULL: it was not followed. */
+static const struct sadmm_flight *flight_of(const sadmm_world *world, int32_t shape)
+{
+    const struct sadmm_hits *h = world->hits;
+    const int32_t slot = world->shapes[shape].body, number = h->index[slot] - 1;
+    return number < 0 || h->flyers[slot] == SADMM_FLYER_NONE ? NULL : &h->list[number].flight;
+}
+
+static double thinner_of(const sadmm_world *world, const struct sadmm_contact_pair *pair)
+{
+    return fmin(geometry_thickness(&world->geometries[world->shapes[pair->shape_a].geometry]),
+                geometry_thickness(&world->geometries[world->shapes[pair->shape_b].geometry]));
+}
+
+/* Gaps are opened by so much more, and by no more than this share of the thinner shape: nothing goes through where the
+ * touch of thin shapes is lost in rounding. */
+#define OPEN        1e-6
+#define OPENED_MOST 0.25
+void sadmm_world_open_gaps(sadmm_world *world)
+{
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
+    if (!world->hits || world->hits->count == 0) return;
+    for (size_t p = 0; p < world->contacts.pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
+        if (!(pair->restitution > 0)) continue;
+        const struct sadmm_flight *a = flight_of(world, pair->shape_a), *b = flight_of(world, pair->shape_b);
+        if (!a || !b || world->geometries[world->shapes[pair->shape_b].geometry].type == SADMM_SHAPE_MESH) continue;
+        const double most = OPENED_MOST * thinner_of(world, pair);
+        for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+            struct sadmm_contact_point *point = &world->contacts.points[k];
+            const double speed = approach_of(pair, point, a, b, settings.dt), way = (1 + OPEN) * speed * settings.dt;
+            if (speed > settings.restitution_threshold && way > point->gap && way - point->gap <= most)
+                point->gap = way;
+        }
+    }
+}
+
+void sadmm_world_add_hit_wrenches(sadmm_world *world, const sadmm_settings *settings)
+{
+    const double mean = 1 / (settings->dt * settings->substeps);
+    for (size_t k = world->start.hit_first; k < world->start.hit_count; ++k) {
+        const struct sadmm_world_hit *hit = &world->start.hits[k];
+        for (int side = 0; side < 2; ++side) {
+            const bool driven = hit->driven[side] >= 0;
+            const double share = (side ? 1 : -1) * (driven ? mean : 1 / settings->dt);
+            double *wrench = driven                    ? world->driven[hit->driven[side]].wrench
+                             : hit->dynamic[side] >= 0 ? world->wrench + 6 * (size_t)hit->dynamic[side]
+                                                       : NULL;
+            if (!wrench) continue;
+            for (int j = 0; j < 3; ++j) wrench[j] += share * hit->impulse[j];
+            add_cross(hit->arm[side], hit->impulse, share, wrench + 3);
+        }
+    }
+}
+
+void sadmm_world_free_hits(sadmm_world *world)
+{
+    struct sadmm_hits *h = world->hits;
+    sadmm_free(world->start.hits);
+    sadmm_free(world->last_start.hits);
+    if (!h) return;
+    void *blocks[] = {h->flyers, h->index, h->since, h->list, h->foreseen, h->queue, h->fast.keys, h->pairs.keys, h};
+    for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
+}
