@@ -85,10 +85,29 @@ SADMM_INLINE real rigid_half_tangent(real y)
 
 /* The mean angular velocity m, in the body's frame, of h of motion without torque from angular velocity w:
  *
- *     I m - I w + h/2 m x I m = 0,    c = h/2 ((I_z - I_y) / I_x, (I_x - I_z) / I_y, (I_y - I_x) / I_z).
+ *     I m - I w + h/2 m x I m = 0,    c = h/2 ((I_z - I_y) / I_x, (I_x - I_z) / I_y, (I_y - I_x) / I_z)
  *
- * Two sweeps over its equations take the error down by (|c| |w|)^3. Where that is slow they come near, and Newton's method
- * closes in. */
+ * By Newton's method, from near it. rate: |c| |w|. */
+SADMM_RARE vec3 rigid_mean_spin_near(vec3 m, vec3 w, vec3 c, real rate)
+{
+    real error = 1;
+    int k;
+    for (k = 0; k < 8 && error > SADMM_EPSILON; ++k) {
+        const vec3 f = v3(m.x - w.x + c.x * (m.y * m.z), m.y - w.y + c.y * (m.z * m.x), m.z - w.z + c.z * (m.x * m.y));
+        vec3 d;
+        mat3 J;
+        J.r[0] = v3(1, c.x * m.z, c.x * m.y);
+        J.r[1] = v3(c.y * m.z, 1, c.y * m.x);
+        J.r[2] = v3(c.z * m.y, c.z * m.x, 1);
+        d = m3_solve(J, f);
+        m = v3_sub(m, d);
+        error = rate * v3_norm2(d) / v3_norm2(m);
+    }
+    return m;
+}
+
+/* The same by sweeps over the equations, two of which take the error down by (|c| |w|)^3. Where that is slow Newton's
+ * method goes on. */
 SADMM_INLINE vec3 rigid_mean_spin(vec3 w, vec3 c)
 {
     const real rate = v3_max_abs(c) * v3_max_abs(w), faster = rate * rate * rate;
@@ -103,18 +122,7 @@ SADMM_INLINE vec3 rigid_mean_spin(vec3 w, vec3 c)
         }
         error *= faster;
     } while (error > SADMM_EPSILON && rate < (real)RIGID_SLOW);
-    for (k = 0; k < 8 && error > SADMM_EPSILON; ++k) {
-        const vec3 f = v3(m.x - w.x + c.x * (m.y * m.z), m.y - w.y + c.y * (m.z * m.x), m.z - w.z + c.z * (m.x * m.y));
-        vec3 d;
-        mat3 J;
-        J.r[0] = v3(1, c.x * m.z, c.x * m.y);
-        J.r[1] = v3(c.y * m.z, 1, c.y * m.x);
-        J.r[2] = v3(c.z * m.y, c.z * m.x, 1);
-        d = m3_solve(J, f);
-        m = v3_sub(m, d);
-        error = rate * v3_norm2(d) / v3_norm2(m);
-    }
-    return m;
+    return error > SADMM_EPSILON ? rigid_mean_spin_near(m, w, c, rate) : m;
 }
 
 /* Of a body whose moments differ, in its own frame: where it is turned to, that as a matrix, how fast it turns. */
@@ -149,27 +157,36 @@ SADMM_INLINE int rigid_pieces(vec3 inertia, real energy2, real momentum2, real d
     return 4 * square > scale ? (int)real_min(2 * real_sqrt(square / scale) + 1, (real)4096) : 1;
 }
 
+/* The turn by 2 atan(|c|) about the mean m of it; c: half of its time, times m. */
+SADMM_INLINE struct rigid_tumbling rigid_tumble_piece(struct rigid_tumbling from, vec3 c, real half)
+{
+    const vec3 m = rigid_mean_spin(from.own, c);
+    quat step;
+    step.w = 1, step.x = half * m.x, step.y = half * m.y, step.z = half * m.z;
+    from.orientation = q_normalize(q_mul(from.orientation, step));
+    from.own = v3_sub(v3_scale(m, 2), from.own);
+    return from;
+}
+SADMM_RARE struct rigid_tumbling rigid_tumble_pieces(struct rigid_tumbling from, vec3 c, real half, int pieces)
+{
+    int k;
+    for (k = 0; k < pieces; ++k) from = rigid_tumble_piece(from, c, half);
+    return from;
+}
+
 /* dt of motion without torque by the midpoint rule: the turn by 2 atan(h |m| / 2) about the mean m takes w to 2 m - w, which
  * has the same energy and in space the same angular momentum, to rounding. h is longer than the time by as much as makes
  * that the turn of the angle by which a body goes about a principal axis. By -dt it goes back to where it was. */
-SADMM_CALLED struct rigid_tumbling rigid_tumble_on(struct rigid_tumbling from, vec3 inertia, real dt)
+SADMM_DEVICE_CALL struct rigid_tumbling rigid_tumble_on(struct rigid_tumbling from, vec3 inertia, real dt)
 {
-    const vec3 inverse = v3(1 / inertia.x, 1 / inertia.y, 1 / inertia.z),
-               p = v3(inertia.x * from.own.x, inertia.y * from.own.y, inertia.z * from.own.z);
+    const vec3 p = v3(inertia.x * from.own.x, inertia.y * from.own.y, inertia.z * from.own.z);
     const real energy2 = v3_dot(p, from.own), momentum2 = v3_norm2(p);
     const int pieces = rigid_pieces(inertia, energy2, momentum2, dt);
-    const real half = dt / (real)(2 * pieces), rate2 = energy2 / momentum2 * energy2,
+    const real half = pieces > 1 ? dt / (real)(2 * pieces) : dt / 2, rate2 = energy2 / momentum2 * energy2,
                stretched = half * rigid_half_tangent(half * half * rate2);
-    const vec3 c = v3(stretched * ((inertia.z - inertia.y) * inverse.x), stretched * ((inertia.x - inertia.z) * inverse.y),
-                      stretched * ((inertia.y - inertia.x) * inverse.z));
-    int k;
-    for (k = 0; k < pieces; ++k) {
-        const vec3 m = rigid_mean_spin(from.own, c);
-        quat step;
-        step.w = 1, step.x = stretched * m.x, step.y = stretched * m.y, step.z = stretched * m.z;
-        from.orientation = q_normalize(q_mul(from.orientation, step));
-        from.own = v3_sub(v3_scale(m, 2), from.own);
-    }
+    const vec3 c = v3(stretched * ((inertia.z - inertia.y) / inertia.x), stretched * ((inertia.x - inertia.z) / inertia.y),
+                      stretched * ((inertia.y - inertia.x) / inertia.z));
+    from = pieces > 1 ? rigid_tumble_pieces(from, c, stretched, pieces) : rigid_tumble_piece(from, c, stretched);
     from.R = q_matrix(from.orientation);
     return from;
 }
