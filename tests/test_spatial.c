@@ -125,6 +125,28 @@ START_TEST(free_bodies_keep_angular_momentum)
 }
 END_TEST
 
+/* A turn without torque by -dt is the way back, at any speed, from where one by dt gets to. */
+START_TEST(turns_can_be_taken_back)
+{
+    uint64_t seed = 11;
+    for (int trial = 0; trial < fewer(400); ++trial) {
+        const double dt = 0.01, spin = pow(10, 2 + 2 * random_number(&seed)); /* up to 100 rad in the step */
+        double moments[3];
+        random_moments(&seed, 0.1, moments);
+        const vec3 inertia = v3_load(moments), w = v3(spin * random_number(&seed), spin * random_number(&seed), spin);
+        const struct rigid_spin start = {random_turn(&seed), w}, there = rigid_tumble(start, inertia, dt),
+                                back = rigid_tumble(there, inertia, -dt);
+        const quat p = start.orientation, q = back.orientation;
+        const double turned = 1 - fabs(p.w * q.w + p.x * q.x + p.y * q.y + p.z * q.z);
+        /* about an axis of the middle moment errors grow by e^(angle), 1e-16 to 1e-6 at the largest speeds */
+        const double most = spin * dt < 5 ? 1e-12 : 1e-3;
+        ck_assert_msg(off(back.angular, w) < most * v3_norm(w) && turned < most * most + 1e-15, "spin %g: %g %g", spin,
+                      off(back.angular, w) / v3_norm(w), turned);
+        ck_assert(off(there.angular, w) > 1e-9 * v3_norm(w)); /* it has gone somewhere */
+    }
+}
+END_TEST
+
 /* A body that turns about a principal axis turns by spin x time, whatever its moments. */
 START_TEST(spins_about_principal_axes_are_exact)
 {
@@ -374,6 +396,7 @@ int main(void)
     TCase *cases = tcase_create("spatial");
     tcase_set_timeout(cases, 60);
     suite_add_tcase(suite, cases);
+    tcase_add_test(cases, turns_can_be_taken_back);
     tcase_add_loop_test(cases, free_bodies_keep_angular_momentum, 0, SOLVERS);
     tcase_add_test(cases, spins_about_principal_axes_are_exact);
     tcase_add_loop_test(cases, torques_add_to_angular_momentum, 0, SOLVERS);

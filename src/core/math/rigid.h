@@ -31,16 +31,13 @@ SADMM_INLINE sym3 rigid_world_inertia(mat3 R, vec3 inertia)
     return s;
 }
 
-/* Principal moments that differ by no more than rounding need no gyroscopic term. */
+/* Principal moments that differ by no more than rounding are equal. */
 SADMM_INLINE int rigid_is_isotropic(vec3 inertia)
 {
     real lo = real_min(inertia.x, real_min(inertia.y, inertia.z));
     real hi = real_max(inertia.x, real_max(inertia.y, inertia.z));
     return hi - lo <= 4 * SADMM_EPSILON * hi;
 }
-
-/* Below this rate of convergence sweeps (rigid_mean_spin) are faster than Newton's method. */
-#define RIGID_SLOW 0.02
 
 /* Solve M x = r for a general 3x3 M (rows) by Cramer's rule. */
 SADMM_INLINE vec3 m3_solve(mat3 m, vec3 r)
@@ -106,8 +103,9 @@ SADMM_RARE vec3 rigid_mean_spin_near(vec3 m, vec3 w, vec3 c, real rate)
     return m;
 }
 
-/* The same by sweeps over the equations, two of which take the error down by (|c| |w|)^3. Where that is slow Newton's
- * method goes on. */
+/* The same by sweeps over the equations, two of which take the error down by rate^3. Beyond a rate of RIGID_SLOW Newton's
+ * method is faster. */
+#define RIGID_SLOW 0.02
 SADMM_INLINE vec3 rigid_mean_spin(vec3 w, vec3 c)
 {
     const real rate = v3_max_abs(c) * v3_max_abs(w), faster = rate * rate * rate;
@@ -132,9 +130,8 @@ struct rigid_tumbling {
     vec3 own;
 };
 
-/* No less than the square of a body's angular velocity (own: in its frame) at any time of its motion without torque: by
- * energy and angular momentum, which stay. Of one that turns about the axis of the least or the largest moment it is that
- * square. Times `scale`, which is returned by itself. */
+/* No less than the square of a body's angular velocity at any time of its motion without torque, times `scale`: by w.Iw and
+ * |Iw|^2, which stay. Of a turn about the axis of the least or the largest moment it is that square. */
 SADMM_INLINE real rigid_rate2_scaled(vec3 inertia, real energy2, real momentum2, real *scale)
 {
     const real lo = real_min(inertia.x, real_min(inertia.y, inertia.z)),
@@ -142,6 +139,7 @@ SADMM_INLINE real rigid_rate2_scaled(vec3 inertia, real energy2, real momentum2,
     *scale = lo * hi;
     return (lo + hi) * energy2 - momentum2;
 }
+/* By the angular velocity at one time, in the body's frame. */
 SADMM_INLINE real rigid_rate2(vec3 inertia, vec3 own)
 {
     const vec3 p = v3(inertia.x * own.x, inertia.y * own.y, inertia.z * own.z);
@@ -157,7 +155,7 @@ SADMM_INLINE int rigid_pieces(vec3 inertia, real energy2, real momentum2, real d
     return 4 * square > scale ? (int)real_min(2 * real_sqrt(square / scale) + 1, (real)4096) : 1;
 }
 
-/* The turn by 2 atan(|c|) about the mean m of it; c: half of its time, times m. */
+/* A piece of twice `half`: turned about the mean by 2 atan(half |m|). */
 SADMM_INLINE struct rigid_tumbling rigid_tumble_piece(struct rigid_tumbling from, vec3 c, real half)
 {
     const vec3 m = rigid_mean_spin(from.own, c);
@@ -184,7 +182,8 @@ SADMM_DEVICE_CALL struct rigid_tumbling rigid_tumble_on(struct rigid_tumbling fr
     const int pieces = rigid_pieces(inertia, energy2, momentum2, dt);
     const real half = pieces > 1 ? dt / (real)(2 * pieces) : dt / 2, rate2 = energy2 / momentum2 * energy2,
                stretched = half * rigid_half_tangent(half * half * rate2);
-    const vec3 c = v3(stretched * ((inertia.z - inertia.y) / inertia.x), stretched * ((inertia.x - inertia.z) / inertia.y),
+    const vec3 c = v3(stretched * ((inertia.z - inertia.y) / inertia.x),
+                      stretched * ((inertia.x - inertia.z) / inertia.y),
                       stretched * ((inertia.y - inertia.x) / inertia.z));
     from = pieces > 1 ? rigid_tumble_pieces(from, c, stretched, pieces) : rigid_tumble_piece(from, c, stretched);
     from.R = q_matrix(from.orientation);

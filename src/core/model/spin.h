@@ -50,6 +50,14 @@ SADMM_INLINE struct spin_system spin_of_system(const struct sadmm_rigid *body, d
     return out;
 }
 
+/* Its orientation alone. */
+SADMM_INLINE quat spin_turned_halfway(const struct sadmm_rigid *body, double dt)
+{
+    const vec3 inertia = v3_load(body->inertia);
+    const struct rigid_spin start = spin_start(body);
+    return rigid_is_isotropic(inertia) ? start.orientation : rigid_tumble(start, inertia, dt / 2).orientation;
+}
+
 /* Velocities of the start with the spin halfway, to first order, which is enough to compare a solution with (leads). */
 SADMM_INLINE void spin_before(const struct sadmm_rigid *body, double dt, double before[6])
 {
@@ -102,7 +110,7 @@ SADMM_INLINE void spin_move_from(const struct sadmm_rigid *body, quat halfway, c
 SADMM_INLINE void spin_move(const struct sadmm_rigid *body, const double v[6], const double mean[6], bool whole,
                             double dt, double position[3], double orientation[4], double velocity[6])
 {
-    spin_move_from(body, spin_of_system(body, dt).orientation, v, mean, whole, dt, position, orientation, velocity);
+    spin_move_from(body, spin_turned_halfway(body, dt), v, mean, whole, dt, position, orientation, velocity);
 }
 
 #endif

@@ -170,7 +170,8 @@ static void turn_from_start(struct flyer *f, double dt)
     const vec3 inertia = v3_load(start->inertia);
     if (rigid_is_isotropic(inertia)) {
         const struct rigid_spin spin = spin_start(start);
-        turn_evenly(&f->flight, spin.orientation, spin.angular, spin_after(start, spin.orientation, spin.angular, dt), 0);
+        const vec3 after = spin_after(start, spin.orientation, spin.angular, dt);
+        turn_evenly(&f->flight, spin.orientation, spin.angular, after, 0);
     } else {
         struct rigid_spin halfway = spin_halfway(start, dt);
         halfway.angular = spin_after(start, halfway.orientation, halfway.angular, dt);
