@@ -390,6 +390,49 @@ START_TEST(a_tumbling_box_keeps_its_turning)
 }
 END_TEST
 
+/* A hit through the centre of mass, without friction, turns nothing: a ball with three moments that tumbles, with a torque
+ * or damped, turns as it does beside the wall, whenever it hits. */
+START_TEST(a_hit_leaves_turning_alone)
+{
+    const double dt = 0.01, torque[3] = {0.02, -0.03, 0.05}, none[3] = {0, 0, 0};
+    random_state = 29;
+    for (int c = 0; c < 12; ++c) {
+        sadmm_world *world = new_world(_i, dt, 0);
+        sadmm_body_id id[2];
+        const double moment = random_in(0.05, 0.95) * dt, spin = c % 2 ? 5 : 40;
+        double w[3];
+        for (int k = 0; k < 3; ++k) w[k] = random_in(-spin, spin);
+        add_floor(world, 0);
+        for (int s = 0; s < 2; ++s) {
+            sadmm_body_def body = sadmm_body_def_default();
+            sadmm_shape_def shape = sadmm_shape_def_default();
+            body.mass = 1;
+            body.inertia[0] = 0.005, body.inertia[1] = 0.01, body.inertia[2] = 0.013;
+            body.angular_damping = c % 3 ? 0 : 3;
+            body.position[0] = s;
+            body.position[2] = s ? 1 : 0.1 + 2 * moment;
+            body.linear_velocity[2] = -2;
+            for (int k = 0; k < 3; ++k) body.angular_velocity[k] = w[k];
+            MUST(world, sadmm_world_add_body(world, &body, &id[s]));
+            shape.type = SADMM_SHAPE_SPHERE;
+            shape.size[0] = 0.1;
+            shape.friction = 0;
+            shape.restitution = 1;
+            MUST(world, sadmm_world_add_shape(world, id[s], &shape, NULL));
+            MUST(world, sadmm_world_set_body_wrench(world, id[s], none, c % 4 < 2 ? torque : none));
+        }
+        step_world(world, 1);
+        const sadmm_body_state hit = body_state(world, id[0]), beside = body_state(world, id[1]);
+        ck_assert_double_eq_tol(hit.linear_velocity[2], 2, 2 * tables[_i].tolerance);
+        for (int k = 0; k < 3; ++k)
+            ck_assert_double_eq_tol(hit.angular_velocity[k], beside.angular_velocity[k], spin * tables[_i].tolerance);
+        for (int k = 0; k < 4; ++k)
+            ck_assert_double_eq_tol(hit.orientation[k], beside.orientation[k], spin * dt * tables[_i].tolerance);
+        sadmm_world_destroy(world);
+    }
+}
+END_TEST
+
 /* ---- what is conserved ------------------------------------------------------------------------------------------- */
 
 /* Twice the kinetic energy. */
@@ -828,6 +871,7 @@ int main(void)
     tcase_add_loop_test(tests, a_hit_goes_through_to_the_floor, 0, TABLES);
     tcase_add_loop_test(tests, a_ball_falls_and_bounces, 0, TABLES);
     tcase_add_loop_test(tests, a_turning_box_hits_a_plane, 0, TABLES);
+    tcase_add_loop_test(tests, a_hit_leaves_turning_alone, 0, TABLES);
     tcase_add_loop_test(tests, a_tumbling_box_keeps_its_turning, 0, TABLES);
     tcase_add_loop_test(tests, any_two_shapes_hit, 0, TABLES);
     tcase_add_loop_test(tests, balls_in_a_box_do_what_formulas_say, 0, TABLES);
