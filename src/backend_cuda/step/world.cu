@@ -147,6 +147,10 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(CUDA(reserve)(c, PINNED_REPORTS, STEPS_AHEAD * sizeof(struct cuda_step_report), error));
     CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_WORLD_CONTROL), 0, sizeof(struct cuda_step_control), c->stream),
               "cudaMemsetAsync(control)");
+    /* steps do not write what is not of account (core/model/rolling.h) */
+    if (n > 0)
+        CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_WORLD_BODIES), 0, 3 * n * sizeof *world->rigid, c->stream),
+                  "cudaMemsetAsync(bodies)");
 
     c->bounces = false;
     for (size_t k = 0; k < world->input->shape_count; ++k)
