@@ -7,7 +7,7 @@
 #define SADMM_SMOOTH_ELSEWHERE sadmm_smooth_manifold_baseline
 #include "pair_manifold.h"
 
-/* Most moves: those towards the touch, and all. */
+/* Most moves towards a touch; a pair that takes more is the solve's. */
 enum { MOST_MOVES = 128 };
 /* Nearer than this share of the thinner shape, points are followed. */
 #define NEAR        1e-3
@@ -81,6 +81,7 @@ static void look_closely(const struct sadmm_flying_pair *p, struct moment *at)
     at->m.cache = 0;
     pair_manifold(p->a.geometry, p->b.geometry, p->hulls, p->child, &at->pose, SADMM_REAL_MAX, 0, &at->m);
     rotate_to_world(at->b.R, at->m.normal, at->manifold_normal);
+    if (at->m.count > 0) memcpy(at->normal, at->manifold_normal, sizeof at->normal);
 }
 
 /* Of the manifold's k-th point, in the world. */
@@ -187,16 +188,17 @@ bool sadmm_first_touch_of(struct sadmm_flying_pair *p, double from, double to, s
     double t = from;
     if (!balls_meet(p, from, to)) return false;
     for (int move = 0; move < MOST_MOVES; ++move) {
-        double separation = 0, next;
+        double separation = 0, next, most;
         look(p, t, &at);
-        const double most = closing(p, &at, to - t);
-        if (!(most > p->threshold)) return false;
+        most = closing(p, &at, to - t);
         if (at.distance > NEAR * thin) {
+            if (!(most > p->threshold)) return false;
             t += at.distance / most;
             if (!(t <= to)) return false;
             continue;
         }
         look_closely(p, &at);
+        most = closing(p, &at, to - t); /* what touches has no distance to have a normal of */
         next = first_point(p, &at, &separation);
         if (next < HUGE_VAL &&
             (fabs(separation) <= NONE * thin || (separation < 0 && t <= from) || (next != 0 && t + next == t))) {
@@ -208,7 +210,7 @@ bool sadmm_first_touch_of(struct sadmm_flying_pair *p, double from, double to, s
             continue;
         }
         /* what is near parts, or is slow: on to where another point may touch */
-        if (!(t < to)) return false;
+        if (!(t < to) || !(most > p->threshold)) return false;
         t = smaller_of(t + larger_of(at.distance / most, smaller_of(passed, PASSED_WAY * thin / most)), to);
     }
     p->lost = true;
