@@ -7,7 +7,7 @@
 #define SADMM_SMOOTH_ELSEWHERE sadmm_smooth_manifold_baseline
 #include "pair_manifold.h"
 
-/* Most moves: those towards the touch, and all. */
+/* Most moves towards a touch; a pair that takes more is the solve's. */
 enum { MOST_MOVES = 128 };
 /* Nearer than this share of the thinner shape, points are followed. */
 #define NEAR        1e-3

@@ -1,6 +1,7 @@
 /* Manifolds to contacts: world terms, and the last step's impulses by feature. Eight threads take a candidate, one a
- * point; the first one writes the pair as well. Pairs that roll, or were found elsewhere than halfway, are made again by
- * a kernel of their own: what they need would cost the others registers. */
+ * point; the first one writes the pair as well. As if all were found halfway and stayed as they are; those that
+ * roll, or were found elsewhere, are then made by a kernel of their own, since what they need would cost the others
+ * registers. */
 #include "view.h"
 
 /* Time steps of this set and of the one before; fetched first, so that nothing waits for them later. */
@@ -68,9 +69,9 @@ static __device__ __forceinline__ emit_in_place emit_source_of(const collision_v
 
 /* The point goes on to the step's end, and its normal (core/model/rolling.h). */
 static __device__ __forceinline__ void migrate(const collision_view &v, const struct sadmm_proxy *a,
-                                            const struct sadmm_proxy *b, const struct sadmm_contact_pair *before,
-                                            double ratio, int32_t count, int32_t lane, int32_t at, double normal[3],
-                                            struct sadmm_contact_point *point)
+                                               const struct sadmm_proxy *b, const struct sadmm_contact_pair *before,
+                                               double ratio, int32_t count, int32_t lane, int32_t at, double normal[3],
+                                               struct sadmm_contact_point *point)
 {
     const struct migration_set last = {v.before.points, v.before.migrations};
     const double radius = contact_radius(a, b, count, normal, point);
@@ -81,9 +82,9 @@ static __device__ __forceinline__ void migrate(const collision_view &v, const st
     for (int k = 0; k < 3; ++k) normal[k] = pair.normal[k];
 }
 
-/* Has a candidate to be made again? Old points are not looked at: of those that are, some do not roll. */
+/* Is a candidate one for emit_general? By what is at hand: of those that are, some do not roll. */
 template <class Source>
-static __device__ __forceinline__ bool is_made_again(const emit_start &start, const Source &source, double dt)
+static __device__ __forceinline__ bool is_general(const emit_start &start, const Source &source, double dt)
 {
     const struct sadmm_proxy *a = &source.a, *b = &source.b;
     if (!is_midway(source.head.ahead, dt)) return true;
@@ -112,6 +113,17 @@ static __device__ __forceinline__ double friction_of(const collision_view &v, co
     return contact_friction(v.friction_pairs, v.friction_values, v.friction_count, own.a, own.b, &source.a, &source.b);
 }
 
+/* A point that was found halfway, and its normal. */
+template <class Source>
+static __device__ __forceinline__ void place_point(const Source &source, double dt, double normal[3],
+                                                   struct sadmm_contact_point *point)
+{
+    struct pair_motion motion;
+    rotate_to_world(source.b.R, source.head.normal, normal);
+    pair_motion_of(&source.a, &source.b, normal, source.head.ahead, dt, &motion);
+    contact_emit_point(&source.a, &source.b, &motion, &source.point, point);
+}
+
 /* Point `lane` of candidate i as it is found halfway, and its pair into the new set by the first lane; place: pairs << 32 |
  * points before it. Points go out by the warp or by the lane, which the kernel knows. */
 template <class Source>
@@ -120,20 +132,15 @@ static __device__ __forceinline__ struct sadmm_contact_point emit_point(const co
                                                                         const emit_start &start, const Source &source,
                                                                         uint64_t place)
 {
-    const struct sadmm_proxy *pa = &source.a, *pb = &source.b;
     const double friction = friction_of(v, start.own, source);
     double normal[3];
-    rotate_to_world(pb->R, source.head.normal, normal);
-
     struct sadmm_contact_point point;
-    struct pair_motion motion;
-    pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
-    contact_emit_point(pa, pb, &motion, &source.point, &point);
+    place_point(source, dt.now, normal, &point);
     if (start.match >= 0)
         contact_carry(&source.old, wide_at(v.before.points, 0), lane, normal, friction,
                       step_ratio(dt.now, dt.before), &point);
     if (lane > 0) return point;
-    if (is_made_again(start, source, dt.now)) v.again[atomicAdd(v.candidate_count + COUNT_AGAIN, 1ull)] = (int32_t)i;
+    if (is_general(start, source, dt.now)) v.general[atomicAdd(v.candidate_count + COUNT_GENERAL, 1ull)] = (int32_t)i;
     emit_pair(v, start, source, normal, friction, (int32_t)(place >> 32), (int32_t)(uint32_t)place);
     return point;
 }
@@ -242,7 +249,7 @@ emit_few_kernel(const __grid_constant__ collision_view v)
 
 /* ---- pairs that roll, or were found elsewhere than halfway -------------------------------------------------------- */
 
-static __device__ __forceinline__ void emit_again(const collision_view &v, const step_lengths &dt, int32_t lane,
+static __device__ __forceinline__ void emit_general(const collision_view &v, const step_lengths &dt, int32_t lane,
                                                   const emit_start &start, const emit_in_place &source, int32_t at,
                                                   int32_t first)
 {
@@ -252,10 +259,7 @@ static __device__ __forceinline__ void emit_again(const collision_view &v, const
     double normal[3];
     struct sadmm_contact_point point;
     if (is_midway(source.head.ahead, dt.now)) {
-        struct pair_motion motion;
-        rotate_to_world(pb->R, source.head.normal, normal);
-        pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
-        contact_emit_point(pa, pb, &motion, &source.point, &point);
+        place_point(source, dt.now, normal, &point);
         if (contact_may_migrate(pa, pb, before, v.before.points, start.count))
             migrate(v, pa, pb, before, ratio, start.count, lane, first + lane, normal, &point);
     } else {
@@ -266,20 +270,20 @@ static __device__ __forceinline__ void emit_again(const collision_view &v, const
     store_wide(point, &v.after.points[first + lane]);
 }
 
-static __global__ void __launch_bounds__(AGAIN_THREADS)
-emit_again_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(GENERAL_THREADS)
+emit_general_kernel(const __grid_constant__ collision_view v)
 {
     follow_if(v.early);
-    const int64_t thread = collision_thread(AGAIN_THREADS), stride = (int64_t)gridDim.x * AGAIN_THREADS;
-    const int64_t count = (int64_t)v.candidate_count[COUNT_AGAIN];
+    const int64_t thread = collision_thread(GENERAL_THREADS), stride = (int64_t)gridDim.x * GENERAL_THREADS;
+    const int64_t count = (int64_t)v.candidate_count[COUNT_GENERAL];
     if (usable_candidates(v) == 0 || v.after.counts->points > v.point_capacity) return;
-    for (int64_t j = thread; j < count * AGAIN_LANES; j += stride) {
-        const int64_t i = v.again[j / AGAIN_LANES];
+    for (int64_t j = thread; j < count * GENERAL_LANES; j += stride) {
+        const int64_t i = v.general[j / GENERAL_LANES];
         const step_lengths dt = lengths_of(v);
         const emit_start start = emit_start_of(v, i);
         const int32_t at = v.pair_of[i], first = v.after.pairs[at].first;
-        for (int32_t k = (int32_t)(j % AGAIN_LANES); k < start.count; k += AGAIN_LANES)
-            emit_again(v, dt, k, start, emit_source_of(v, start, i, k), at, first);
+        for (int32_t k = (int32_t)(j % GENERAL_LANES); k < start.count; k += GENERAL_LANES)
+            emit_general(v, dt, k, start, emit_source_of(v, start, i, k), at, first);
     }
 }
 
@@ -315,7 +319,7 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) carry_kernel(const _
 void COLLISION(matching_kernels)(struct collision_kernels *kernels)
 {
     kernels->emit = {emit_kernel, COLLISION_THREADS, sizeof(struct emit_pieces), "contacts"};
-    kernels->emit_again = {emit_again_kernel, AGAIN_THREADS, 0, "contacts that roll"};
+    kernels->emit_general = {emit_general_kernel, GENERAL_THREADS, 0, "contacts that roll"};
     kernels->carry = {carry_kernel, COLLISION_THREADS, 0, "impulses from triangle to triangle"};
     kernels->emit_few = {emit_few_kernel, EMIT_CANDIDATES * POINT_LANES, sizeof(struct emit_sums), "contacts"};
 }

@@ -17,7 +17,7 @@ struct collision_buffer {
 enum buffer_name {
     /* device */
     PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_NUMBERS, LEAF_NUMBERS_2, NODES, GROUPS, PARENTS, ARRIVALS,
-    COUNTER, GRID, CANDIDATES, CANDIDATES_2, LISTED, WALKS, MESH_PAIRS, TOUCHES, MANIFOLDS, MATCHES, SIZES, EMIT_AGAIN,
+    COUNTER, GRID, CANDIDATES, CANDIDATES_2, LISTED, WALKS, MESH_PAIRS, TOUCHES, MANIFOLDS, MATCHES, SIZES, EMIT_GENERAL,
     PLACES, TEMP, BOXES, REACHES, PAIR_OF,
     PAIRS, POINTS, MIGRATIONS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, MIGRATIONS_2, PAIR_KEYS_2, COUNTS_2,
     PAIRS_3, POINTS_3, MIGRATIONS_3, PAIR_KEYS_3, COUNTS_3,
@@ -36,7 +36,7 @@ static const char *const buffer_names[BUFFERS] = {
     "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "groups",
     "parents", "arrivals", "counter", "grid", "candidates", "sorted candidates", "listed candidates",
     "walks of listed candidates", "pairs with meshes", "first touches", "manifolds", "matches", "sizes",
-    "candidates made again", "places", "sort", "boxes of sub-steps", "reaches", "pairs of candidates",
+    "general candidates", "places", "sort", "boxes of sub-steps", "reaches", "pairs of candidates",
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",

@@ -146,15 +146,15 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
 enum narrow_how {
     NARROW_PLAIN_AT_ONCE, /* of worlds without hulls and meshes what is little work; the others are listed */
     NARROW_PLAIN_LISTED,  /* those */
-    NARROW_AT_ONCE,       /* the same of worlds with hulls */
-    NARROW_LISTED,
+    NARROW_HULLS_AT_ONCE,       /* the same of worlds with hulls */
+    NARROW_HULLS_LISTED,
     NARROW_MESHES_AT_ONCE, /* the same of worlds with meshes: further code, which would slow down the others */
     NARROW_MESHES_LISTED,
     NARROW_ALL_AT_ONCE,   /* the same again, of worlds with smooth bodies */
     NARROW_ALL_LISTED
 };
 static __device__ constexpr bool with_meshes(int how) { return how >= NARROW_MESHES_AT_ONCE; }
-static __device__ constexpr bool with_hulls(int how) { return how >= NARROW_AT_ONCE; }
+static __device__ constexpr bool with_hulls(int how) { return how >= NARROW_HULLS_AT_ONCE; }
 static __device__ constexpr bool is_at_once(int how) { return how % 2 == NARROW_PLAIN_AT_ONCE; }
 static __device__ constexpr bool is_listed(int how) { return !is_at_once(how); }
 static __device__ constexpr bool with_smooth(int how) { return how >= NARROW_ALL_AT_ONCE; }

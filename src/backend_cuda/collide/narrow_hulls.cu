@@ -5,8 +5,8 @@
 void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels)
 {
     struct narrow_kernels *k = &kernels->with_hulls;
-    k->at_once = {at_once_kernel<NARROW_ONE, NARROW_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of hulls"};
-    k->at_once_first = {at_once_kernel<NARROW_FIRST, NARROW_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of hulls"};
-    k->at_once_again = {at_once_kernel<NARROW_AGAIN, NARROW_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of hulls"};
-    k->listed = {listed_kernel<NARROW_ANY, NARROW_LISTED>, NARROW_THREADS, 0, "narrow phase of listed pairs"};
+    k->at_once = {at_once_kernel<NARROW_ONE, NARROW_HULLS_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of hulls"};
+    k->at_once_first = {at_once_kernel<NARROW_FIRST, NARROW_HULLS_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of hulls"};
+    k->at_once_again = {at_once_kernel<NARROW_AGAIN, NARROW_HULLS_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of hulls"};
+    k->listed = {listed_kernel<NARROW_ANY, NARROW_HULLS_LISTED>, NARROW_THREADS, 0, "narrow phase of listed pairs"};
 }

@@ -70,7 +70,7 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, MATCHES, candidates, sizeof *v->matches, error));
     TRY(reserve(c, PAIR_OF, candidates, sizeof *v->pair_of, error));
     TRY(reserve(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
-    TRY(reserve(c, EMIT_AGAIN, candidates, sizeof *v->again, error));
+    TRY(reserve(c, EMIT_GENERAL, candidates, sizeof *v->general, error));
     TRY(reserve(c, PLACES, candidates + 1, sizeof *v->places, error));
     v->found = in<uint64_t>(c, CANDIDATES);
     v->listed = in<int32_t>(c, LISTED);
@@ -81,7 +81,7 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     v->matches = in<int32_t>(c, MATCHES);
     v->pair_of = in<int32_t>(c, PAIR_OF);
     v->sizes = in<uint8_t>(c, SIZES);
-    v->again = in<int32_t>(c, EMIT_AGAIN);
+    v->general = in<int32_t>(c, EMIT_GENERAL);
     v->places = in<uint64_t>(c, PLACES);
     v->candidate_capacity = (int32_t)c->candidate_capacity;
     v->point_capacity = (int32_t)c->point_capacity;
@@ -211,8 +211,8 @@ static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_e
     TRY(narrow_phase(c, error));
     if (v->seams.first) TRY(launch(c, c->kernels.seams, v->candidate_capacity, error));
     TRY(emit_contacts(c, error));
-    TRY(launch(c, c->kernels.emit_again,
-               std::min<int64_t>((int64_t)v->candidate_capacity * AGAIN_LANES, AGAIN_BLOCKS * AGAIN_THREADS), error));
+    TRY(launch(c, c->kernels.emit_general,
+               std::min<int64_t>((int64_t)v->candidate_capacity * GENERAL_LANES, GENERAL_BLOCKS * GENERAL_THREADS), error));
     if (v->mesh_count == 0) return SADMM_OK;
     return launch(c, c->kernels.carry, (int64_t)v->candidate_capacity * POINT_LANES, error);
 }

@@ -69,9 +69,9 @@ enum {
     RANK_CHUNK = 1024,       /* ... and how many are staged at a time */
     EMIT_CANDIDATES = 32,    /* of a block */
     POINT_LANES = SADMM_MANIFOLD_POINTS,
-    AGAIN_THREADS = 32,      /* contacts that are made again: long chains, on as many multiprocessors as there are, ... */
-    AGAIN_LANES = 2,         /* ... two lanes a candidate, since few have more points, ... */
-    AGAIN_BLOCKS = 4096,     /* ... and so many blocks at most, that go on to others: as a rule there are none */
+    GENERAL_THREADS = 32,      /* emit_general: long chains of loads, on as many multiprocessors as there are, ... */
+    GENERAL_LANES = 2,         /* ... two lanes a candidate, since few have more points, ... */
+    GENERAL_BLOCKS = 4096,     /* ... and so many blocks at most, that go on to others: as a rule there are none */
     MORTON_BITS = 10         /* an axis: finer cells would part no more bodies, and sorting costs by the bit */
 };
 
@@ -195,7 +195,7 @@ struct collision_view {
     int32_t *parents;                              /* of nodes; -1: the root */
     int32_t *arrivals;                             /* at inner nodes, bottom up */
 
-    unsigned long long *candidate_count;           /* found, whether they fit or not; listed; mesh_pairs; again (COUNT_) */
+    unsigned long long *candidate_count;           /* found, whether they fit or not; listed; mesh_pairs; general (COUNT_) */
     uint64_t *mesh_pairs;                          /* first_candidate of pairs with a mesh, of which there may be as many as
                                                       candidates; as they come */
     double *touches;                               /* by candidate, of triangles and pairs that are fast: mesh_first_touch */
@@ -209,7 +209,7 @@ struct collision_view {
     int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
     int32_t *pair_of;                              /* by candidate: its pair in the new set; without: the next one */
     uint8_t *sizes;                                /* points by candidate; 0 beyond the last, SIZES_BEYOND of them */
-    int32_t *again;                                /* candidates whose contacts are made again; as they come */
+    int32_t *general;                              /* candidates whose contacts emit_general makes; as they come */
     uint64_t *places;                              /* exclusive sums of pairs << 32 | points */
 
     struct collision_set before, after;
@@ -256,7 +256,7 @@ static __device__ __forceinline__ uint32_t candidates_of(const collision_view &v
 }
 
 /* Counters. */
-enum { COUNT_FOUND, COUNT_LISTED, COUNT_MESH_PAIRS, COUNT_AGAIN, COUNTERS };
+enum { COUNT_FOUND, COUNT_LISTED, COUNT_MESH_PAIRS, COUNT_GENERAL, COUNTERS };
 
 /* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */
 static __device__ __forceinline__ int32_t usable_candidates(const collision_view &v)
@@ -305,8 +305,8 @@ struct narrow_kernels {
 struct collision_kernels {
     struct collision_launch place[2], place_first[2], place_again[2]; /* of few shapes, of many (by_warp_from) */
     struct collision_launch grid, build, refit, clear, walk, tiles, small_tiles, rank,
-        expand, expand_first, seams, emit, emit_few, emit_again, carry;
-    struct narrow_kernels plain, with_hulls, with_meshes, with_smooth; /* each where there are any that the last has not */
+        expand, expand_first, seams, emit, emit_few, emit_general, carry;
+    struct narrow_kernels plain, with_hulls, with_meshes, with_smooth; /* by what kinds of shapes there are */
     int expand_warps; /* expand is launched for */
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);

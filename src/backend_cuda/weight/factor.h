@@ -35,7 +35,7 @@ struct eight_sides {
 
 /* weight_most of pair p. By itself: few bodies are alone, and the others should not pay in registers. */
 static __device__ __noinline__ double most_of(const body_view &bodies, const contact_view &contacts, int alone,
-                                           int32_t p)
+                                              int32_t p)
 {
     const pair_bodies pair = contacts.bodies[p];
     const double mass[2] = {alone & 1 ? mass_of(bodies, (size_t)pair.body_a) : 0,
