@@ -199,9 +199,9 @@ SADMM_INLINE double turning_speed(const struct sadmm_proxy *p, const double norm
     return lever * sqrt(x * x + y * y + z * z);
 }
 
-/* Pose of a in b's frame (pair_manifold.h). */
+/* Pose of a in b's frame, `ahead` seconds into the step, and where b is then (pair_manifold.h). */
 SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
-                                           double dt);
+                                           double dt, struct proxy_place *of_b);
 
 struct first_touch {
     double ahead; /* s: when it touches, or up to when it was looked at */
@@ -217,18 +217,18 @@ SADMM_INLINE struct first_touch first_touch_of(const struct sadmm_proxy *a, cons
                  falls = (fall_of(gravity, dt) + a->fall + b->fall) / dt, lever_a = proxy_lever(a),
                  lever_b = proxy_lever(b);
     struct first_touch first = {from, false};
-    struct sadmm_proxy turned;
+    struct proxy_place of_b;
     double normal[3];
     int move, k;
     for (move = 0; move < ADVANCE_MOVES; ++move) {
-        const struct pair_pose pose = proxies_pose(a, b, first.ahead, dt);
+        const struct pair_pose pose = proxies_pose(a, b, first.ahead, dt, &of_b);
         vec3 n;
         /* accelerations add their part to the whole step's velocity, from its start on */
         const double distance =
             (double)shapes_apart(&a->geometry, &b->geometry, hulls, child, &pose, &n) - falls * first.ahead;
         double closing = falls, next;
         if (!(distance > touch)) return first;
-        rotate_to_world(proxy_at(b, first.ahead, dt, &turned)->R, n, normal);
+        rotate_to_world(of_b.R, n, normal);
         for (k = 0; k < 3; ++k) closing -= normal[k] * (b->velocity[k] - a->velocity[k]);
         closing += turning_speed(a, normal, lever_a) + turning_speed(b, normal, lever_b);
         next = first.ahead + distance / closing;

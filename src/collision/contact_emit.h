@@ -49,10 +49,12 @@ struct pair_motion {
     double closed; /* by the centres of mass, along the normal, and by what the shifts make of turning in the step, m */
 };
 
-/* ahead: manifold.ahead. The point stays where it is on a body beside one that is not dynamic. Of two dynamic bodies the arms of
- * the one that is harder to turn take up most of the way: those of a bullet must be its own. */
-SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
-                                 double ahead, double dt, struct pair_motion *m)
+/* ahead: manifold.ahead; by how much the shapes are turned ahead. The point stays where it is on a body beside one that is
+ * not dynamic. Of two dynamic bodies the arms of the one that is harder to turn take up most of the way: those of a bullet
+ * must be its own. */
+SADMM_INLINE void pair_motion_at(const struct sadmm_proxy *a, double ahead_a, const struct sadmm_proxy *b,
+                                 double ahead_b, const double normal[3], double ahead, double dt,
+                                 struct pair_motion *m)
 {
     const bool both = a->system_body >= 0 && b->system_body >= 0;
     const double inertia = a->inertia + b->inertia, share_a = !both ? 0 : inertia > 0 ? a->inertia / inertia : 0.5,
@@ -67,23 +69,30 @@ SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm
         m->between[k] = b->com[k] - a->com[k] + way;
         m->shift_a[k] = -share_a * way;
         m->shift_b[k] = share_b * way;
-        m->turn_a[k] = a->ahead * across_a[k];
-        m->turn_b[k] = -b->ahead * across_b[k];
+        m->turn_a[k] = ahead_a * across_a[k];
+        m->turn_b[k] = -ahead_b * across_b[k];
         m->closed -= normal[k] * way;
     }
     m->closed += dt * (dot3(across_a, m->shift_a) - dot3(across_b, m->shift_b));
 }
 
-/* Without an impulse. */
-SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                     const struct pair_motion *motion, const struct manifold_point *from,
-                                     struct sadmm_contact_point *point)
+/* Where they are placed. */
+SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
+                                 double ahead, double dt, struct pair_motion *m)
+{
+    pair_motion_at(a, a->ahead, b, b->ahead, normal, ahead, dt, m);
+}
+
+/* Without an impulse. Rb, b_arm: of b, at which it is turned ahead. */
+SADMM_INLINE void contact_emit_point_at(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double Rb[9],
+                                        const double b_arm[3], const struct pair_motion *motion,
+                                        const struct manifold_point *from, struct sadmm_contact_point *point)
 {
     double arm_a[3], arm_b[3];
     int k;
-    rotate_to_world(b->R, from->position, arm_b);
+    rotate_to_world(Rb, from->position, arm_b);
     for (k = 0; k < 3; ++k) {
-        arm_b[k] += b->arm[k];
+        arm_b[k] += b_arm[k];
         arm_a[k] = arm_b[k] + motion->between[k];
         point->arm_b[k] = sadmm_body_moves(b->system_body) ? arm_b[k] + motion->shift_b[k] : 0;
         point->arm_a[k] = sadmm_body_moves(a->system_body) ? arm_a[k] + motion->shift_a[k] : 0;
@@ -96,17 +105,24 @@ SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct s
     point->migrates = 0;
 }
 
-/* The same of a pair that was not found halfway, from its shapes as they are placed; normal: set, in the world. */
+SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                     const struct pair_motion *motion, const struct manifold_point *from,
+                                     struct sadmm_contact_point *point)
+{
+    contact_emit_point_at(a, b, b->R, b->arm, motion, from, point);
+}
+
+/* The same of a pair that was not found halfway; normal: set, in the world. */
 SADMM_RARE void contact_emit_turned(const struct sadmm_proxy *a, const struct sadmm_proxy *b, vec3 manifold_normal,
                                     double ahead, double dt, const struct manifold_point *from, double normal[3],
                                     struct sadmm_contact_point *point)
 {
-    struct sadmm_proxy turned[2];
-    const struct sadmm_proxy *pa = proxy_at(a, ahead, dt, &turned[0]), *pb = proxy_at(b, ahead, dt, &turned[1]);
+    struct proxy_place of_b;
     struct pair_motion motion;
-    rotate_to_world(pb->R, manifold_normal, normal);
-    pair_motion_of(pa, pb, normal, ahead, dt, &motion);
-    contact_emit_point(pa, pb, &motion, from, point);
+    proxy_place_at(b, ahead, dt, &of_b);
+    rotate_to_world(of_b.R, manifold_normal, normal);
+    pair_motion_at(a, ahead, b, ahead, normal, ahead, dt, &motion); /* what does not turn is turned by nothing */
+    contact_emit_point_at(a, b, of_b.R, of_b.arm, &motion, from, point);
 }
 
 #endif

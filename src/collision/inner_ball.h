@@ -77,9 +77,10 @@ SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sad
     const struct sadmm_proxy *first = swapped || !of_b ? ball : a, *second = swapped ? a : of_b ? ball : b;
     const struct first_touch touch = pair_first_touch(first, second, hulls, child, from, gravity, dt);
     const double at = touch.missed ? ahead : touch.ahead;
-    const struct pair_pose pose = proxies_pose(first, second, at, dt), own = proxies_pose(a, b, at, dt);
+    struct proxy_place there;
+    const struct pair_pose pose = proxies_pose(first, second, at, dt, &there),
+                           own = proxies_pose(a, b, at, dt, &there);
     const struct manifold_point *point;
-    struct sadmm_proxy turned;
     struct manifold m;
     mat3 R;
     int k;
@@ -100,7 +101,7 @@ SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sad
         found->on_other = v3_madd(point->position, point->separation / 2, m.normal);
         return true;
     }
-    found->centre = proxy_centre(proxy_at(b, at, dt, &turned));
+    found->centre = proxy_centre(b); /* in its frame, which turns along */
     if (!swapped) {
         found->normal = m.normal;
         found->on_other = v3_add(found->centre, v3_madd(point->position, -point->separation / 2, m.normal));
@@ -142,7 +143,8 @@ SADMM_INLINE void inner_instead(const struct sadmm_proxy *a, const struct sadmm_
                                 double dt, const struct inner_ball *ball, struct manifold *m)
 {
     const vec3 n = ball->normal;
-    const struct pair_pose pose = proxies_pose(a, b, ball->ahead, dt);
+    struct proxy_place of_b;
+    const struct pair_pose pose = proxies_pose(a, b, ball->ahead, dt, &of_b);
     const real offset = v3_dot(n, ball->on_other);
     vec3 x;
     real separation;
@@ -204,7 +206,8 @@ SADMM_INLINE void inner_along(const struct sadmm_proxy *a, const struct sadmm_pr
                               double dt, const struct inner_ball *ball, struct manifold *m)
 {
     const real side = ball->of_b ? -1 : 1;
-    const struct pair_pose pose = proxies_pose(ball->of_b ? a : proxy, b, m->ahead, dt);
+    struct proxy_place of_b;
+    const struct pair_pose pose = proxies_pose(ball->of_b ? a : proxy, b, m->ahead, dt, &of_b);
     const vec3 centre = ball->of_b ? ball->centre : r3_vec3(pose.t);
     real offset = 0;
     int k;

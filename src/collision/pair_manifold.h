@@ -72,26 +72,35 @@ SADMM_INLINE void pose_add_centres(const struct sadmm_proxy *a, const struct sad
     pose->tips[1] = b->system_body >= 0;
 }
 
-/* Of two shapes as they are placed, moved on by `ahead` seconds (midway.h). */
-SADMM_INLINE struct pair_pose turned_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead)
+/* Of two shapes turned to Ra and Rb about xa and xb, and moved on by `ahead` seconds (midway.h). */
+SADMM_INLINE struct pair_pose pose_between(const struct sadmm_proxy *a, const double Ra[9], const double xa[3],
+                                           const struct sadmm_proxy *b, const double Rb[9], const double xb[3],
+                                           double ahead)
 {
     struct pair_pose pose;
     double d[3];
     int i;
-    for (i = 0; i < 3; ++i) d[i] = a->x[i] - b->x[i] - way_ahead(a, b, ahead, i);
-    pose = pose_at(a->geometry.type == SADMM_SHAPE_PLANE, a->R, d, b->R);
+    for (i = 0; i < 3; ++i) d[i] = xa[i] - xb[i] - way_ahead(a, b, ahead, i);
+    pose = pose_at(a->geometry.type == SADMM_SHAPE_PLANE, Ra, d, Rb);
 #ifndef SADMM_WITHOUT_SMOOTH
     pose_add_centres(a, b, &pose);
 #endif
     return pose;
 }
 
-/* Of two shapes `ahead` seconds into the step. */
-SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
-                                           double dt)
+/* Of two shapes as they are placed. */
+SADMM_INLINE struct pair_pose turned_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead)
 {
-    struct sadmm_proxy turned[2];
-    return turned_pose(proxy_at(a, ahead, dt, &turned[0]), proxy_at(b, ahead, dt, &turned[1]), ahead);
+    return pose_between(a, a->R, a->x, b, b->R, b->x, ahead);
+}
+
+SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
+                                           double dt, struct proxy_place *of_b)
+{
+    struct proxy_place of_a;
+    proxy_place_at(a, ahead, dt, &of_a);
+    proxy_place_at(b, ahead, dt, of_b);
+    return pose_between(a, of_a.R, of_a.x, b, of_b->R, of_b->x, ahead);
 }
 
 SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
@@ -196,19 +205,26 @@ SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const 
 SADMM_INLINE void pair_start_at(const struct sadmm_proxy *a, const struct sadmm_proxy *b, struct first_touch first,
                                 double margin, double gravity, double dt, struct pair_start *start)
 {
+    struct proxy_place of_b;
     start->touch = first;
     start->ahead = first.ahead;
     if (first.missed) start->limit = proxy_near_limit(a, b, margin, gravity, dt);
-    start->pose = proxies_pose(a, b, start->ahead, dt);
+    start->pose = proxies_pose(a, b, start->ahead, dt, &of_b);
 }
 
-/* Is the pair to have contacts of the balls in its bodies? m: its manifold without. */
+/* Is the pair to have contacts of the balls in its bodies, be it fast or not? m: its manifold without. */
+SADMM_INLINE bool pair_sinks(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                             uint32_t child, const struct pair_start *start, double gravity, double dt,
+                             const struct manifold *m)
+{
+    return inner_is_asked(a, b, gravity, dt, m) ||
+           (hulls && b->geometry.type == SADMM_SHAPE_MESH && inner_is_behind(a, b, hulls, child, &start->pose));
+}
 SADMM_INLINE bool pair_asks_balls(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
                                   uint32_t child, const struct pair_start *start, double gravity, double dt,
                                   const struct manifold *m)
 {
-    return start->moves_on || inner_is_asked(a, b, gravity, dt, m) ||
-           (hulls && b->geometry.type == SADMM_SHAPE_MESH && inner_is_behind(a, b, hulls, child, &start->pose));
+    return start->moves_on || pair_sinks(a, b, hulls, child, start, gravity, dt, m);
 }
 
 /* The manifold of two shapes in a step: where they are halfway through it (midway.h), or where a pair that is faster

@@ -127,6 +127,31 @@ SADMM_INLINE const struct sadmm_proxy *proxy_at(const struct sadmm_proxy *p, dou
     return turned;
 }
 
+/* Where proxy_at has a shape, as in its proxy. */
+struct proxy_place {
+    double R[9], x[3], arm[3];
+};
+SADMM_INLINE void proxy_place_at(const struct sadmm_proxy *p, double ahead, double dt, struct proxy_place *place)
+{
+    double Q[9];
+    int i, k;
+    if (is_midway(ahead, dt) || (p->angular[0] == 0 && p->angular[1] == 0 && p->angular[2] == 0)) {
+        for (i = 0; i < 9; ++i) place->R[i] = p->R[i];
+        for (i = 0; i < 3; ++i) {
+            place->x[i] = p->x[i];
+            place->arm[i] = p->arm[i];
+        }
+        return;
+    }
+    turn_between(p->angular, p->ahead, ahead, Q);
+    for (i = 0; i < 3; ++i) {
+        for (k = 0; k < 3; ++k)
+            place->R[3 * i + k] = Q[3 * i] * p->R[k] + Q[3 * i + 1] * p->R[3 + k] + Q[3 * i + 2] * p->R[6 + k];
+        place->arm[i] = Q[3 * i] * p->arm[0] + Q[3 * i + 1] * p->arm[1] + Q[3 * i + 2] * p->arm[2];
+        place->x[i] = p->com[i] + place->arm[i];
+    }
+}
+
 SADMM_INLINE void rotate_to_world(const double R[9], vec3 v, double out[3])
 {
     int k;

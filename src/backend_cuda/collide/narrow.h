@@ -224,11 +224,12 @@ static __device__ bool smooth_at_once(const collision_view &v, const struct coll
 }
 #endif
 
-/* The manifold with a triangle, as find_triangles makes it on the host; false: it is to be listed. */
+/* The manifold with a triangle, as find_triangles makes it on the host; false: it is to be listed. missed: the pair moves
+ * on, but not as far as this triangle, so that no ball in its body does. */
 template <int HOW>
 static __device__ bool narrow_triangle(const collision_view &v, const struct collision_step &step,
                                        const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                       const struct pair_start &start, uint32_t child, uint32_t cache,
+                                       const struct pair_start &start, bool missed, uint32_t child, uint32_t cache,
                                        struct gjk_walk *walk, struct manifold *m)
 {
     m->ahead = start.ahead;
@@ -236,12 +237,14 @@ static __device__ bool narrow_triangle(const collision_view &v, const struct col
     m->cache = 0;
     if (is_at_once(HOW)) {
         walk->end = GJK_FAR;
-        if (start.moves_on || (with_smooth(HOW) && geometry_is_smooth(&a->geometry))) return false;
+        if ((start.moves_on && !missed) || (with_smooth(HOW) && geometry_is_smooth(&a->geometry))) return false;
         if (!mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache,
                                    walk, m))
             return false;
         walk->end = GJK_FAR;
-        return !pair_asks_balls(a, b, v.hulls, child, &start, step.gravity, step.dt, m);
+        if (pair_sinks(a, b, v.hulls, child, &start, step.gravity, step.dt, m)) return false;
+        if (start.moves_on) inner_on_surface(a, b, m);
+        return true;
     }
     if (walk->end != GJK_FAR)
         mesh_manifold_from(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, walk, m);
@@ -299,7 +302,9 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     if (!contact_goes_on(&old, own.child, &a, &b)) before = -1;
     struct manifold m;
     if (on_mesh) {
-        if (!narrow_triangle<HOW>(v, step, pa, pb, start, own.child, before >= 0 ? cache : 0, walk, &m)) return false;
+        const bool missed = start.moves_on && !(v.touches[i] < HUGE_VAL);
+        if (!narrow_triangle<HOW>(v, step, pa, pb, start, missed, own.child, before >= 0 ? cache : 0, walk, &m))
+            return false;
     } else if (with_hulls(HOW) && is_at_once(HOW) && b.geometry.type == SADMM_SHAPE_HULL) {
         if (!hulls_at_once(v, step, pa, pb, start, before >= 0 ? cache : 0, walk, &m)) return false;
     } else if (with_hulls(HOW) && b.geometry.type == SADMM_SHAPE_HULL && walk->end != GJK_FAR) {

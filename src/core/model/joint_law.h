@@ -308,6 +308,12 @@ SADMM_INLINE bool joint_turns(const struct acting_joint *acting, int k, bool rad
                                    JOINT_NO_TURN * (v3_norm(turn_a) + v3_norm(turn_b));
     if (radial && k == 0) arm = v3_madd(arm, -g->value[0], g->axis[0]); /* to a's own point */
     around_a = v3_cross(turn_a, arm);
+    if (!(radial && k == 0)) { /* most rows: what the bodies' own spin and the point's speed add is not needed to say no */
+        const double half = dt / 2 * turning, most = JOINT_MOST_TURN * JOINT_MOST_TURN;
+        if (half * half * max_of(v3_norm2(turn_a), v3_norm2(turn_b)) <=
+            most * most * (v3_norm2(around_a) + v3_norm2(around_b)))
+            return false;
+    }
     around = sqrt(v3_norm2(around_a) + joint_spin2(&acting->side[0])) +
              sqrt(v3_norm2(around_b) + joint_spin2(&acting->side[1]));
     past = v3_norm(v3_sub(v3_add(vb, around_b), v3_add(va, around_a)));
