@@ -78,17 +78,31 @@ START_TEST(bodies_on_ice)
 }
 END_TEST
 
-/* Mechanisms that balls run into, in the plane and in space: in the queue and step by step by the host, to the same
- * bits. */
+/* To the last bit by the emulated device; a GPU's sines are rounded otherwise, and what is solved in single precision, and
+ * where a contact begins, follows. */
+static void expect_close_worlds(sadmm_world *a, sadmm_world *b, const char *what)
+{
+    if (EMULATED) ck_assert_msg(state_hash(a) == state_hash(b), "%s", what);
+    for (int32_t i = 0; i < sadmm_world_body_count(a); ++i) {
+        sadmm_body_state x, y;
+        MUST(a, sadmm_world_body_state(a, body_at(a, i), &x));
+        MUST(b, sadmm_world_body_state(b, body_at(b, i), &y));
+        for (int k = 0; k < 3; ++k)
+            ck_assert_msg(fabs(x.position[k] - y.position[k]) < 1e-3, "%s: body %d", what, i);
+    }
+}
+
+/* Mechanisms that balls run into, in the plane and in space: in the queue and step by step by the host. */
 START_TEST(mechanisms)
 {
     const int precision = _i / RUNS, run = _i % RUNS;
     for (int k = 0; k < 2 * MECHANISM_PLACES; ++k) {
         const enum mechanism_place place = (enum mechanism_place)(k / 2);
         const bool space = k % 2;
-        uint64_t hash[2];
+        char what[40];
+        sadmm_world *worlds[2];
         for (int host = 0; host < 2; ++host) {
-            sadmm_world *world = begin_world(precision, run, mechanism_has_weight(place));
+            sadmm_world *world = worlds[host] = begin_world(precision, run, mechanism_has_weight(place));
             use_device(world, precision, 0);
             if (host) by_host(world);
             add_mechanism(world, place, space, 0.5);
@@ -96,10 +110,10 @@ START_TEST(mechanisms)
                 expect_whole_momentum_kept(world, mechanism_keeps(place, space), place == MECHANISM_HANGS,
                                            momentum_tolerance((sadmm_precision)precision),
                                            host ? "by the host" : "on the device");
-            hash[host] = state_hash(world);
-            sadmm_world_destroy(world);
         }
-        ck_assert_msg(hash[0] == hash[1], "place %d, space %d", (int)place, space);
+        snprintf(what, sizeof what, "place %d, space %d", (int)place, space);
+        expect_close_worlds(worlds[0], worlds[1], what);
+        for (int host = 0; host < 2; ++host) sadmm_world_destroy(worlds[host]);
     }
 }
 END_TEST

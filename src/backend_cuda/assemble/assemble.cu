@@ -44,9 +44,17 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
     double A[36], b[6], x[6], factor[36];
     const struct sadmm_settings settings = *v.model.settings;
-    if (v.raw.system.rigid)
-        sadmm_system_rigid(&v.raw.system, &settings, wide_at(v.raw.system.rigid, (size_t)i), i, A, b);
-    else sadmm_system_body(&v.raw.system, &settings, i, A, b);
+    if (v.raw.system.rigid) {
+        const struct sadmm_rigid *state = wide_at(v.raw.system.rigid, (size_t)i);
+        const struct spin_system spin = spin_of_system(state, settings.dt);
+        eight_numbers<double> halfway = {};
+        q_store(spin.orientation, halfway.of);
+        v3_store(spin.angular, halfway.of + HALFWAY_ANGULAR);
+        store_row(halfway, v.bodies.halfway, (size_t)i);
+        sadmm_system_rigid(&v.raw.system, &settings, state, &spin, i, A, b);
+    } else {
+        sadmm_system_body(&v.raw.system, &settings, i, A, b);
+    }
     if (v.joints.count > 0 && v.joints.is_direct[i]) {
         const struct cuda_joined_body body = {A[0],  {A[21], A[28], A[35], A[22], A[23], A[29]},
                                               {b[0], b[1], b[2], b[3], b[4], b[5]}};

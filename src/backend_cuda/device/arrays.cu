@@ -79,6 +79,7 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
         {BUFFER_STATE, (n + 1 + (v->raw.system.driven_count > 0 ? pairs : 0)) * ROW * real_size},
         {BUFFER_B, (c->fast ? 2 : 1) * n * ROW * real_size},
         {BUFFER_LINES, n * (size_t)v->bodies.line * real_size},
+        {BUFFER_HALFWAY, v->bodies.rigid ? HALFWAY * n * sizeof(double) : 0},
         {BUFFER_C, n * PACKED * sizeof(double)},
         {BUFFER_BETA, n * sizeof(double)},
         {BUFFER_NORMAL, pairs * sizeof(real4)},
@@ -108,6 +109,7 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
     cuda_buffer *b = c->buffers;
     v->bodies.state = (solver_real *)b[BUFFER_STATE].data;
     v->bodies.b = (solver_real *)b[BUFFER_B].data;
+    v->bodies.halfway = (double *)b[BUFFER_HALFWAY].data;
     v->bodies.momentum_residual = c->fast ? v->bodies.b + n * ROW : nullptr;
     v->bodies.lines = (solver_real *)b[BUFFER_LINES].data;
     v->bodies.C = (double *)b[BUFFER_C].data;

@@ -32,6 +32,7 @@ static const char *const buffer_names[] = {
     "states",
     "b",
     "matrices",
+    "turns halfway",
     "C",
     "penalties",
     "normals",

@@ -140,6 +140,8 @@ struct model_view {
     int32_t fast, wrenches; /* of the settings that are no numbers: the method; recover_wrenches */
 };
 
+enum { HALFWAY = 8, HALFWAY_ANGULAR = 4 }; /* orientation, angular velocity, 0 */
+
 /* Bodies in the solver's form. */
 struct body_view {
     solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0. Where there
@@ -149,6 +151,7 @@ struct body_view {
     solver_real *lines; /* bodies x line: A and H (device/line.h) */
     int32_t line;
     int32_t rigid;       /* how lines are packed */
+    double *halfway;     /* bodies x HALFWAY: what A and b are of (core/model/spin.h) */
     double *C;           /* bodies x PACKED */
     double *beta;        /* bodies, kg */
     double *A_inverse;   /* fast: bodies x PACKED */

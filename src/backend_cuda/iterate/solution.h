@@ -3,6 +3,7 @@
 #define SADMM_CUDA_ITERATE_SOLUTION_H
 
 #include "backend_cuda/device/double.h"
+#include "backend_cuda/device/wide.h"
 #include "core/math/lead.h"
 #include "core/model/spin.h"
 
@@ -13,27 +14,33 @@ static __device__ __forceinline__ vec3 point_impulse(const contact_view &contact
     return v3((double)lambda[0], (double)lambda[contacts.lambda_stride], (double)lambda[2 * contacts.lambda_stride]);
 }
 
+static __device__ __forceinline__ const double *halfway_of(const cuda_view &v, int32_t i)
+{
+    return row_at(v.bodies.halfway, (size_t)i);
+}
+
 /* Q: where a body for which `velocity` is solved gets to by that less its lead (math/lead.h): position, orientation, and
- * velocity at the end. dt: the settings', fetched early. */
+ * velocity at the end. halfway: its orientation then (spin.h); dt: the settings', fetched early. */
 enum { PLACE = 13 };
-static __device__ __forceinline__ void move_body(const struct sadmm_rigid *body, const double velocity[6], double dt,
-                                                 const double gravity[3], enum lead_kind kind, double place[PLACE])
+static __device__ __forceinline__ void move_body(const struct sadmm_rigid *body, const double halfway[4],
+                                                 const double velocity[6], double dt, const double gravity[3],
+                                                 enum lead_kind kind, double place[PLACE])
 {
     double lead[6] = {}, mean[6];
     if (kind == LEAD_SHARED) lead_shared(gravity, dt, lead);
     if (kind == LEAD_OWN) lead_own(body->velocity, velocity, lead); /* turned by it only where moments are equal */
     for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - lead[k];
-    spin_move(body, velocity, mean, kind != LEAD_OWN, dt, place, place + 3, place + 7);
+    spin_move_from(body, halfway, velocity, mean, kind != LEAD_OWN, dt, place, place + 3, place + 7);
 }
 
 /* Both places of a body that rests or moves by itself: one tumble is enough. */
-static __device__ __forceinline__ void move_body_both(const struct sadmm_rigid *body, const double velocity[6],
-                                                      double dt, const double gravity[3], double stays[PLACE],
-                                                      double own[PLACE])
+static __device__ __forceinline__ void move_body_both(const struct sadmm_rigid *body, const double halfway[4],
+                                                      const double velocity[6], double dt, const double gravity[3],
+                                                      double stays[PLACE], double own[PLACE])
 {
-    move_body(body, velocity, dt, gravity, LEAD_OWN, own);
+    move_body(body, halfway, velocity, dt, gravity, LEAD_OWN, own);
     if (rigid_is_isotropic(v3_load(body->inertia))) {
-        move_body(body, velocity, dt, gravity, LEAD_STAYS, stays);
+        move_body(body, halfway, velocity, dt, gravity, LEAD_STAYS, stays);
         return;
     }
     const struct rigid_spin end = {q_load(own + 3), v3_load(own + 10)},

@@ -90,7 +90,7 @@ struct finish_move {
     bool live, finite;
     int32_t body;
     body_before before;
-    double velocity[6], stays[PLACE], own[PLACE];
+    double stays[PLACE], own[PLACE];
 };
 
 /* What the thread does that moves a body, while the others look at contacts; */
@@ -105,8 +105,9 @@ static __device__ __forceinline__ finish_move begin_move(const cuda_view &v, dou
     wait_for_stream();
     let_next_begin();
     if (!m.live) return m;
-    load_end_velocity(v, m.body, m.velocity);
-    move_body_both(&m.before.body, m.velocity, dt, v.model.settings->gravity, m.stays, m.own);
+    double velocity[6];
+    load_end_velocity(v, m.body, velocity);
+    move_body_both(&m.before.body, halfway_of(v, m.body), velocity, dt, v.model.settings->gravity, m.stays, m.own);
     m.finite = finite_numbers(m.stays, PLACE) && finite_numbers(m.own, PLACE);
     return m;
 }
@@ -137,7 +138,7 @@ static __device__ __noinline__ void finish_free(const cuda_view &v, double dt, i
     let_next_begin();
     if (!live) return;
     load_end_velocity(v, body, velocity);
-    move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
+    move_body(&before.body, halfway_of(v, body), velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
     if (!moves_apart(v, body)) store_moved(v, body, before, place, true, dt);
     if (!finite_numbers(place, PLACE)) atomicMin(&v.step.control->offending_body, body);
     double owed[6] = {};

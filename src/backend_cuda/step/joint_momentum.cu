@@ -10,7 +10,7 @@
 #include "move.h"
 #include "world.h"
 
-enum { ISLAND_THREADS = 128, ISLAND_BLOCKS = 1024 };
+enum { ISLAND_THREADS = 128, ISLAND_BLOCKS = 1024, FETCHED = 8 /* at once, of a sum */ };
 
 /* Its bodies, ascending. part: where joints are apart (device/step.h), else NULL. */
 struct joint_island {
@@ -102,8 +102,8 @@ static __device__ __noinline__ void store_body(const cuda_view &v, const struct 
     if (v.joints.is_direct[i])
         for (int k = 0; k < 6; ++k) velocity[k] = v.joints.velocity[6 * (size_t)i + (size_t)k];
     else load_end_velocity(v, i, velocity);
-    joint_move(body, velocity, island.bits & ISLAND_LEADS_STAY, settings.dt, place, place + 3, place + 7);
-    joint_add_momentum(&sums, body, place, place + 3, place + 7, origin, &settings);
+    joint_move(body, halfway_of(v, i), velocity, island.bits & ISLAND_LEADS_STAY, settings.dt, place, place + 3, place + 7);
+    joint_add_momentum(&sums, body, halfway_of(v, i), place, place + 3, place + 7, origin, &settings);
     v.joints.momentum[i] = sums;
 }
 
@@ -123,7 +123,16 @@ static __device__ __forceinline__ void restore_island(const cuda_view &v, const 
     __syncthreads();
     for (int32_t n = t; n < JOINT_MOMENTUM_SUMS; n += ISLAND_THREADS) {
         double sum = to[n];
-        for (int32_t k = 1; k < island.count; ++k) sum += ((const double *)&v.joints.momentum[island.body[k]])[n];
+        for (int32_t first = 1; first < island.count; first += FETCHED) {
+            double next[FETCHED];
+#pragma unroll
+            for (int32_t k = 0; k < FETCHED; ++k)
+                if (first + k < island.count)
+                    next[k] = ((const double *)&v.joints.momentum[island.body[first + k]])[n];
+#pragma unroll
+            for (int32_t k = 0; k < FETCHED; ++k)
+                if (first + k < island.count) sum += next[k];
+        }
         to[n] = sum;
     }
     __syncthreads();

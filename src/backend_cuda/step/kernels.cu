@@ -199,7 +199,7 @@ static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
     const double dt = v.model.settings->dt;
     double velocity[6], place[PLACE];
     load_end_velocity(v, i, velocity);
-    move_body(&before.body, velocity, dt, v.model.settings->gravity, kind, place);
+    move_body(&before.body, halfway_of(v, i), velocity, dt, v.model.settings->gravity, kind, place);
     store_moved(v, i, before, place, false, dt); /* finite, since both places were that it had to choose from */
 }
 

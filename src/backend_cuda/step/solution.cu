@@ -113,7 +113,8 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
         if (v.raw.system.carried) velocity[k] += v.raw.system.carried[6 * (size_t)i + (size_t)k];
     }
     const enum lead_kind kind = lead_kind_of(island, own);
-    move_body(&v.raw.system.rigid[i], velocity, v.model.settings->dt, v.model.settings->gravity, kind, out);
+    move_body(&v.raw.system.rigid[i], halfway_of(v, i), velocity, v.model.settings->dt, v.model.settings->gravity, kind,
+              out);
     out[PLACE] = kind == LEAD_OWN;
 }
 

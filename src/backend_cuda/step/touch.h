@@ -25,10 +25,10 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
     double before[6];
     for (int k = 0; k < 6; ++k) {
         out.before[k] = rigid->velocity[k];
+        before[k] = k < 3 ? out.before[k] : halfway_of(v, body)[HALFWAY_ANGULAR + k - 3];
         out.velocity[k] = (double)velocity[k];
         if (carried) out.velocity[k] += v.raw.system.carried[6 * (size_t)body + (size_t)k];
     }
-    spin_before(rigid, v.model.settings->dt, before);
     lead_own(before, out.velocity, out.lead);
     return out;
 }

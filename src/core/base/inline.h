@@ -20,12 +20,6 @@
 #else
 #define SADMM_CALLED SADMM_INLINE
 #endif
-/* What is long and called from few places, where a call would cost much: inline on the host, a call on a device. */
-#ifdef __CUDACC__
-#define SADMM_DEVICE_CALL SADMM_RARE
-#else
-#define SADMM_DEVICE_CALL static inline __attribute__((always_inline))
-#endif
 /* What a compiler for the host is not left to choose about, as one for a device is: inline, or a function by itself. */
 #ifdef __CUDACC__
 #define SADMM_HOST_INLINE SADMM_INLINE

@@ -104,8 +104,15 @@ SADMM_RARE vec3 rigid_mean_spin_near(vec3 m, vec3 w, vec3 c, real rate)
 }
 
 /* The same by sweeps over the equations, two of which take the error down by rate^3. Beyond a rate of RIGID_SLOW Newton's
- * method is faster. */
-#define RIGID_SLOW 0.02
+ * method is faster; not on a device, where divisions and what differs between threads are dear: a piece has a rate of 1/3
+ * at most. */
+#ifdef __CUDA_ARCH__
+#define RIGID_SLOW ((real)0.5)
+#define RIGID_NEAR(m, w, c, rate) (m)
+#else
+#define RIGID_SLOW ((real)0.02)
+#define RIGID_NEAR rigid_mean_spin_near
+#endif
 SADMM_INLINE vec3 rigid_mean_spin(vec3 w, vec3 c)
 {
     const real rate = v3_max_abs(c) * v3_max_abs(w), faster = rate * rate * rate;
@@ -119,8 +126,8 @@ SADMM_INLINE vec3 rigid_mean_spin(vec3 w, vec3 c)
             m.z = w.z - c.z * (m.x * m.y);
         }
         error *= faster;
-    } while (error > SADMM_EPSILON && rate < (real)RIGID_SLOW);
-    return error > SADMM_EPSILON ? rigid_mean_spin_near(m, w, c, rate) : m;
+    } while (error > SADMM_EPSILON && rate < RIGID_SLOW);
+    return error > SADMM_EPSILON ? RIGID_NEAR(m, w, c, rate) : m;
 }
 
 /* Of a body whose moments differ, in its own frame: where it is turned to, that as a matrix, how fast it turns. */
@@ -175,7 +182,7 @@ SADMM_RARE struct rigid_tumbling rigid_tumble_pieces(struct rigid_tumbling from,
 /* dt of motion without torque by the midpoint rule: the turn by 2 atan(h |m| / 2) about the mean m takes w to 2 m - w, which
  * has the same energy and in space the same angular momentum, to rounding. h is longer than the time by as much as makes
  * that the turn of the angle by which a body goes about a principal axis. By -dt it goes back to where it was. */
-SADMM_DEVICE_CALL struct rigid_tumbling rigid_tumble_on(struct rigid_tumbling from, vec3 inertia, real dt)
+SADMM_ALWAYS_INLINE struct rigid_tumbling rigid_tumble_on(struct rigid_tumbling from, vec3 inertia, real dt)
 {
     const vec3 p = v3(inertia.x * from.own.x, inertia.y * from.own.y, inertia.z * from.own.z);
     const real energy2 = v3_dot(p, from.own), momentum2 = v3_norm2(p);

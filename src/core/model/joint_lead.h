@@ -116,14 +116,14 @@ SADMM_INLINE int joint_row_touches(const struct sadmm_joint_source *source, doub
     return joint_limit_jolts(source, lambda, row_a, row_b, bodies, settings) ? bits | ISLAND_LEADS_STAY : bits;
 }
 
-/* Position, orientation and velocity at the end, by the solution v. */
-SADMM_INLINE void joint_move(const struct sadmm_rigid *from, const double v[6], bool leads_stay, double dt,
-                             double position[3], double orientation[4], double velocity[6])
+/* Position, orientation and velocity at the end, by the solution v. halfway: its orientation then (spin.h). */
+SADMM_INLINE void joint_move(const struct sadmm_rigid *from, const double halfway[4], const double v[6],
+                             bool leads_stay, double dt, double position[3], double orientation[4], double velocity[6])
 {
     double mean[6];
     int k;
     for (k = 0; k < 6; ++k) mean[k] = leads_stay ? v[k] : (from->velocity[k] + v[k]) / 2;
-    spin_move(from, v, mean, leads_stay, dt, position, orientation, velocity);
+    spin_move_from(from, halfway, v, mean, leads_stay, dt, position, orientation, velocity);
 }
 
 #endif

@@ -49,14 +49,15 @@ SADMM_INLINE double joint_free_energy(double mass, sym3 inertia, const double b[
     return dot3(b, b) / mass + v3_dot(angular, m3_solve(rows, angular));
 }
 
-/* A body that the step moves to this pose and velocity. */
+/* A body that the step moves to this pose and velocity. turned: its orientation halfway (spin.h). */
 SADMM_INLINE void joint_add_momentum(struct joint_momentum *to, const struct sadmm_rigid *from,
-                                     const double position[3], const double orientation[4], const double velocity[6],
+                                     const double turned[4], const double position[3], const double orientation[4], const double velocity[6],
                                      const double origin[3], const struct sadmm_settings *settings)
 {
     const double none[6] = {0, 0, 0, 0, 0, 0};
     double mass, b[6], halfway[3], end[3], A[PACKED6];
-    sym3 inertia = sadmm_rigid_body(from, settings, &mass, b);
+    const struct spin_system spin = spin_system_at(from, turned);
+    sym3 inertia = sadmm_rigid_body_at(from, &spin, settings, &mass, b);
     int k;
     to->free_energy += joint_free_energy(mass, inertia, b);
     joint_halfway(from, origin, settings->dt, halfway);

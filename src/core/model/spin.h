@@ -50,7 +50,19 @@ SADMM_INLINE struct spin_system spin_of_system(const struct sadmm_rigid *body, d
     return out;
 }
 
-/* Its orientation alone. */
+/* The same by the orientation halfway. */
+SADMM_INLINE struct spin_system spin_system_at(const struct sadmm_rigid *body, const double halfway[4])
+{
+    const vec3 inertia = v3_load(body->inertia);
+    struct spin_system out;
+    out.momentum = rigid_angular_momentum(q_load(body->orientation), inertia, v3_load(body->velocity + 3));
+    out.orientation = rigid_is_isotropic(inertia) ? q_load(body->orientation) : q_load(halfway);
+    out.R = q_matrix(out.orientation);
+    out.angular = rigid_angular_velocity(out.orientation, inertia, out.momentum);
+    return out;
+}
+
+/* That orientation alone. */
 SADMM_INLINE quat spin_turned_halfway(const struct sadmm_rigid *body, double dt)
 {
     const vec3 inertia = v3_load(body->inertia);
@@ -71,7 +83,7 @@ SADMM_INLINE void spin_before(const struct sadmm_rigid *body, double dt, double 
 }
 
 /* Where a body whose moments differ gets to: on from halfway by the spin that the step has left it with. */
-SADMM_RARE struct rigid_spin spin_end(const struct sadmm_rigid *body, quat halfway, const double spin[3], double dt)
+SADMM_INLINE struct rigid_spin spin_end(const struct sadmm_rigid *body, quat halfway, const double spin[3], double dt)
 {
     const struct rigid_spin from = {halfway, v3_load(spin)};
     return rigid_tumble(from, v3_load(body->inertia), dt / 2);
@@ -90,9 +102,10 @@ SADMM_INLINE struct rigid_spin spin_end_whole(const struct sadmm_rigid *body, co
 }
 
 /* The pose and the velocity that the solution v leaves it with. mean: what it is moved by, and turned, where moments are
- * equal; halfway: its orientation then, where they differ; whole: it keeps its lead. */
-SADMM_INLINE void spin_move_from(const struct sadmm_rigid *body, quat halfway, const double v[6], const double mean[6],
-                                 bool whole, double dt, double position[3], double orientation[4], double velocity[6])
+ * equal; halfway: its orientation then, looked at where they differ; whole: it keeps its lead. */
+SADMM_INLINE void spin_move_from(const struct sadmm_rigid *body, const double halfway[4], const double v[6],
+                                 const double mean[6], bool whole, double dt, double position[3],
+                                 double orientation[4], double velocity[6])
 {
     int k;
     v3_store(rigid_move(v3_load(body->position), v3_load(mean), dt), position);
@@ -100,7 +113,7 @@ SADMM_INLINE void spin_move_from(const struct sadmm_rigid *body, quat halfway, c
     if (rigid_is_isotropic(v3_load(body->inertia))) {
         q_store(rigid_turn(q_load(body->orientation), v3_load(mean + 3), dt), orientation);
     } else {
-        struct rigid_spin end = spin_end(body, halfway, v + 3, dt);
+        struct rigid_spin end = spin_end(body, q_load(halfway), v + 3, dt);
         if (whole) end = spin_end_whole(body, v + 3, end, dt);
         q_store(end.orientation, orientation);
         v3_store(end.angular, velocity + 3);
@@ -110,7 +123,9 @@ SADMM_INLINE void spin_move_from(const struct sadmm_rigid *body, quat halfway, c
 SADMM_INLINE void spin_move(const struct sadmm_rigid *body, const double v[6], const double mean[6], bool whole,
                             double dt, double position[3], double orientation[4], double velocity[6])
 {
-    spin_move_from(body, spin_turned_halfway(body, dt), v, mean, whole, dt, position, orientation, velocity);
+    double halfway[4];
+    q_store(spin_turned_halfway(body, dt), halfway);
+    spin_move_from(body, halfway, v, mean, whole, dt, position, orientation, velocity);
 }
 
 #endif

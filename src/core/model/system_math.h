@@ -65,10 +65,11 @@ SADMM_INLINE void sadmm_take_carried(double mass, sym3 I, const double c[6], dou
 
 /* A (6 x 6 row-major) and b of eq. (1), of body i by its state. */
 SADMM_INLINE void sadmm_system_rigid(const struct sadmm_system *system, const struct sadmm_settings *settings,
-                                     const struct sadmm_rigid *state, int32_t i, double A[36], double b[6])
+                                     const struct sadmm_rigid *state, const struct spin_system *spin, int32_t i,
+                                     double A[36], double b[6])
 {
     double mass;
-    const sym3 I = sadmm_rigid_body(state, settings, &mass, b);
+    const sym3 I = sadmm_rigid_body_at(state, spin, settings, &mass, b);
     memset(A, 0, 36 * sizeof *A);
     A[0] = A[7] = A[14] = mass;
     A[21] = I.xx, A[28] = I.yy, A[35] = I.zz;
@@ -81,7 +82,8 @@ SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const str
                                      double A[36], double b[6])
 {
     if (system->rigid) {
-        sadmm_system_rigid(system, settings, &system->rigid[i], i, A, b);
+        const struct spin_system spin = spin_of_system(&system->rigid[i], settings->dt);
+        sadmm_system_rigid(system, settings, &system->rigid[i], &spin, i, A, b);
         return;
     }
     memcpy(A, system->A + 36 * (size_t)i, 36 * sizeof *A);

@@ -71,7 +71,7 @@ static void advance(const struct sadmm_rigid *body, const double velocity[6], co
     double mean[6];
     for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - lead->lead[k];
     *next = *body;
-    spin_move_from(body, q_load(lead->halfway), velocity, mean, lead->kind != LEAD_OWN, dt, next->position,
+    spin_move_from(body, lead->halfway, velocity, mean, lead->kind != LEAD_OWN, dt, next->position,
                    next->orientation, next->velocity);
     rolling_forget(next);
     next->mean = lead->kind == LEAD_OWN;

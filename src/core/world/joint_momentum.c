@@ -53,9 +53,11 @@ static void add_rows(const sadmm_world *world, const struct sadmm_row_constraint
 static void add_body(const sadmm_world *world, int32_t i, const sadmm_settings *settings)
 {
     const struct sadmm_rigid *next = &world->next[i];
-    if (is_loose(world, i))
-        joint_add_momentum(sums_of(world, i), &world->start.rigid[i], next->position, next->orientation, next->velocity,
-                           origin_of(world, i), settings);
+    double halfway[4];
+    if (!is_loose(world, i)) return;
+    q_store(spin_turned_halfway(&world->start.rigid[i], settings->dt), halfway);
+    joint_add_momentum(sums_of(world, i), &world->start.rigid[i], halfway, next->position, next->orientation,
+                       next->velocity, origin_of(world, i), settings);
 }
 
 /* To its island's first body, which names it. */

@@ -81,7 +81,9 @@ sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *s
         struct sadmm_rigid *next = &world->next[i];
         if (!(island & ISLAND_JOINED)) continue;
         next->mean = !(island & ISLAND_LEADS_STAY);
-        joint_move(&world->start.rigid[i], world->velocity + 6 * i, island & ISLAND_LEADS_STAY, settings->dt,
+        double halfway[4];
+        q_store(spin_turned_halfway(&world->start.rigid[i], settings->dt), halfway);
+        joint_move(&world->start.rigid[i], halfway, world->velocity + 6 * i, island & ISLAND_LEADS_STAY, settings->dt,
                    next->position, next->orientation, next->velocity);
     }
     for (size_t k = 0; k < system.rows->constraint_count; ++k) {
