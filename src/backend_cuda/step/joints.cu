@@ -224,6 +224,7 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
     int bits = ISLAND_JOINED;
     double finite = 0;
     for (int32_t c = 0; c < joint->constraints; ++c) {
+        int moorings = 0;
         const int32_t count = v.raw.constraints[first + c].count;
         const size_t slots = (size_t)(first + c) * SADMM_MAX_ROWS;
         const bool direct = v.joints.is_direct[v.model.bodies + first + c];
@@ -244,8 +245,10 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
             if (!direct) v.joints.solution[slots + (size_t)r] = lambda[r];
             joint_keep_row(&memory, middle->axis, source[r].role, source[r].coordinate,
                            source[r].sign * lambda[r] / settings.dt);
+            moorings |= joint_mooring(&source[r], lambda[r], bodies);
             bits |= joint_row_touches(&source[r], lambda[r], row->jacobian[0], row->jacobian[1], bodies, &settings);
         }
+        if (moorings == JOINT_MOORED_WHOLLY) bits |= ISLAND_HELD;
     }
     joint_end_wrench(&memory, &joint->def, middle->frame);
     v.joints.after[j] = memory;

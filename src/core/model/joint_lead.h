@@ -103,15 +103,24 @@ SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, dou
     return lambda < 0 ? way > max_of(source->gap, 0) + margin : -way > max_of(-source->gap, 0) + margin;
 }
 
+/* The coordinate in which a row holds a body to what does not move by itself, as a bit. */
+SADMM_INLINE int joint_mooring(const struct sadmm_joint_source *source, double lambda,
+                               const struct joint_lead bodies[2])
+{
+    const bool moors = !bodies[0].rigid || !bodies[1].rigid;
+    return moors && (source->role == SADMM_ROLE_LOCK || lambda != 0) ? 1 << source->coordinate : 0;
+}
+/* Bits of a constraint's rows: all coordinates, which leave its island no motion. */
+#define JOINT_MOORED_WHOLLY 63
+
 /* What a row says of its island. */
 SADMM_INLINE int joint_row_touches(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
                                    const double row_b[6], const struct joint_lead bodies[2],
                                    const struct sadmm_settings *settings)
 {
-    const bool lock = source->role == SADMM_ROLE_LOCK, moors = !bodies[0].rigid || !bodies[1].rigid,
-               powers = source->role == SADMM_ROLE_DRIVE || source->role == SADMM_ROLE_SPRING ||
+    const bool powers = source->role == SADMM_ROLE_DRIVE || source->role == SADMM_ROLE_SPRING ||
                         source->role == SADMM_ROLE_ARMATURE;
-    const int bits = (moors && (lock || lambda != 0) ? ISLAND_MOORED : 0) | (powers ? ISLAND_POWERED : 0);
+    const int bits = (joint_mooring(source, lambda, bodies) ? ISLAND_MOORED : 0) | (powers ? ISLAND_POWERED : 0);
     if (source->slack == INFINITY) return bits | ISLAND_LEADS_STAY | ISLAND_TURNS;
     return joint_limit_jolts(source, lambda, row_a, row_b, bodies, settings) ? bits | ISLAND_LEADS_STAY : bits;
 }

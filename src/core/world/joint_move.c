@@ -26,12 +26,15 @@ static void add_constraint(const sadmm_world *world, const struct sadmm_row_cons
     const struct joint_lead bodies[2] = {lead_of(world, constraint->body_a, settings->dt),
                                          lead_of(world, constraint->body_b, settings->dt)};
     uint8_t *island = island_of(world, constraint->body_a, constraint->body_b);
+    int moorings = 0;
     *island |= ISLAND_JOINED;
     for (int32_t k = 0; k < constraint->count; ++k) {
         const size_t r = (size_t)(constraint->first + k);
+        moorings |= joint_mooring(&world->joint_sources[r], rows->lambda[r], bodies);
         *island |= (uint8_t)joint_row_touches(&world->joint_sources[r], rows->lambda[r], rows->jacobian_a + 6 * r,
                                               rows->jacobian_b + 6 * r, bodies, settings);
     }
+    if (moorings == JOINT_MOORED_WHOLLY) *island |= ISLAND_HELD;
 }
 
 /* A static pair that leaves its island no motion. */
