@@ -11,6 +11,7 @@
 #include "core/math/max.h"
 #include "core/math/rigid.h"
 #include "forces.h"
+#include "stiffening.h"
 #include "subadmm/joint.h"
 #include "system.h"
 
@@ -409,6 +410,50 @@ SADMM_INLINE int joint_most_laws(const sadmm_joint_def *def)
                                            (c->spring_stiffness > 0 || c->spring_damping > 0) + (c->armature > 0);
     }
     return count;
+}
+
+/* ---- geometric stiffness ----------------------------------------------------------------------------------------- */
+
+/* What a step keeps of a joint. By side: the axes that it gives forces along and where on the body these act, as rows
+ * have them, of which geometric stiffness is made (stiffening.h). */
+struct joint_lever {
+    int32_t body[2];
+    vec3 axis[2][3], arm[2];
+    double error[JOINT_COORDINATES]; /* of what is locked, as the step began */
+    double size;                     /* of its bodies: their arms and radii of gyration, m */
+};
+
+SADMM_INLINE struct joint_lever joint_lever_of(const struct acting_joint *acting, const sadmm_joint_def *def)
+{
+    const struct joint_geometry *g = &acting->middle;
+    const int radial = joint_is_radial(def->kind);
+    struct joint_lever lever;
+    int s, k;
+    lever.size = 0;
+    for (k = 0; k < JOINT_COORDINATES; ++k)
+        lever.error[k] = acting->start.value[k] - (radial && k == 0 ? def->length : 0);
+    for (s = 0; s < 2; ++s) {
+        const quat back = acting->side[s].back;
+        vec3 arm = s ? g->arm_b : g->arm_a;
+        if (!s && radial) arm = v3_madd(arm, -g->value[0], g->axis[0]); /* a's own point */
+        lever.body[s] = acting->side[s].system_body;
+        if (lever.body[s] >= 0) {
+            const struct sadmm_rigid *body = acting->side[s].rigid;
+            lever.size += v3_norm(arm) + sqrt(v3_max_abs(v3_load(body->inertia)) / body->mass);
+        }
+        lever.arm[s] = q_turn(back, arm);
+        for (k = 0; k < 3; ++k) lever.axis[s][k] = v3_scale(q_turn(back, g->axis[k]), s ? 1 : -1);
+    }
+    return lever;
+}
+
+/* Adds to K of a side's body what `force` along the joint's axes makes of it. */
+SADMM_INLINE void joint_add_stiffness(const struct joint_lever *lever, int s, const double force[3], double K[6])
+{
+    vec3 sum = v3(0, 0, 0);
+    int k;
+    for (k = 0; k < 3; ++k) sum = v3_madd(sum, force[k], lever->axis[s][k]);
+    stiffening_add(K, lever->arm[s], sum);
 }
 
 /* ---- the solution ------------------------------------------------------------------------------------------------ */

@@ -55,6 +55,8 @@ struct sadmm_system {
     int32_t driven_count;
     const double *carried;           /* (body_count x 6): velocities are less this, the motion of what an island
                                         rides on (core/world/driven.c); NULL: as they are */
+    const double *stiffening;        /* (body_count x 6): what joints add to the inertia of bodies, world axes
+                                        (stiffening.h); NULL: nothing */
     struct sadmm_contact_set *contacts;
     bool errors_given;               /* points carry e (problem level) instead of a gap */
     bool first;                      /* no step came before: where there are no impulses, none are known */

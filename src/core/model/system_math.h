@@ -8,16 +8,31 @@
 #include "core/math/impact.h"
 #include "core/math/rigid.h"
 #include "forces.h"
+#include "stiffening.h"
 #include "system.h"
 
 #ifndef SADMM_REAL_IS_DOUBLE
 #error "system_math.h is double only: do not include it in a source compiled per precision"
 #endif
 
+/* To the inertia and to the angular part of b, what resists a change of the angular momentum `momentum` of inertia I. */
+SADMM_RARE void sadmm_stiffen(const double stiffening[6], const struct sadmm_rigid *body, vec3 momentum, sym3 *I,
+                              double b[3])
+{
+    const mat3 R = q_matrix(q_load(body->orientation));
+    const vec3 own = m3_tmul(R, momentum), inertia = v3_load(body->inertia);
+    const vec3 spin = m3_mul(R, v3(own.x / inertia.x, own.y / inertia.y, own.z / inertia.z));
+    const sym3 K = {stiffening[0], stiffening[1], stiffening[2], stiffening[3], stiffening[4], stiffening[5]};
+    v3_store(v3_add(v3_load(b), s3_mul(K, spin)), b);
+    I->xx += K.xx, I->yy += K.yy, I->zz += K.zz;
+    I->xy += K.xy, I->xz += K.xz, I->yz += K.yz;
+}
+
 /* Eq. (1) of a rigid body: A = diag(m I, world inertia) and b = A v + dt (m g + f, tau) with the gyroscopic term inside
- * the angular momentum (math/rigid.h), and damping (forces.h). Returns the inertia; *mass: of A. */
-SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double *mass,
-                                   double b[6])
+ * the angular momentum (math/rigid.h), damping (forces.h) and what joints add (stiffening.h; NULL: nothing). Returns the
+ * inertia; *mass: of A. */
+SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const double *stiffening,
+                                   const struct sadmm_settings *settings, double *mass, double b[6])
 {
     const double dt = settings->dt;
     const quat q = q_load(body->orientation);
@@ -30,7 +45,9 @@ SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct 
     }
     v3_store(v3_madd(v3_scale(momentum, angular.keep), dt, v3_load(body->wrench + 3)), b + 3);
     *mass = linear.mass * body->mass;
-    return rigid_world_inertia(q_matrix(q), v3_scale(inertia, angular.mass));
+    sym3 I = rigid_world_inertia(q_matrix(q), v3_scale(inertia, angular.mass));
+    if (stiffening && stiffening_is_any(stiffening)) sadmm_stiffen(stiffening, body, momentum, &I, b + 3);
+    return I;
 }
 
 /* b of the motion less c, of a rigid body: b - A c. */
@@ -45,7 +62,8 @@ SADMM_INLINE void sadmm_system_rigid(const struct sadmm_system *system, const st
                                      const struct sadmm_rigid *state, int32_t i, double A[36], double b[6])
 {
     double mass;
-    const sym3 I = sadmm_rigid_body(state, settings, &mass, b);
+    const double *stiffening = system->stiffening ? system->stiffening + 6 * (size_t)i : NULL;
+    const sym3 I = sadmm_rigid_body(state, stiffening, settings, &mass, b);
     memset(A, 0, 36 * sizeof *A);
     A[0] = A[7] = A[14] = mass;
     A[21] = I.xx, A[28] = I.yy, A[35] = I.zz;

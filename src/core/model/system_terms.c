@@ -26,7 +26,8 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
     for (size_t i = 0; i < count && !bodies; ++i) pack(system->A + 36 * (first + i), A + PACKED6 * i);
     for (size_t i = 0; i < count && bodies; ++i) {
         double mass;
-        const sym3 I = sadmm_rigid_body(&bodies[first + i], settings, &mass, b + 6 * i);
+        const double *stiffening = system->stiffening ? system->stiffening + 6 * (first + i) : NULL;
+        const sym3 I = sadmm_rigid_body(&bodies[first + i], stiffening, settings, &mass, b + 6 * i);
         pack_rigid(mass, I, A + PACKED6 * i);
         if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (first + i), b + 6 * i);
     }

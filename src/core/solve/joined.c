@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "core/math/principal.h"
 #include "core/model/system_math.h"
 #include "joined_part.h"
 
@@ -193,9 +194,17 @@ static void take_kept(const struct solving *s, const struct joined_part *part)
 /* Is it as it was solved before the iterations? No contact touches it. */
 static bool is_solved(const struct joined_part *part) { return part->kept && !part->touched; }
 
+static bool has_any(const struct joined_part *part, const uint8_t *bodies)
+{
+    bool any = false;
+    for (int32_t e = 0; e < part->view.s.bodies; ++e) any = any || bodies[part->view.s.body[e]];
+    return any;
+}
+
 sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
                                 const struct sadmm_row_constraint *slots, size_t slot_count,
-                                const struct sadmm_settings *settings, bool after, struct sadmm_error *error)
+                                const struct sadmm_settings *settings, const uint8_t *stiffened, bool after,
+                                struct sadmm_error *error)
 {
     const struct solving s = {joined, system, slots, slot_count, settings};
     if (!find_order(&s) || !sadmm_grow_empty(&joined->kept_lambda, &joined->kept_lambda_capacity,
@@ -206,15 +215,19 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
     for (int32_t k = 0; k < joined->order.parts; ++k) {
         struct joined_part *part = &joined->parts[k];
         part->speed = 0;
+        part->left = stiffened && !has_any(part, stiffened);
+        if (part->left) continue;
         part->kept = kept && part->kept;
         solves = solves || !is_solved(part);
     }
     if (solves) find_impulses(&s);
     for (int32_t k = 0; k < joined->order.parts; ++k)
-        if (!is_solved(&joined->parts[k])) sadmm_joined_part_load(&joined->parts[k], system, settings, slots);
+        if (!joined->parts[k].left && !is_solved(&joined->parts[k]))
+            sadmm_joined_part_load(&joined->parts[k], system, settings, slots);
     if (solves) each_contact(&s, add_weight);
     for (int32_t k = 0; k < joined->order.parts; ++k) {
         struct joined_part *part = &joined->parts[k];
+        if (part->left) continue;
         if (is_solved(part)) {
             take_kept(&s, part);
             continue;
@@ -228,5 +241,96 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
         if (!after) keep_part(&s, part, solved);
     }
     joined->kept = !after;
+    return SADMM_OK;
+}
+
+/* ---- displacements ----------------------------------------------------------------------------------------------- */
+
+/* No joint holds it to what is not of it, and no contact touches it: its momentum stays. */
+static bool floats(const struct joined_part *part)
+{
+    const struct joined_structure *s = &part->view.s;
+    bool floating = !part->touched;
+    for (int32_t k = 0; k < 2 * s->places; ++k) floating = floating && s->side[k] >= 0;
+    return floating;
+}
+
+static vec3 center_of(const struct joined_structure *s, const struct sadmm_rigid *bodies)
+{
+    double mass = 0;
+    vec3 sum = v3(0, 0, 0);
+    for (int32_t e = 0; e < s->bodies; ++e) {
+        const struct sadmm_rigid *body = &bodies[s->body[e]];
+        mass += body->mass;
+        sum = v3_madd(sum, body->mass, v3_load(body->position));
+    }
+    return v3_scale(sum, 1 / mass);
+}
+
+/* Its angular momentum about `center`, and the inertia of all of it. */
+static vec3 spin_of(const struct joined_structure *s, const struct sadmm_rigid *bodies, vec3 center, double total[3][3])
+{
+    vec3 sum = v3(0, 0, 0);
+    memset(total, 0, 9 * sizeof(double));
+    for (int32_t e = 0; e < s->bodies; ++e) {
+        const struct sadmm_rigid *body = &bodies[s->body[e]];
+        const vec3 arm = v3_sub(v3_load(body->position), center);
+        const sym3 I = rigid_world_inertia(q_matrix(q_load(body->orientation)), v3_load(body->inertia));
+        principal_add(total, body->inertia, body->orientation, body->mass, arm);
+        sum = v3_add(sum, s3_mul(I, v3_load(body->velocity + 3)));
+        sum = v3_madd(sum, body->mass, v3_cross(arm, v3_load(body->velocity)));
+    }
+    return sum;
+}
+
+/* The rigid motion that gives it back what its angular momentum was: no joint feels it. */
+static void restore_spin(const struct joined_structure *s, struct sadmm_rigid *bodies, vec3 center, vec3 before)
+{
+    double total[3][3];
+    mat3 inertia;
+    const vec3 missing = v3_sub(before, spin_of(s, bodies, center, total));
+    for (int k = 0; k < 3; ++k) inertia.r[k] = v3_load(total[k]);
+    const vec3 turn = m3_solve(inertia, missing);
+    for (int32_t e = 0; e < s->bodies; ++e) {
+        struct sadmm_rigid *body = &bodies[s->body[e]];
+        const vec3 arm = v3_sub(v3_load(body->position), center);
+        v3_store(v3_add(v3_load(body->velocity), v3_cross(turn, arm)), body->velocity);
+        v3_store(v3_add(v3_load(body->velocity + 3), turn), body->velocity + 3);
+    }
+}
+
+static void move_by(const struct joined_view *v, struct sadmm_rigid *bodies)
+{
+    for (int32_t e = 0; e < v->s.bodies; ++e) {
+        struct sadmm_rigid *body = &bodies[v->s.body[e]];
+        const double *by = v->dv + 6 * (size_t)e;
+        v3_store(rigid_move(v3_load(body->position), v3_load(by), 1), body->position);
+        q_store(rigid_turn(q_load(body->orientation), v3_load(by + 3), 1), body->orientation);
+    }
+}
+
+static void close_part(const struct solving *s, struct joined_part *part, struct sadmm_rigid *bodies)
+{
+    const struct joined_view *v = &part->view;
+    double total[3][3];
+    memset(part->impulse, 0, 6 * (size_t)v->s.bodies * sizeof *part->impulse);
+    sadmm_joined_part_load(part, s->system, s->settings, s->slots);
+    memset(v->velocity, 0, 6 * (size_t)v->s.bodies * sizeof *v->velocity);
+    leave_to_contacts(v); /* nothing but the errors moves bodies */
+    if (!sadmm_joined_part_solve(v, NULL, true)) return;
+    const vec3 center = center_of(&v->s, bodies), before = spin_of(&v->s, bodies, center, total);
+    move_by(v, bodies);
+    if (floats(part)) restore_spin(&v->s, bodies, center, before);
+}
+
+sadmm_status sadmm_joined_close(struct sadmm_joined *joined, const struct sadmm_system *system,
+                                const struct sadmm_row_constraint *slots, size_t slot_count, const uint8_t *opened,
+                                struct sadmm_rigid *bodies, struct sadmm_error *error)
+{
+    const struct sadmm_settings still = {.dt = 0};
+    const struct solving s = {joined, system, slots, slot_count, &still};
+    if (!find_order(&s)) return sadmm_fail_memory(error, "joined bodies");
+    for (int32_t k = 0; k < joined->order.parts; ++k)
+        if (has_any(&joined->parts[k], opened)) close_part(&s, &joined->parts[k], bodies);
     return SADMM_OK;
 }

@@ -146,7 +146,8 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, con
     struct sadmm_system system = {.body_count = world->plan.bodies,
                                   .rigid = world->start.rigid,
                                   .driven = world->start.driven,
-                                  .driven_count = world->start.driven_count};
+                                  .driven_count = world->start.driven_count,
+                                  .stiffening = world->start.stiffened ? world->start.stiffening : NULL};
     for (size_t i = 0; i < n; ++i) {
         sadmm_system_body(&system, &settings, (int32_t)i, f->A + 36 * i, f->b + 6 * i);
         memcpy(f->v + 6 * i, world->start.velocity + 6 * i, 6 * sizeof *f->v);

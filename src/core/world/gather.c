@@ -188,6 +188,7 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
         .driven = world->start.driven,
         .driven_count = world->start.driven_count,
         .rows = world->start.rows.constraint_count > 0 ? &world->start.rows : NULL,
+        .stiffening = world->start.stiffened ? world->start.stiffening : NULL,
     };
     return system;
 }

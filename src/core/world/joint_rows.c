@@ -94,6 +94,56 @@ static bool add_slots(sadmm_world *world, const struct sadmm_world_joint *joint,
     return true;
 }
 
+/* ---- geometric stiffness ----------------------------------------------------------------------------------------- */
+
+static bool add_lever(sadmm_world *world, int32_t slot, const struct acting_joint *acting)
+{
+    const size_t count = (size_t)slot + 1;
+    if (!sadmm_grow(&world->joint_levers, &world->joint_lever_capacity, (size_t)slot, count,
+                    sizeof *world->joint_levers))
+        return false;
+    world->joint_levers[slot] = joint_lever_of(acting, &world->joints[slot].def);
+    return true;
+}
+
+/* Every body's K, by the rows' multipliers. */
+static void add_stiffness(sadmm_world *world, double dt)
+{
+    const struct sadmm_rows *rows = &world->start.rows;
+    for (size_t r = 0; r < world->joint_rows;) {
+        const int32_t slot = world->joint_sources[r].joint;
+        const struct joint_lever *lever = &world->joint_levers[slot];
+        double force[3] = {0, 0, 0};
+        for (; r < world->joint_rows && world->joint_sources[r].joint == slot; ++r) {
+            const struct sadmm_joint_source *source = &world->joint_sources[r];
+            if (source->coordinate < 3) force[source->coordinate] += source->sign * rows->lambda[r] / dt;
+        }
+        for (int s = 0; s < 2; ++s)
+            if (lever->body[s] >= 0)
+                joint_add_stiffness(lever, s, force, world->start.stiffening + 6 * (size_t)lever->body[s]);
+    }
+}
+
+bool sadmm_world_stiffen(sadmm_world *world, const sadmm_settings *settings)
+{
+    bool before = world->start.stiffened;
+    double *K = world->start.stiffening;
+    world->start.stiffened = false;
+    /* a device that keeps worlds does not do it */
+    if (world->joint_rows == 0 || world->kernels->resident) return false;
+    for (int32_t i = 0; i < world->dynamic_count; ++i)
+        world->stiffened[i] = before && stiffening_is_any(K + 6 * i);
+    memset(K, 0, 6 * (size_t)world->dynamic_count * sizeof *K);
+    add_stiffness(world, settings->dt);
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        const struct sadmm_rigid *body = &world->start.rigid[i];
+        if (!stiffening_of(body->inertia, q_load(body->orientation), settings->dt, K + 6 * i)) continue;
+        world->start.stiffened = true;
+        world->stiffened[i] = true;
+    }
+    return before || world->start.stiffened;
+}
+
 sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings)
 {
     sadmm_rows_clear(&world->start.rows);
@@ -111,11 +161,20 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
         const struct acting_joint acting = sadmm_world_act_joint(world, joint, settings);
         find_laws(joint, &acting, settings, &laws);
         if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
-        if (!add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt) || !add_slots(world, joint, before))
+        if (!add_lever(world, (int32_t)slot, &acting) ||
+            !add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt) || !add_slots(world, joint, before))
             return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution tells */
     }
-    return sadmm_world_make_gear_rows(world, settings);
+    world->start.stiffened = false;
+    const size_t bodies = world->joint_count > 0 ? (size_t)world->dynamic_count : 0;
+    if (!sadmm_grow_empty(&world->start.stiffening, &world->start.stiffening_capacity, 6 * bodies,
+                          sizeof *world->start.stiffening) ||
+        !sadmm_grow_empty(&world->stiffened, &world->stiffened_capacity, bodies, sizeof *world->stiffened))
+        return sadmm_fail_memory(&world->error, "the joints' rows");
+    TRY(sadmm_world_make_gear_rows(world, settings));
+    sadmm_world_stiffen(world, settings);
+    return SADMM_OK;
 }
 
 /* ---- from step to step ------------------------------------------------------------------------------------------- */

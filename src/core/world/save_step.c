@@ -120,7 +120,7 @@ static void archive_rows(struct sadmm_archive *archive, sadmm_world *world)
 
 /* ---- plan, start, report ----------------------------------------------------------------------------------------- */
 
-_Static_assert(sizeof(struct sadmm_plan) == 40 && sizeof(sadmm_step_report) == 208,
+_Static_assert(sizeof(struct sadmm_plan) == 40 && sizeof(sadmm_step_report) == 216,
                "a plan, or a report, has other members than the list of a saved world");
 
 static void archive_plan(struct sadmm_archive *archive, struct sadmm_plan *plan)
@@ -155,6 +155,7 @@ static void archive_report(struct sadmm_archive *archive, sadmm_step_report *r)
     SADMM_ARCHIVE(archive, r->limited);
     SADMM_ARCHIVE(archive, r->repeated);
     SADMM_ARCHIVE(archive, r->penetration_max);
+    SADMM_ARCHIVE(archive, r->joint_drift);
     SADMM_ARCHIVE(archive, r->residual);
     SADMM_ARCHIVE(archive, r->certificate);
     if (archive->reading)
@@ -190,5 +191,12 @@ void sadmm_archive_step(struct sadmm_archive *archive, sadmm_world *world)
     sadmm_archive_array(archive, &start->impulse, &numbers, &start->impulse_capacity, sizeof(double), INT32_MAX);
     if (archive->reading)
         sadmm_archive_expect(archive, !readable || numbers == 3 * world->contacts.point_count, "the start of a step");
-    if (readable) archive_rows(archive, world);
+    if (!readable) return;
+    archive_rows(archive, world);
+    numbers = start->stiffened ? 6 * bodies : 0;
+    sadmm_archive_array(archive, &start->stiffening, &numbers, &start->stiffening_capacity, sizeof(double), INT32_MAX);
+    start->stiffened = numbers > 0;
+    if (archive->reading && archive->status == SADMM_OK)
+        sadmm_archive_expect(archive, numbers == 0 || (numbers == 6 * bodies && sadmm_all_finite(start->stiffening, numbers)),
+                             "the start of a step");
 }

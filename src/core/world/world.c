@@ -61,6 +61,7 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_direct_destroy(world->direct);
     sadmm_rows_free(&world->start.rows);
     sadmm_rows_free(&world->last_start.rows);
+    sadmm_rows_free(&world->closing);
     for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
     sadmm_world_free_tables(world);
     sadmm_block_pool_free(&world->block_pool);
@@ -69,9 +70,10 @@ void sadmm_world_destroy(sadmm_world *world)
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->block_shapes,
                       world->disabled_pairs.keys, world->disabled_pairs.values, world->joined_pairs.keys,
                       world->joined_pairs.values, world->filtered_pairs, world->joints, world->couplings, world->gears,
-                      world->joint_sources, world->joint_labels, world->joint_touch, world->joint_constraints,
+                      world->joint_sources, world->joint_levers, world->stiffened, world->opened, world->closing_slots,
+                      world->joint_labels, world->joint_touch, world->joint_constraints,
                       world->start.multiplier, world->last_start.multiplier,
-                      world->friction_pairs.keys,
+                      world->start.stiffening, world->last_start.stiffening, world->friction_pairs.keys,
                       world->friction_pairs.values, world->collision_bodies, world->start.rigid, world->start.velocity,
                       world->start.impulse, world->last_start.rigid, world->last_start.velocity,
                       world->last_start.impulse, world->start.driven, world->last_start.driven, world->driven,

@@ -128,9 +128,12 @@ struct sadmm_step_start {
     double *impulse;           /* points x 3: the warm start */
     struct sadmm_rows rows;    /* of joints; their multipliers are the solution */
     double *multiplier;        /* rows: the warm start */
+    double *stiffening;        /* dynamic bodies x 6: what joints add to their inertia (model/stiffening.h); */
+    bool stiffened;            /* there is any, else the list is not read */
     double *driven;            /* kinematic bodies x 6: velocities, m/s, rad/s */
     int32_t driven_count;
-    size_t driven_capacity, rigid_capacity, velocity_capacity, impulse_capacity, multiplier_capacity;
+    size_t driven_capacity, rigid_capacity, velocity_capacity, impulse_capacity, multiplier_capacity,
+        stiffening_capacity;
 };
 
 /* Two shapes that touch, or a sensor and what it sees. */
@@ -186,6 +189,12 @@ struct sadmm_world {
     uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
     size_t filtered_count, filtered_capacity;
     struct sadmm_joint_source *joint_sources; /* of the step's rows */
+    struct joint_lever *joint_levers;         /* by slot, of those that act (model/stiffening.h) */
+    uint8_t *stiffened;                       /* dynamic bodies: it has stiffening, or had it before it was found last */
+    struct sadmm_rows closing;                /* locks, where the step has moved bodies to; their places in it; */
+    struct sadmm_row_constraint *closing_slots;
+    uint8_t *opened;                          /* dynamic bodies: of parts with joints that are to be closed */
+    size_t joint_lever_capacity, stiffened_capacity, closing_slot_capacity, opened_capacity;
     struct sadmm_row_constraint *joint_constraints; /* all that joints may have, in order; most have rows in the step */
     size_t joint_constraint_count, joint_constraint_capacity;
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
@@ -358,6 +367,9 @@ sadmm_status sadmm_world_begin_joints(sadmm_world *world);
 int32_t sadmm_joint_constraints(const struct sadmm_world_joint *joint);
 /* Rows of the (sub-)step's joints into `start`, from the bodies there. */
 sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings);
+/* What the stiffness of joints adds to inertia, by the multipliers that rows have: world->start.stiffening. Has any body
+ * some, or had it before? By body: world->stiffened. */
+bool sadmm_world_stiffen(sadmm_world *world, const sadmm_settings *settings);
 /* The solution's multipliers into what joints keep. */
 void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings);
 /* The step is done. */
@@ -366,6 +378,8 @@ void sadmm_world_commit_joints(sadmm_world *world);
 /* ---- joint_move.c ---- */
 
 /* Bodies of islands with joints as they are after the step, in the place of what the backend made of them. */
+/* Closes what is locked in world->next, where it is off by much; off: the largest error that is left, m. */
+sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *settings, double *off);
 sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *settings);
 
 /* ---- report.c ---- */
