@@ -8,6 +8,7 @@
 #include "core/math/impact.h"
 #include "core/math/rigid.h"
 #include "forces.h"
+#include "rolling.h"
 #include "spin.h"
 #include "system.h"
 
@@ -15,7 +16,7 @@
 #error "system_math.h is double only: do not include it in a source compiled per precision"
 #endif
 
-/* What stiffness adds to its inertia (rolling.h). */
+/* What stiffness adds to its inertia (rolling.h, stiffening.h). */
 SADMM_INLINE sym3 sadmm_stiffness(const struct sadmm_rigid *body, double dt)
 {
     const double *k = body->stiffness, s = dt * dt / 2;
@@ -46,7 +47,7 @@ SADMM_INLINE sym3 sadmm_rigid_body_at(const struct sadmm_rigid *body, const stru
     rolling_pay(body, b);
     *mass = linear.mass * body->mass;
     const sym3 I = rigid_world_inertia(spin->R, v3_scale(v3_load(body->inertia), angular.mass));
-    return rolling_is_stiff(body) ? sadmm_stiffened(body, spin->angular, dt, I, b) : I;
+    return rolling_stiffens(body) ? sadmm_stiffened(body, spin->angular, dt, I, b) : I;
 }
 
 SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double *mass,
