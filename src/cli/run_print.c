@@ -150,6 +150,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     set_or_null(o, "limited_steps", record, json_integer((json_int_t)record->limited_steps));
     set_or_null(o, "repeated", record, json_integer(record->last.repeated));
     set_or_null(o, "penetration_max", record, cli_json_real(record->penetration_max));
+    set_or_null(o, "joint_drift", record, cli_json_real(record->joint_drift));
     json_object_set_new(o, "speed_max_final", cli_json_real(record->speed_max));
     json_object_set_new(o, "displacement_max", cli_json_real(record->displacement_max));
     json_object_set_new(o, "scene_result", result_json(&record->result));
@@ -202,6 +203,8 @@ void run_record_print(const struct run_record *record, const char *spec, const s
         printf("repeated       %" PRId64 " steps, which outgrew the capacities or the plan they were begun with\n",
                last->repeated);
     if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);
+    if (last->joints > 0 && record->joint_drift >= 0)
+        printf("joints         off by %.3g m at most\n", record->joint_drift);
     printf("final state    fastest %.3g m/s, moved %.3g m at most, %s, hash %016" PRIx64 "\n", record->speed_max,
            record->displacement_max, record->finite ? "finite" : "NOT FINITE", record->hash);
     print_result(&record->result);

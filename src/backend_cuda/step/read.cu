@@ -37,6 +37,7 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
     out->plan.row_constraints = last->joints.constraints;
     out->plan.rows_apart = last->apart;
     out->penetration_max = last->depth;
+    out->joint_drift = s->joints > 0 ? -1 : 0;
     out->residual.primal = last->primal;
     out->residual.dual = last->dual;
     out->ms.collide = milliseconds(last, STAMP_START, STAMP_FOUND);

@@ -12,7 +12,7 @@
 
 /* Of islands. TOUCHED: by a contact; HELD: by one that leaves it no motion (math/momentum.h); RESTORED: on a device, it
  * is (joint_momentum.h); TURNS: rows of it turn by more than a step resolves; POWERED: springs, drives or armatures act;
- * MOORED: rows hold it to what does not move by itself. */
+ * MOORED: rows hold it to what does not move by itself; STRAYS: joints stiffen its bodies, or have been closed. */
 enum {
     ISLAND_JOINED = 1,
     ISLAND_LEADS_STAY = 2,
@@ -21,7 +21,8 @@ enum {
     ISLAND_RESTORED = 16,
     ISLAND_TURNS = 32,
     ISLAND_POWERED = 64,
-    ISLAND_MOORED = 128
+    ISLAND_MOORED = 128,
+    ISLAND_STRAYS = 256
 };
 
 /* A body as the step ends. */

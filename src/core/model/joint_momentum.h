@@ -14,12 +14,13 @@
 #include "system_math.h"
 
 /* Is there something to restore? bits: of an island, but for ISLAND_HELD where that is not known yet. What nothing
- * touches has it already; and what hangs on rows that turn by more than a step resolves (joint_law.h) has neither its
+ * touches has it already, but where the stiffness of joints holds on to some, or they have been closed; and what hangs on rows that turn by more than a step resolves (joint_law.h) has neither its
  * impulses nor its weight where they act. */
 SADMM_INLINE bool joint_island_is_loose(int bits)
 {
     if (!(bits & ISLAND_JOINED) || bits & ISLAND_HELD) return false;
-    return bits & (ISLAND_TOUCHED | ISLAND_LEADS_STAY) && !(bits & ISLAND_MOORED && bits & ISLAND_TURNS);
+    if (bits & ISLAND_MOORED) return bits & (ISLAND_TOUCHED | ISLAND_LEADS_STAY) && !(bits & ISLAND_TURNS);
+    return (bits & (ISLAND_TOUCHED | ISLAND_LEADS_STAY | ISLAND_STRAYS)) != 0;
 }
 
 /* Sums over an island; then what restores it: velocities times `factor`, the rigid motion in sums.now, and what all of it
@@ -57,7 +58,8 @@ SADMM_INLINE void joint_add_momentum(struct joint_momentum *to, const struct sad
     const double none[6] = {0, 0, 0, 0, 0, 0};
     double mass, b[6], halfway[3], end[3], A[PACKED6];
     const struct spin_system spin = spin_system_at(from, turned);
-    sym3 inertia = sadmm_rigid_body_at(from, &spin, settings, &mass, b);
+    /* stiffness of joints moves no momentum to anything */
+    sym3 inertia = sadmm_rigid_body_by(from, &spin, rolling_is_stiff(from), settings, &mass, b);
     int k;
     to->free_energy += joint_free_energy(mass, inertia, b);
     joint_halfway(from, origin, settings->dt, halfway);

@@ -22,11 +22,18 @@
 #define ROLLING_STIFF 0.25
 
 /* What a body takes along from contacts that rolled. Few have any of it, so that it is not read, or cleared, where a bit
- * does not say that it is there: records of bodies are what large worlds move. */
-enum rolling_kept { ROLLING_OWES = 1, ROLLING_IS_STIFF = 2 };
+ * does not say that it is there: records of bodies are what large worlds move. STIFFENED: in the step at hand its
+ * stiffness has what joints add (stiffening.h). */
+enum rolling_kept { ROLLING_OWES = 1, ROLLING_IS_STIFF = 2, ROLLING_IS_STIFFENED = 4 };
 
 /* Does rocking have to be taken out of the body? */
 SADMM_INLINE bool rolling_is_stiff(const struct sadmm_rigid *body) { return (body->rolls & ROLLING_IS_STIFF) != 0; }
+
+/* Has it stiffness of any kind? */
+SADMM_INLINE bool rolling_stiffens(const struct sadmm_rigid *body)
+{
+    return (body->rolls & (ROLLING_IS_STIFF | ROLLING_IS_STIFFENED)) != 0;
+}
 
 /* Nothing of the last step counts: its state was set. */
 SADMM_INLINE void rolling_forget(struct sadmm_rigid *body) { body->rolls = body->mean = 0; }

@@ -35,7 +35,8 @@ struct sadmm_rigid {
     int32_t rolls;          /* which of owed and stiffness are of account: enum rolling_kept; the others may be anything */
     int32_t reserved[2];
     double owed[6];         /* of the last step's contacts that rolled, N s, N m s, world (rolling.h) */
-    double stiffness[6];    /* against rocking that no step resolves, N m: xx, yy, zz, xy, xz, yz, world (rolling.h) */
+    double stiffness[6];    /* that no step resolves, N m: xx, yy, zz, xy, xz, yz, world: against rocking (rolling.h), and
+                               in a step what joints give (stiffening.h) */
 };
 
 /* What is remembered of a body's last steps (steady.h). */

@@ -8,6 +8,7 @@
 #include "core/math/impact.h"
 #include "core/math/rigid.h"
 #include "forces.h"
+#include "rolling.h"
 #include "spin.h"
 #include "system.h"
 
@@ -15,7 +16,7 @@
 #error "system_math.h is double only: do not include it in a source compiled per precision"
 #endif
 
-/* What stiffness adds to its inertia (rolling.h). */
+/* What stiffness adds to its inertia (rolling.h, stiffening.h). */
 SADMM_INLINE sym3 sadmm_stiffness(const struct sadmm_rigid *body, double dt)
 {
     const double *k = body->stiffness, s = dt * dt / 2;
@@ -33,7 +34,7 @@ SADMM_INLINE sym3 sadmm_stiffened(const struct sadmm_rigid *body, vec3 angular, 
 
 /* Eq. (1) of a rigid body: A = diag(m I, world inertia) halfway through the step (spin: spin_of_system) and b = A v +
  * dt (m g + f, tau), with damping (forces.h), and what contacts that roll owe it. Returns the inertia; *mass: of A. */
-SADMM_INLINE sym3 sadmm_rigid_body_at(const struct sadmm_rigid *body, const struct spin_system *spin,
+SADMM_INLINE sym3 sadmm_rigid_body_by(const struct sadmm_rigid *body, const struct spin_system *spin, bool stiffens,
                                       const struct sadmm_settings *settings, double *mass, double b[6])
 {
     const double dt = settings->dt;
@@ -46,7 +47,13 @@ SADMM_INLINE sym3 sadmm_rigid_body_at(const struct sadmm_rigid *body, const stru
     rolling_pay(body, b);
     *mass = linear.mass * body->mass;
     const sym3 I = rigid_world_inertia(spin->R, v3_scale(v3_load(body->inertia), angular.mass));
-    return rolling_is_stiff(body) ? sadmm_stiffened(body, spin->angular, dt, I, b) : I;
+    return stiffens ? sadmm_stiffened(body, spin->angular, dt, I, b) : I;
+}
+
+SADMM_INLINE sym3 sadmm_rigid_body_at(const struct sadmm_rigid *body, const struct spin_system *spin,
+                                      const struct sadmm_settings *settings, double *mass, double b[6])
+{
+    return sadmm_rigid_body_by(body, spin, rolling_stiffens(body), settings, mass, b);
 }
 
 SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double *mass,

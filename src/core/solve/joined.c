@@ -193,9 +193,17 @@ static void take_kept(const struct solving *s, const struct joined_part *part)
 /* Is it as it was solved before the iterations? No contact touches it. */
 static bool is_solved(const struct joined_part *part) { return part->kept && !part->touched; }
 
+static bool has_any(const struct joined_part *part, const uint8_t *bodies)
+{
+    bool any = false;
+    for (int32_t e = 0; e < part->view.s.bodies; ++e) any = any || bodies[part->view.s.body[e]];
+    return any;
+}
+
 sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
                                 const struct sadmm_row_constraint *slots, size_t slot_count,
-                                const struct sadmm_settings *settings, bool after, struct sadmm_error *error)
+                                const struct sadmm_settings *settings, const uint8_t *stiffened, bool after,
+                                struct sadmm_error *error)
 {
     const struct solving s = {joined, system, slots, slot_count, settings};
     if (!find_order(&s) || !sadmm_grow_empty(&joined->kept_lambda, &joined->kept_lambda_capacity,
@@ -206,15 +214,19 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
     for (int32_t k = 0; k < joined->order.parts; ++k) {
         struct joined_part *part = &joined->parts[k];
         part->speed = 0;
+        part->left = stiffened && !has_any(part, stiffened);
+        if (part->left) continue;
         part->kept = kept && part->kept;
         solves = solves || !is_solved(part);
     }
     if (solves) find_impulses(&s);
     for (int32_t k = 0; k < joined->order.parts; ++k)
-        if (!is_solved(&joined->parts[k])) sadmm_joined_part_load(&joined->parts[k], system, settings, slots);
+        if (!joined->parts[k].left && !is_solved(&joined->parts[k]))
+            sadmm_joined_part_load(&joined->parts[k], system, settings, slots);
     if (solves) each_contact(&s, add_weight);
     for (int32_t k = 0; k < joined->order.parts; ++k) {
         struct joined_part *part = &joined->parts[k];
+        if (part->left) continue;
         if (is_solved(part)) {
             take_kept(&s, part);
             continue;
@@ -228,5 +240,40 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
         if (!after) keep_part(&s, part, solved);
     }
     joined->kept = !after;
+    return SADMM_OK;
+}
+
+/* ---- displacements ----------------------------------------------------------------------------------------------- */
+
+static void move_by(const struct joined_view *v, struct sadmm_rigid *bodies)
+{
+    for (int32_t e = 0; e < v->s.bodies; ++e) {
+        struct sadmm_rigid *body = &bodies[v->s.body[e]];
+        const double *by = v->dv + 6 * (size_t)e;
+        v3_store(rigid_move(v3_load(body->position), v3_load(by), 1), body->position);
+        q_store(rigid_turn(q_load(body->orientation), v3_load(by + 3), 1), body->orientation);
+    }
+}
+
+static void close_part(const struct solving *s, struct joined_part *part, struct sadmm_rigid *bodies)
+{
+    const struct joined_view *v = &part->view;
+    memset(part->impulse, 0, 6 * (size_t)v->s.bodies * sizeof *part->impulse);
+    sadmm_joined_part_load(part, s->system, s->settings, s->slots);
+    memset(v->velocity, 0, 6 * (size_t)v->s.bodies * sizeof *v->velocity);
+    leave_to_contacts(v); /* nothing but the errors moves bodies */
+    if (!sadmm_joined_part_solve(v, NULL, true)) return;
+    move_by(v, bodies);
+}
+
+sadmm_status sadmm_joined_close(struct sadmm_joined *joined, const struct sadmm_system *system,
+                                const struct sadmm_row_constraint *slots, size_t slot_count,
+                                const struct sadmm_settings *settings, const uint8_t *opened,
+                                struct sadmm_rigid *bodies, struct sadmm_error *error)
+{
+    const struct solving s = {joined, system, slots, slot_count, settings};
+    if (!find_order(&s)) return sadmm_fail_memory(error, "joined bodies");
+    for (int32_t k = 0; k < joined->order.parts; ++k)
+        if (has_any(&joined->parts[k], opened)) close_part(&s, &joined->parts[k], bodies);
     return SADMM_OK;
 }

@@ -39,12 +39,24 @@ void sadmm_joined_begin(struct sadmm_joined *joined);
 
 /* system->velocity and the multipliers of system->rows, in place. slots: constraints of these rows, at places that stay
  * from step to step, so that the order does, too: one may have no rows at the time, but has the bodies that it joins
- * when it has. What does not fit a direct solve is left as it is. after: the iterations have come; parts without
- * contacts then get back what they had before these, which is their solution. Contacts are then those of that call.
+ * when it has. What does not fit a direct solve is left as it is.
+ * stiffened: NULL, or bodies (of the system) whose stiffening has changed since a call before the iterations: parts
+ * without any are left as they are.
+ * after: the iterations have come; parts without contacts then get back what they had before these, which is their
+ * solution. Contacts are then those of that call.
  * Errors: OUT_OF_MEMORY, nothing has changed. */
 sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
                                 const struct sadmm_row_constraint *slots, size_t slot_count,
-                                const struct sadmm_settings *settings, bool after, struct sadmm_error *error);
+                                const struct sadmm_settings *settings, const uint8_t *stiffened, bool after,
+                                struct sadmm_error *error);
+
+/* Moves `bodies` (what the step has made of the system's), of parts that have one of `opened`, by the least displacements,
+ * weighed by A, that take away the errors (biases) of system->rows, which are hard. Parts that cannot be solved stay.
+ * slots: as above. Errors: OUT_OF_MEMORY. */
+sadmm_status sadmm_joined_close(struct sadmm_joined *joined, const struct sadmm_system *system,
+                                const struct sadmm_row_constraint *slots, size_t slot_count,
+                                const struct sadmm_settings *settings, const uint8_t *opened,
+                                struct sadmm_rigid *bodies, struct sadmm_error *error);
 
 #ifdef __cplusplus
 }

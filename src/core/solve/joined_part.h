@@ -17,6 +17,7 @@ struct joined_part {
     double *impulse;         /* bodies x 6, in lists of all parts: J^T lambda; */
     double *kept_velocity;   /* that before the iterations */
     double speed;            /* that its impulses change it by; 0: it is not solved */
+    bool left;               /* it is not this call's */
     bool touched;            /* by a contact */
     bool kept;               /* solved before the iterations: */
     uint8_t *kept_state;     /* rows; in `kept_states` */

@@ -14,7 +14,7 @@ static struct joint_lead lead_of(const sadmm_world *world, int32_t body, double 
                      : joint_lead_of(NULL, NULL, dt);
 }
 
-static uint8_t *island_of(const sadmm_world *world, int32_t a, int32_t b)
+static uint16_t *island_of(const sadmm_world *world, int32_t a, int32_t b)
 {
     return &world->joint_touch[world->joint_labels[a >= 0 ? a : b]];
 }
@@ -25,13 +25,13 @@ static void add_constraint(const sadmm_world *world, const struct sadmm_row_cons
     const struct sadmm_rows *rows = &world->start.rows;
     const struct joint_lead bodies[2] = {lead_of(world, constraint->body_a, settings->dt),
                                          lead_of(world, constraint->body_b, settings->dt)};
-    uint8_t *island = island_of(world, constraint->body_a, constraint->body_b);
+    uint16_t *island = island_of(world, constraint->body_a, constraint->body_b);
     int moorings = 0;
     *island |= ISLAND_JOINED;
     for (int32_t k = 0; k < constraint->count; ++k) {
         const size_t r = (size_t)(constraint->first + k);
         moorings |= joint_mooring(&world->joint_sources[r], rows->lambda[r], bodies);
-        *island |= (uint8_t)joint_row_touches(&world->joint_sources[r], rows->lambda[r], rows->jacobian_a + 6 * r,
+        *island |= (uint16_t)joint_row_touches(&world->joint_sources[r], rows->lambda[r], rows->jacobian_a + 6 * r,
                                               rows->jacobian_b + 6 * r, bodies, settings);
     }
     if (moorings == JOINT_MOORED_WHOLLY) *island |= ISLAND_HELD;
@@ -51,12 +51,12 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
 {
     const struct sadmm_contact_set *contacts = system->contacts;
     sadmm_islands(system, world->joint_labels);
-    memset(world->joint_touch, 0, (size_t)system->body_count);
+    memset(world->joint_touch, 0, (size_t)system->body_count * sizeof *world->joint_touch);
     for (size_t k = 0; k < system->rows->constraint_count; ++k)
         add_constraint(world, &system->rows->constraints[k], settings);
     for (size_t k = 0; k < contacts->pair_count; ++k) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[k];
-        uint8_t *island = island_of(world, pair->body_a, pair->body_b);
+        uint16_t *island = island_of(world, pair->body_a, pair->body_b);
         if (!(*island & ISLAND_JOINED)) continue;
         *island |= ISLAND_TOUCHED | (holds(contacts, pair) ? ISLAND_HELD : 0);
         if (*island & ISLAND_LEADS_STAY) continue;
@@ -71,7 +71,7 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
     }
 }
 
-sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *settings)
+sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *settings, double *off)
 {
     const struct sadmm_system system = sadmm_world_system(world);
     const size_t n = (size_t)system.body_count;
@@ -80,8 +80,10 @@ sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *s
         return sadmm_fail_memory(&world->error, "islands of joints");
     find_islands(world, &system, settings);
     for (size_t i = 0; i < n; ++i) {
-        const uint8_t island = world->joint_touch[world->joint_labels[i]];
+        const uint16_t island = world->joint_touch[world->joint_labels[i]];
         struct sadmm_rigid *next = &world->next[i];
+        if (world->start.rigid[i].rolls & ROLLING_IS_STIFFENED)
+            world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
         if (!(island & ISLAND_JOINED)) continue;
         next->mean = !(island & ISLAND_LEADS_STAY);
         double halfway[4];
@@ -94,5 +96,6 @@ sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *s
         world->joints[world->joint_sources[constraint->first].joint].next.leads_stay =
             *island_of(world, constraint->body_a, constraint->body_b) & ISLAND_LEADS_STAY;
     }
+    TRY(sadmm_world_close_joints(world, settings, off));
     return sadmm_world_restore_joined(world, settings);
 }

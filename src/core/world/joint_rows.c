@@ -115,7 +115,9 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
             return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution tells */
     }
-    return sadmm_world_make_gear_rows(world, settings);
+    bool any;
+    TRY(sadmm_world_make_gear_rows(world, settings));
+    return sadmm_world_stiffen(world, settings, &any);
 }
 
 /* ---- from step to step ------------------------------------------------------------------------------------------- */

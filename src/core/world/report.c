@@ -19,6 +19,7 @@ void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sa
     report->converged = done->converged;
     report->limited = done->limited;
     report->penetration_max = done->penetration_max;
+    report->joint_drift = done->joint_drift;
     report->residual = done->residual;
     report->ms.collide = done->ms.collide;
     report->ms.assemble = done->ms.assemble;

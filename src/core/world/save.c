@@ -8,7 +8,7 @@
 #include "save.h"
 
 /* Raised with every change of what is written. */
-enum { FORMAT = 3 };
+enum { FORMAT = 4 };
 
 struct header {
     char magic[8];

@@ -167,7 +167,7 @@ static void archive_rows(struct sadmm_archive *archive, sadmm_world *world)
 
 /* ---- plan, start, report ----------------------------------------------------------------------------------------- */
 
-_Static_assert(sizeof(struct sadmm_plan) == 40 && sizeof(sadmm_step_report) == 208,
+_Static_assert(sizeof(struct sadmm_plan) == 40 && sizeof(sadmm_step_report) == 216,
                "a plan, or a report, has other members than the list of a saved world");
 
 static void archive_plan(struct sadmm_archive *archive, struct sadmm_plan *plan)
@@ -202,6 +202,7 @@ static void archive_report(struct sadmm_archive *archive, sadmm_step_report *r)
     SADMM_ARCHIVE(archive, r->limited);
     SADMM_ARCHIVE(archive, r->repeated);
     SADMM_ARCHIVE(archive, r->penetration_max);
+    SADMM_ARCHIVE(archive, r->joint_drift);
     SADMM_ARCHIVE(archive, r->residual);
     SADMM_ARCHIVE(archive, r->certificate);
     if (archive->reading)

@@ -152,6 +152,7 @@ struct host_step {
     bool found;   /* the contacts have been replaced */
     /* Of the sub-steps made so far. */
     double depth;          /* deepest penetration, m */
+    double joint_drift;    /* of the last one */
     int iterations;        /* of all of them */
     bool unconverged;      /* one of them has not met a stop rule */
     int32_t limited;       /* islands, most of any */
@@ -162,14 +163,24 @@ struct host_step {
 };
 
 /* Bodies with joints, directly. */
-static sadmm_status solve_joined(struct host_step *step, bool after)
+static sadmm_status solve_joined(struct host_step *step, const uint8_t *stiffened, bool after)
 {
     sadmm_world *world = step->world;
     if (!step->system.rows) return SADMM_OK;
     if (!world->joined) world->joined = sadmm_joined_create();
     if (!world->joined) return sadmm_fail_memory(&world->error, "joined bodies");
     return sadmm_joined_solve(world->joined, &step->system, world->joint_constraints, world->joint_constraint_count,
-                              &step->settings, after, &world->error);
+                              &step->settings, stiffened, after, &world->error);
+}
+
+/* Before the iterations; again with the stiffness of the forces that this finds. */
+static sadmm_status begin_joined(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    bool stiffened;
+    TRY(solve_joined(step, NULL, false));
+    TRY(sadmm_world_stiffen(world, &step->settings, &stiffened));
+    return stiffened ? solve_joined(step, world->stiffened, false) : SADMM_OK;
 }
 
 /* What the iterations have left of islands with joints (core/solve/direct.h). */
@@ -219,7 +230,7 @@ static sadmm_status make_plan(struct host_step *step)
     TRY(keep_start(world, &depth));
     TRY(choose_pushes(step, depth));
     if (world->joined) sadmm_joined_begin(world->joined);
-    if (world->plan.warm_start) TRY(solve_joined(step, false));
+    if (world->plan.warm_start) TRY(begin_joined(step));
     step->depth = depth > step->depth ? depth : step->depth;
     return SADMM_OK;
 }
@@ -287,13 +298,13 @@ static sadmm_status integrate(struct host_step *step)
     sadmm_world_put_down(world, &step->system);
     TRY(world->kernels->integrate(world->context, world->next, &world->error));
     if (step->system.rows) {
-        TRY(solve_joined(step, true));
+        TRY(solve_joined(step, NULL, true));
         TRY(solve_direct(step));
-        TRY(sadmm_world_move_joined(world, &step->settings));
         sadmm_world_keep_rows(world, &step->settings);
     }
     TRY(sadmm_world_move_driven(world, &step->settings));
     sadmm_world_move_targets(world, step->settings.dt);
+    if (step->system.rows) TRY(sadmm_world_move_joined(world, &step->settings, &step->joint_drift));
     if (step->pushed > 0) sadmm_push_move(world->push, step->settings.dt, world->next);
     keep_rolling_contacts(world, step->settings.dt);
     add_substep(step);
@@ -365,6 +376,7 @@ static void report_step(const struct host_step *step)
         .joints = step->world->joints_acting,
         .couplings = step->world->couplings_acting,
         .penetration_max = step->depth,
+        .joint_drift = step->joint_drift,
         .residual = solved->residual,
         .ms = {.collide = ms[SADMM_PHASE_COLLIDE], .assemble = ms[SADMM_PHASE_ASSEMBLE],
                .solve = ms[SADMM_PHASE_SOLVE], .finish = ms[SADMM_PHASE_FINISH]},

@@ -62,6 +62,7 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_push_destroy(world->push);
     sadmm_rows_free(&world->start.rows);
     sadmm_rows_free(&world->last_start.rows);
+    sadmm_rows_free(&world->closing);
     for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
     sadmm_world_free_tables(world);
     sadmm_block_pool_free(&world->block_pool);
@@ -75,7 +76,8 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_world_free_hits(world);
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->block_shapes,
                       world->shape_links, world->filtered_pairs, world->joints, world->couplings, world->gears,
-                      world->joint_sources, world->joint_labels, world->joint_touch, world->joint_number,
+                      world->joint_sources, world->joint_load, world->stiffening, world->stiffened, world->opened, world->closing_slots,
+                      world->joint_labels, world->joint_touch, world->joint_number,
                       world->joint_momentum, world->joint_constraints,
                       world->start.multiplier, world->last_start.multiplier,
                       world->collision_bodies, world->start.rigid, world->start.velocity,

@@ -141,6 +141,12 @@ struct sadmm_world_hit {
 
 struct sadmm_hits;
 
+/* K of a body's joints in its frame (model/stiffening.h); what they add to its inertia, kg m^2, world; its own stiffness. */
+struct joint_stiffening {
+    mat3 frame;
+    double K[6], more[6], own[6];
+};
+
 /* What the last step started from, for contacts, freeze and the certificate. Bodies that were hit: from where they would
  * have started with the velocity that they have after it. */
 struct sadmm_step_start {
@@ -213,10 +219,17 @@ struct sadmm_world {
     uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
     size_t filtered_count, filtered_capacity;
     struct sadmm_joint_source *joint_sources; /* of the step's rows */
+    double *joint_load;                       /* dynamic bodies x 3: what joints may stiffen them by, N m; */
+    struct joint_stiffening *stiffening;      /* by what they do, those that may be; */
+    uint8_t *stiffened;                       /* it is another one than before it was found last */
+    struct sadmm_rows closing;                /* locks, where the step has moved bodies to; their places in it; */
+    struct sadmm_row_constraint *closing_slots;
+    uint8_t *opened;                          /* dynamic bodies: of parts with joints that are to be closed */
+    size_t joint_load_capacity, stiffening_capacity, stiffened_capacity, closing_slot_capacity, opened_capacity;
     struct sadmm_row_constraint *joint_constraints; /* all that joints may have, in order; most have rows in the step */
     size_t joint_constraint_count, joint_constraint_capacity;
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
-    uint8_t *joint_touch;                     /* of islands, at their labels (joint_move.c) */
+    uint16_t *joint_touch;                    /* of islands, at their labels (joint_move.c) */
     int32_t *joint_number;                    /* of bodies of islands whose momentum is restored (joint_momentum.c) */
     struct joint_momentum *joint_momentum;    /* at these numbers */
     size_t joint_source_capacity, joint_label_capacity, joint_touch_capacity, joint_number_capacity,
@@ -415,8 +428,20 @@ void sadmm_world_commit_joints(sadmm_world *world);
 
 /* ---- joint_move.c ---- */
 
-/* Bodies of islands with joints as they are after the step, in the place of what the backend made of them. */
-sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *settings);
+/* Bodies of islands with joints as they are after the step, in the place of what the backend made of them, once the
+ * others have moved. off: the largest error of a locked translation that is left, m. */
+sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *settings, double *off);
+
+/* ---- joint_stiffen.c ---- */
+
+/* Stiffness of joints into the bodies of `start`, by the multipliers that rows have. any: bodies whose inertia this
+ * changes, by body world->stiffened. */
+sadmm_status sadmm_world_stiffen(sadmm_world *world, const sadmm_settings *settings, bool *any);
+
+/* ---- joint_close.c ---- */
+
+/* Closes what is locked in world->next, where it is off by much; off: the largest error that is left, m. */
+sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *settings, double *off);
 
 /* ---- joint_momentum.c ---- */
 

@@ -1,0 +1,111 @@
+/* What is locked, closed at the end of a step (docs/algorithm.md, section 10): the errors that turning bodies leave joints
+ * with are of third order in the step, and where bodies turn by much of a radian in one they are a good part of a link.
+ * Bodies are then moved by the least displacement, weighed by the step's inertia, that takes the errors away. In double. */
+#ifndef SADMM_CORE_MODEL_JOINT_CLOSE_H
+#define SADMM_CORE_MODEL_JOINT_CLOSE_H
+
+#include "joint_law.h"
+
+/* A joint is closed once it is off by more than this share of its bodies' arms and radii of gyration, or rad. */
+#define JOINT_CLOSE_FROM 5e-4
+/* By so many Newton steps at most. */
+enum { JOINT_CLOSE_STEPS = 8 };
+
+/* How far the locks of a joint are off. Translations alone, m; and do their arms say that all of it is little? The bodies'
+ * scale is more than their arms' is. */
+struct joint_opening {
+    double off;
+    bool little;
+};
+
+SADMM_INLINE bool joint_turns_little(const struct joint_end *a, const struct joint_end *b, uint32_t locks)
+{
+    const double most = JOINT_CLOSE_FROM / 4; /* of half an angle, and with room */
+    const int locked = joint_locked_rotations(locks), odd = joint_odd_rotation(locks);
+    vec3 part;
+    if (locked == 0) return true;
+    if (locked == 1)
+        return fabs(v3_dot(m3_column(q_matrix(a->orientation), (odd + 1) % 3),
+                           m3_column(q_matrix(b->orientation), (odd + 2) % 3))) < most;
+    const quat relative = q_mul(q_conjugate(a->orientation), b->orientation);
+    part = v3(odd == 0 ? 0 : relative.x, odd == 1 ? 0 : relative.y, odd == 2 ? 0 : relative.z);
+    return v3_norm2(part) < most * most;
+}
+
+SADMM_INLINE struct joint_opening joint_opening_of(const sadmm_joint_def *def, const struct joint_end *a,
+                                                   const struct joint_end *b)
+{
+    const vec3 way = v3_sub(b->point, a->point);
+    struct joint_opening out = {0, false};
+    if (joint_is_radial(def->kind)) {
+        if (def->locks & 1) out.off = fabs(v3_norm(way) - def->length);
+    } else if (def->locks & 7) {
+        const mat3 frame = q_matrix(a->orientation);
+        int k;
+        for (k = 0; k < 3; ++k)
+            if (def->locks >> k & 1) out.off = max_of(out.off, fabs(v3_dot(m3_column(frame, k), way)));
+    }
+    out.little = out.off * out.off <= JOINT_CLOSE_FROM * JOINT_CLOSE_FROM * (v3_norm2(a->arm) + v3_norm2(b->arm)) &&
+                 joint_turns_little(a, b, def->locks);
+    return out;
+}
+
+/* A joint as its bodies' poses have it: locks in order. */
+struct joint_closing {
+    struct joint_geometry geometry;
+    int count, coordinate[JOINT_COORDINATES];
+    double error[JOINT_COORDINATES]; /* m, rad: that are to be taken away */
+    double share;                    /* the largest one, over its scale */
+};
+
+/* What is left of an error that a step begins with: joints that were made apart are drawn together at the speed of
+ * corrections. */
+SADMM_INLINE double joint_closing_left(double error, double dt, double most)
+{
+    const double left = fabs(error) - dt * most;
+    return left > 0 ? copysign(left, error) : 0;
+}
+
+/* Of a body, to the scale of its joint's errors; NULL: it does not move. */
+SADMM_INLINE double joint_closing_scale(const struct joint_end *end, const struct sadmm_rigid *body)
+{
+    return body ? v3_norm(end->arm) + sqrt(v3_max_abs(v3_load(body->inertia)) / body->mass) : 0;
+}
+
+/* start: as the step began; scale: of both bodies. A distance is an arm, too. */
+SADMM_INLINE struct joint_closing joint_closing_of(const sadmm_joint_def *def, const struct joint_end start[2],
+                                                   const struct joint_end end[2], double scale,
+                                                   const struct sadmm_settings *settings)
+{
+    const int radial = joint_is_radial(def->kind);
+    const struct joint_geometry before = joint_geometry_of(&start[0], &start[1], def->locks, radial);
+    struct joint_closing c;
+    int k;
+    c.geometry = joint_geometry_of(&end[0], &end[1], def->locks, radial);
+    c.count = 0;
+    c.share = 0;
+    if (radial) scale += def->length;
+    for (k = 0; k < JOINT_COORDINATES; ++k) {
+        const double rest = k == 0 && radial ? def->length : 0;
+        double error;
+        if (!(def->locks >> k & 1)) continue;
+        error = c.geometry.value[k] - rest -
+                joint_closing_left(before.value[k] - rest, settings->dt, settings->correction_speed);
+        c.share = max_of(c.share, fabs(error) / (k < 3 ? scale : 1));
+        c.coordinate[c.count] = k;
+        c.error[c.count++] = error;
+    }
+    return c;
+}
+
+/* The row of lock i on a side. */
+SADMM_INLINE void joint_closing_row(const struct joint_closing *c, int i, int s, double row[6])
+{
+    vec3 linear, angular;
+    const double sign = s ? 1 : -1;
+    joint_row(&c->geometry, c->coordinate[i], s ? c->geometry.arm_b : c->geometry.arm_a, &linear, &angular);
+    v3_store(v3_scale(linear, sign), row);
+    v3_store(v3_scale(angular, sign), row + 3);
+}
+
+#endif

@@ -1,0 +1,137 @@
+/* What is locked, closed at the end of a (sub-)step (core/model/joint_close.h): rows of the poses that it has moved bodies
+ * to, solved for displacements by the order of the step's own. */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/model/joint_close.h"
+#include "core/model/joint_lead.h"
+#include "core/solve/joined.h"
+#include "world_internal.h"
+
+/* A joint's ends as the step began, and where it has left its bodies; what moves there is of account for its scale. */
+struct ends {
+    struct joint_end start[2], end[2];
+    double scale;
+};
+
+static struct joint_end end_of(const sadmm_world *world, const struct sadmm_world_joint *joint, int s)
+{
+    const struct joint_frame *frame = &joint->frame[s];
+    if (s == 0 && joint->coupling) return joint_end_on(frame, &world->couplings[joint->coupling - 1].next.target);
+    const struct joint_body body = sadmm_world_joint_body(world, joint->body[s]);
+    if (body.system_body >= 0) return joint_end_on(frame, &world->next[body.system_body]);
+    if (body.steered)
+        return joint_end_on(frame, &world->driven[sadmm_driven(world->bodies[joint->body[s]].system_body)].next);
+    return joint_end_on(frame, body.rigid);
+}
+
+/* Targets of couplings have no start of their own left: their ends are where the step has left them. */
+static struct ends ends_of(const sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    struct ends e;
+    e.scale = 0;
+    for (int s = 0; s < 2; ++s) {
+        const struct joint_body body = sadmm_world_joint_body(world, joint->body[s]);
+        e.end[s] = end_of(world, joint, s);
+        e.start[s] = s == 0 && joint->coupling ? e.end[s] : joint_end_on(&joint->frame[s], body.rigid);
+        e.scale += joint_closing_scale(&e.end[s], body.system_body >= 0 ? body.rigid : NULL);
+    }
+    return e;
+}
+
+static bool closes(const struct sadmm_world_joint *joint)
+{
+    return joint->alive && joint->def.enabled && joint->def.locks;
+}
+
+static struct joint_closing closing_of(const sadmm_world *world, const struct sadmm_world_joint *joint,
+                                       const sadmm_settings *settings)
+{
+    const struct ends e = ends_of(world, joint);
+    return joint_closing_of(&joint->def, e.start, e.end, e.scale, settings);
+}
+
+static void open_bodies(sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    for (int s = 0; s < 2; ++s) {
+        const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
+        if (body >= 0) world->opened[body] = true;
+    }
+}
+
+/* Which bodies have joints that are to be closed; the largest error, m. Are there any? */
+static bool find_open(sadmm_world *world, const sadmm_settings *settings, double *off)
+{
+    bool any = false;
+    *off = 0;
+    for (size_t slot = 0; slot < world->joint_slots; ++slot) {
+        const struct sadmm_world_joint *joint = &world->joints[slot];
+        if (!closes(joint)) continue;
+        const struct joint_end a = end_of(world, joint, 0), b = end_of(world, joint, 1);
+        const struct joint_opening opening = joint_opening_of(&joint->def, &a, &b);
+        *off = opening.off > *off ? opening.off : *off;
+        if (opening.little || world->kernels->resident) continue; /* a device would not do it */
+        if (!(closing_of(world, joint, settings).share > JOINT_CLOSE_FROM)) continue;
+        if (!any) memset(world->opened, 0, (size_t)world->dynamic_count);
+        open_bodies(world, joint);
+        any = true;
+    }
+    return any;
+}
+
+/* ---- rows -------------------------------------------------------------------------------------------------------- */
+
+/* Rows of locks, a constraint each, in the places of the step's own. */
+static bool add_rows(sadmm_world *world, const struct sadmm_row_constraint *place,
+                     const struct sadmm_world_joint *joint, const sadmm_settings *settings)
+{
+    struct sadmm_rows *rows = &world->closing;
+    const struct joint_closing c = closing_of(world, joint, settings);
+    const int32_t first = sadmm_rows_add(rows, c.count, place->body_a, place->body_b);
+    if (first < 0) return false;
+    for (int i = 0; i < c.count; ++i) {
+        const size_t r = (size_t)(first + i);
+        if (place->body_a >= 0) joint_closing_row(&c, i, 0, rows->jacobian_a + 6 * r);
+        if (place->body_b >= 0) joint_closing_row(&c, i, 1, rows->jacobian_b + 6 * r);
+        sadmm_row_hard(rows, (int32_t)r, c.error[i]);
+    }
+    return true;
+}
+
+static bool make_rows(sadmm_world *world, const sadmm_settings *settings)
+{
+    size_t at = 0;
+    sadmm_rows_clear(&world->closing);
+    if (!sadmm_grow_empty(&world->closing_slots, &world->closing_slot_capacity, world->joint_constraint_count,
+                          sizeof *world->closing_slots))
+        return false;
+    for (size_t k = 0; k < world->joint_constraint_count; ++k) {
+        world->closing_slots[k] = world->joint_constraints[k];
+        world->closing_slots[k].first = world->closing_slots[k].count = 0;
+    }
+    for (size_t slot = 0; slot < world->joint_slots; ++slot) {
+        const struct sadmm_world_joint *joint = &world->joints[slot];
+        if (!joint->alive) continue;
+        const size_t before = world->closing.constraint_count, places = (size_t)sadmm_joint_constraints(joint);
+        if (places > 0 && closes(joint) && !add_rows(world, &world->closing_slots[at], joint, settings)) return false;
+        if (world->closing.constraint_count > before) world->closing_slots[at] = world->closing.constraints[before];
+        at += places;
+    }
+    return true;
+}
+
+sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *settings, double *off)
+{
+    struct sadmm_system system = sadmm_world_system(world);
+    if (!sadmm_grow_empty(&world->opened, &world->opened_capacity, (size_t)world->dynamic_count, sizeof *world->opened))
+        return sadmm_fail_memory(&world->error, "joints that close");
+    system.rows = &world->closing;
+    for (int step = 0; find_open(world, settings, off) && step < JOINT_CLOSE_STEPS; ++step) {
+        if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
+        for (int32_t i = 0; i < world->dynamic_count; ++i)
+            if (world->opened[i]) world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
+        TRY(sadmm_joined_close(world->joined, &system, world->closing_slots, world->joint_constraint_count, settings,
+                               world->opened, world->next, &world->error));
+    }
+    return SADMM_OK;
+}
