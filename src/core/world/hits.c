@@ -19,7 +19,7 @@
 #include <string.h>
 
 #include "collision/broad_phase.h"
-#include "collision/first_touch.h"
+#include "collision/flight_touch.h"
 #include "collision/flyers.h"
 #include "collision/geometry.h"
 #include "core/base/memory.h"
@@ -47,7 +47,7 @@ struct foreseen {
     uint32_t child;
     int32_t flyer[2];
     uint32_t hits[2];
-    struct sadmm_first_touch touch;
+    struct sadmm_flight_touch touch;
 };
 
 struct sadmm_hits {
@@ -281,11 +281,11 @@ static bool foresee(struct taking *t, uint64_t key, double from)
     const struct flyer *a = &h->list[number[0]], *b = &h->list[number[1]];
     struct sadmm_flying_pair pair = {
         shape_of(t, slot[0], a), shape_of(t, slot[1], b), t->input.hulls, 0, t->settings.restitution_threshold, false};
-    struct sadmm_first_touch touch;
+    struct sadmm_flight_touch touch;
     /* What the triangles of a mesh push along depends on those around them, which one touch by itself does not see: that
      * is left to the solve. */
     if (pair.b.geometry->type == SADMM_SHAPE_MESH) return true;
-    const bool found = sadmm_first_touch(&pair, from, t->settings.dt, &touch);
+    const bool found = sadmm_flight_touch(&pair, from, t->settings.dt, &touch);
     for (int side = 0; pair.lost && side < 2; ++side) give_up(&h->list[number[side]]);
     if (!found) return true;
     if (!sadmm_grow(&h->foreseen, &h->foreseen_capacity, h->foreseen_count, h->foreseen_count + 1, sizeof *h->foreseen))
@@ -356,7 +356,7 @@ static void hit_body_of(const struct flyer *f, const struct sadmm_flight_pose *p
 static void make_hit(const struct taking *t, const struct foreseen *item, const struct sadmm_flight_pose pose[2],
                      struct hit *hit)
 {
-    const struct sadmm_first_touch *touch = &item->touch;
+    const struct sadmm_flight_touch *touch = &item->touch;
     memset(hit, 0, sizeof *hit);
     sadmm_collision_pair_law(t->world->collision, &t->input, item->key, &hit->friction, &hit->restitution);
     hit->threshold = t->settings.restitution_threshold;
