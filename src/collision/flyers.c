@@ -50,12 +50,17 @@ static double way_of(const struct sadmm_collision_input *input, const struct sad
 /* The solve has such an impact with the way until then in the arms of the body that is harder to turn (contact_emit.h):
  * that lets the other one through unless it is so much lighter that the arms do not matter. */
 #define ARMS_MATTER 0.01
+/* And by the plane in which they touch: what turns by more than so many rad takes it away from what it hits. */
+#define TURNS_AWAY  0.3
 static bool passes(const struct sadmm_collision_input *input, const struct sadmm_proxy *a, const struct sadmm_proxy *b)
 {
-    const struct sadmm_proxy *light = a->inertia < b->inertia ? a : b, *heavy = light == a ? b : a;
+    const bool a_is_light = b->system_body < 0 || (a->system_body >= 0 && a->inertia < b->inertia);
+    const struct sadmm_proxy *light = a_is_light ? a : b, *heavy = a_is_light ? b : a;
     const double way = way_of(input, a, b), size = length3(light->arm) + geometry_radius(&light->geometry);
-    return a->system_body >= 0 && b->system_body >= 0 && way > smaller_of(a->thin, b->thin) &&
-           way * way * light->inertia > ARMS_MATTER * size * size * heavy->inertia;
+    if (light->system_body < 0 || !sadmm_body_moves(heavy->system_body) || !(way > smaller_of(a->thin, b->thin)))
+        return false;
+    return turning_rate(heavy->angular) * input->dt > TURNS_AWAY ||
+           (heavy->system_body >= 0 && way * way * light->inertia > ARMS_MATTER * size * size * heavy->inertia);
 }
 
 bool sadmm_collision_passes(const struct sadmm_collision *collision, const struct sadmm_collision_input *input,
@@ -72,7 +77,7 @@ static bool any_passes(const struct sadmm_candidates *c, const struct sadmm_coll
     double most = 0, thin = HUGE_VAL;
     for (size_t slot = 0; slot < c->slot_count; ++slot) {
         const struct sadmm_proxy *p = &c->proxies[slot];
-        if (!(c->state[slot] & SLOT_PRESENT) || p->system_body < 0) continue;
+        if (!(c->state[slot] & SLOT_PRESENT) || !sadmm_body_moves(p->system_body)) continue;
         most = larger_of(most, length3(p->velocity) * input->dt + p->spin + p->fall);
         thin = smaller_of(thin, p->thin);
     }
