@@ -74,14 +74,15 @@ bool sadmm_collision_passes(const struct sadmm_collision *collision, const struc
 /* May any pair pass? By sizes alone: most worlds have none. */
 static bool any_passes(const struct sadmm_candidates *c, const struct sadmm_collision_input *input)
 {
-    double most = 0, thin = HUGE_VAL;
+    double speed2 = 0, turns = 0, thin = HUGE_VAL;
     for (size_t slot = 0; slot < c->slot_count; ++slot) {
         const struct sadmm_proxy *p = &c->proxies[slot];
         if (!(c->state[slot] & SLOT_PRESENT) || !sadmm_body_moves(p->system_body)) continue;
-        most = larger_of(most, length3(p->velocity) * input->dt + p->spin + p->fall);
+        speed2 = larger_of(speed2, dot3(p->velocity, p->velocity));
+        turns = larger_of(turns, p->spin + p->fall);
         thin = smaller_of(thin, p->thin);
     }
-    return 2 * most > thin;
+    return 2 * (sqrt(speed2) * input->dt + turns) > thin;
 }
 
 bool sadmm_collision_list_fast(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
