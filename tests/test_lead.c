@@ -27,12 +27,14 @@ START_TEST(kinds)
         {TOUCH_INNER | TOUCH_SMOOTH, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
         /* nor is what gravity gives its bodies the same */
         {TOUCH_INNER | TOUCH_DIFFERS, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
+        {TOUCH_INNER | TOUCH_DIFFERS, TOUCH_MOVED, LEAD_OWN},
+        {TOUCH_INNER | TOUCH_DIFFERS | TOUCH_SMOOTH, TOUCH_MOVED, LEAD_STAYS},
         {TOUCH_INNER | TOUCH_FRICTION | TOUCH_DIFFERS, TOUCH_CARRIED | TOUCH_MOVED, LEAD_OWN},
     };
     ck_assert_int_eq(lead_kind_of(cases[_i].island, cases[_i].body), cases[_i].kind);
 }
 END_TEST
-enum { KINDS = 14 };
+enum { KINDS = 16 };
 
 START_TEST(half_of_the_change)
 {

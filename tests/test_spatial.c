@@ -147,6 +147,24 @@ START_TEST(turns_can_be_taken_back)
 }
 END_TEST
 
+/* What turns by more than is followed in a step, 1e5 rad here, keeps its energy and its angular momentum. */
+START_TEST(any_spin_is_finite)
+{
+    uint64_t seed = 17;
+    for (int trial = 0; trial < fewer(20); ++trial) {
+        double moments[3];
+        random_moments(&seed, 0.1, moments);
+        const vec3 inertia = v3_load(moments), w = v3(4e6, 5e6 * random_number(&seed), 5e6 * random_number(&seed));
+        const struct rigid_spin start = {random_turn(&seed), w}, there = rigid_tumble(start, inertia, 0.02);
+        const vec3 before = rigid_angular_momentum(start.orientation, inertia, start.angular),
+                   after = rigid_angular_momentum(there.orientation, inertia, there.angular);
+        /* rounding of 4,096 turns */
+        ck_assert_double_lt(off(after, before), 1e-11 * v3_norm(before));
+        ck_assert_double_eq_tol(v3_dot(after, there.angular), v3_dot(before, w), 1e-11 * v3_dot(before, w));
+    }
+}
+END_TEST
+
 /* A body that turns about a principal axis turns by spin x time, whatever its moments. */
 START_TEST(spins_about_principal_axes_are_exact)
 {
@@ -397,6 +415,7 @@ int main(void)
     tcase_set_timeout(cases, 60);
     suite_add_tcase(suite, cases);
     tcase_add_test(cases, turns_can_be_taken_back);
+    tcase_add_test(cases, any_spin_is_finite);
     tcase_add_loop_test(cases, free_bodies_keep_angular_momentum, 0, SOLVERS);
     tcase_add_test(cases, spins_about_principal_axes_are_exact);
     tcase_add_loop_test(cases, torques_add_to_angular_momentum, 0, SOLVERS);

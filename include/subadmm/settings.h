@@ -120,7 +120,8 @@ typedef struct sadmm_settings {
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
 
     int hits;                    /* worlds on ref and cpu: bodies in flight that hit something, faster than
-                                    restitution_threshold and with restitution (of either shape), do so at the moment
+                                    restitution_threshold and with restitution (of either shape), or a body that moves
+                                    so fast that they pass by their own thickness in a step, do so at the moment
                                     of their first touch within the (sub-)step, so many times each at most; one that
                                     would be hit more often is left to the solve, and so is what rests on something,
                                     has joints, or hits a mesh (docs/algorithm.md, section 6). In

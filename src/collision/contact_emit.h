@@ -49,6 +49,18 @@ struct pair_motion {
     double closed; /* by the centres of mass, along the normal, and by what the shifts make of turning in the step, m */
 };
 
+/* The share of a way across the normal that arms may take up: an impulse on a longer arm turns its body instead of
+ * stopping it, by a share of the approach that goes as the arm's square, and that may be a way through what is thin. */
+#define ARMS_GIVE 0.02
+SADMM_RARE double arms_take(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
+                            const double way[3], double dt)
+{
+    const double thin = smaller_of(a->thin, b->thin), along = dot3(normal, way),
+                 across = dot3(way, way) - along * along, step = relative_speed(a->velocity, b->velocity) * dt,
+                 most = ARMS_GIVE * thin * thin * thin;
+    return across * step > most ? sqrt(most / (across * step)) : 1;
+}
+
 /* ahead: manifold.ahead; by how much the shapes are turned ahead. The point stays where it is on a body beside one that is
  * not dynamic. Of two dynamic bodies the arms of the one that is harder to turn take up most of the way: those of a bullet
  * must be its own. */
@@ -60,18 +72,20 @@ SADMM_INLINE void pair_motion_at(const struct sadmm_proxy *a, double ahead_a, co
     const double inertia = a->inertia + b->inertia, share_a = !both ? 0 : inertia > 0 ? a->inertia / inertia : 0.5,
                  share_b = !both ? 0 : inertia > 0 ? b->inertia / inertia : 0.5;
     double across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0}; /* n x w, since n . (w x r) = r . (n x w) */
+    double way[3], take;
     int k;
     add_cross(normal, a->angular, 1, across_a);
     add_cross(normal, b->angular, 1, across_b);
+    for (k = 0; k < 3; ++k) way[k] = way_ahead(a, b, ahead, k);
+    take = both && !is_midway(ahead, dt) ? arms_take(a, b, normal, way, dt) : 1;
     m->closed = 0;
     for (k = 0; k < 3; ++k) {
-        const double way = way_ahead(a, b, ahead, k);
-        m->between[k] = b->com[k] - a->com[k] + way;
-        m->shift_a[k] = -share_a * way;
-        m->shift_b[k] = share_b * way;
+        m->between[k] = b->com[k] - a->com[k] + way[k];
+        m->shift_a[k] = -share_a * (take * way[k]);
+        m->shift_b[k] = share_b * (take * way[k]);
         m->turn_a[k] = ahead_a * across_a[k];
         m->turn_b[k] = -ahead_b * across_b[k];
-        m->closed -= normal[k] * way;
+        m->closed -= normal[k] * way[k];
     }
     m->closed += dt * (dot3(across_a, m->shift_a) - dot3(across_b, m->shift_b));
 }

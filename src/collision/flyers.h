@@ -27,10 +27,16 @@ void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const
                                   unsigned char *flyers);
 
 /* The pairs of shapes, as (a << 32 | b) in the order of pairs, that approach faster than the threshold, at least as far
- * as their velocities and boxes tell, and of which either has restitution: what has none comes as far as the surface in
- * the step in which it is found, as the solve has it. After look_ahead. False: out of memory. */
+ * as their velocities and boxes tell, and of which either has restitution (bounces: any shape has), or which pass: other
+ * pairs come as far as the surface in the step in which they are found, as the solve has it. After look_ahead. False:
+ * out of memory. */
 bool sadmm_collision_list_fast(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
-                               double threshold, struct sadmm_pair_list *list);
+                               double threshold, bool bounces, struct sadmm_pair_list *list);
+/* Are they a dynamic body and one that moves that the solve might let through each other? Their way within the step is
+ * longer than the thinner one is thick, and takes part in the impact, or the one that is harder to turn goes round. */
+bool sadmm_collision_passes(const struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                            uint64_t key);
+
 /* Do both of a pair take part, one of them at least as a dynamic body? */
 bool sadmm_collision_may_hit(const struct sadmm_collision *collision, const unsigned char *flyers, uint64_t key);
 

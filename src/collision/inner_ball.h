@@ -22,6 +22,11 @@
 #define INNER_BALL_ALONE      4.0
 /* Bodies whose surface turns by less than this share of their thickness in a step do not sink by turning. */
 #define INNER_TURNS           0.02
+/* Shares of the thinner shape. Deeper than that which way out a manifold says is a question. A body that rocks by so much
+ * in a step may sink on by points that take turns, each of them deeper than the last. */
+#define INNER_ASKS_SIDE       0.5
+#define INNER_SINKS           0.05
+#define INNER_ROCKS           0.2
 /* Features of the two bodies' balls, and of a deepest point; no other has them. */
 #define INNER_BALL_FEATURE    0xfffffff0u
 #define INNER_DEEPEST_FEATURE 0xfffffff4u
@@ -90,6 +95,7 @@ SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sad
     found->radius = (real)ball->geometry.size[0];
     m.count = 0;
     m.cache = 0;
+    m.normal = v3(0, 0, 1);
     ball_manifold(&first->geometry, &second->geometry, hulls, child, &pose, &m);
     if (m.count == 0) return false;
     point = &m.points[0];
@@ -201,6 +207,14 @@ SADMM_INLINE bool inner_is_held(const struct manifold *m, vec3 centre, real sepa
     return false;
 }
 
+/* Does the body tumble about an axis across the normal, so that points let its centre of mass come down by turning? */
+SADMM_INLINE bool inner_tumbles(const struct sadmm_proxy *p, const double Rb[9], vec3 n, double dt)
+{
+    double normal[3];
+    rotate_to_world(Rb, n, normal);
+    return turning_speed(p, normal, 1) * dt > MIDWAY_TURN;
+}
+
 /* Along the manifold's normal, against the outermost of its points on the other shape, unless they hold it. */
 SADMM_INLINE void inner_along(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct sadmm_proxy *proxy,
                               double dt, const struct inner_ball *ball, struct manifold *m)
@@ -215,7 +229,8 @@ SADMM_INLINE void inner_along(const struct sadmm_proxy *a, const struct sadmm_pr
         const real at = v3_dot(m->normal, m->points[k].position) + side * m->points[k].separation / 2;
         if (k == 0 || side * at < side * offset) offset = at;
     }
-    if (!inner_is_held(m, centre, side * (offset - v3_dot(m->normal, centre)) - ball->radius, ball->radius))
+    if (inner_tumbles(proxy, of_b.R, m->normal, dt) ||
+        !inner_is_held(m, centre, side * (offset - v3_dot(m->normal, centre)) - ball->radius, ball->radius))
         inner_add_ball(ball, centre, offset, m);
 }
 
@@ -226,10 +241,11 @@ SADMM_INLINE bool inner_forgets(const struct sadmm_proxy *a, const struct sadmm_
     return turning_rate(a->angular) * dt > MIDWAY_TURN || turning_rate(b->angular) * dt > MIDWAY_TURN;
 }
 
-/* Is a manifold so deep that which way is out is a question? */
-SADMM_INLINE bool inner_is_deep(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct manifold *m)
+/* Is a manifold deep by more than this share of the thinner shape? */
+SADMM_INLINE bool inner_is_deep(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct manifold *m,
+                                double share)
 {
-    const double deep = -0.5 * smaller_of(a->thin, b->thin);
+    const double deep = -share * smaller_of(a->thin, b->thin);
     int k;
     for (k = 0; k < m->count; ++k)
         if ((double)m->points[k].separation < deep) return true;
@@ -258,7 +274,8 @@ SADMM_INLINE void inner_ball_add(const struct sadmm_proxy *a, const struct sadmm
         (m->count > 0 &&
          ((ball.hits && 2 * ball.separation > -ball.radius) ||
           (along < -INNER_BALL_ALONG && !remembers && ball.separation > -ball.radius &&
-           (double)ball.separation < geometry_radius(&(of_b ? b : a)->geometry) && inner_is_deep(a, b, m)))))
+           (double)ball.separation < geometry_radius(&(of_b ? b : a)->geometry) &&
+           inner_is_deep(a, b, m, INNER_ASKS_SIDE)))))
         inner_instead(a, b, hulls, dt, &ball, m);
     if (!alone) return;
     m->points[0] = m->points[1];
@@ -335,7 +352,7 @@ SADMM_INLINE bool inner_is_asked(const struct sadmm_proxy *a, const struct sadmm
                                  const struct manifold *m)
 {
     return fall_of(gravity, dt) + a->fall + b->fall > 2 * MIDWAY_TRAVEL * smaller_of(a->thin, b->thin) ||
-           (inner_is_deep(a, b, m) && inner_forgets(a, b, dt));
+           (a->spin + b->spin > INNER_ROCKS * smaller_of(a->thin, b->thin) && inner_is_deep(a, b, m, INNER_SINKS));
 }
 
 #endif

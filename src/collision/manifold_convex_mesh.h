@@ -188,6 +188,13 @@ SADMM_INLINE uint32_t convex_best_axis(const struct convex_triangle *p, struct c
     return cache;
 }
 
+/* The middle of the body: a cone's origin is halfway up, and comes through with the tip. */
+SADMM_INLINE vec3 convex_middle(const struct convex_pair *pair)
+{
+    const vec3 centroid = v3(0, 0, pair->a.form == CONVEX_CONE ? -pair->a.size.y / 2 : 0);
+    return v3_add(m3_mul(pair->R, centroid), pair->t);
+}
+
 /* Where the surface does not push along the axis of least depth, or of the nearest points (mesh_by_surface). */
 SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct convex_axis *nearest, bool kept_front,
                                   real limit, struct manifold *m)
@@ -215,7 +222,7 @@ SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct 
     if (!front || (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5)) {
         const real more = front ? MESH_SHALLOW : MANIFOLD_KEEP_EXTENT;
         if (m->count > 0 && least < 4 * real_min(nearest->separation, 0) - more * pair->thin &&
-            !(front && mesh_came_through_front(&p->mesh, &p->triangle, pair->t, m)))
+            !(front && mesh_came_through_front(&p->mesh, &p->triangle, convex_middle(pair), m)))
             m->count = 0;
     }
     convex_mesh_give(p, cache, axis.separation, m);
@@ -240,7 +247,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     shallow = p.front.separation >= -MESH_SHALLOW * p.pair.thin;
     if (convex_lies_on(&p, flat || cache == of_front, limit, m) || flat) {
         if (flat && m->count > 0 && !shallow && cache != of_front &&
-            !mesh_came_through_front(&p.mesh, &p.triangle, p.pair.t, m))
+            !mesh_came_through_front(&p.mesh, &p.triangle, convex_middle(&p.pair), m))
             m->count = 0;
         m->cache = of_front;
         convex_mesh_give(&p, of_front, p.front.separation, m);

@@ -35,8 +35,11 @@ enum lead_kind {
 
 SADMM_INLINE enum lead_kind lead_kind_of(int island, int body)
 {
-    if (island & TOUCH_INNER && !(island & TOUCH_FRICTION))
-        return island & (TOUCH_SMOOTH | TOUCH_DIFFERS) ? LEAD_STAYS : LEAD_SHARED;
+    if (island & TOUCH_INNER && !(island & TOUCH_FRICTION)) {
+        if (!(island & (TOUCH_SMOOTH | TOUCH_DIFFERS))) return LEAD_SHARED;
+        /* forces alone move a body that nothing presses on, and by its own lead it keeps its angular momentum */
+        return island & TOUCH_SMOOTH || body & TOUCH_CARRIED ? LEAD_STAYS : LEAD_OWN;
+    }
     if (!(body & TOUCH_CARRIED)) return LEAD_OWN;
     return island & TOUCH_JOLT || !(body & TOUCH_MOVED) ? LEAD_STAYS : LEAD_OWN;
 }

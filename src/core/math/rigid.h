@@ -154,13 +154,16 @@ SADMM_INLINE real rigid_rate2(vec3 inertia, vec3 own)
     return rate2 / scale;
 }
 
-/* How many pieces a motion without torque is made in: of half a radian at most, in which Newton's method closes in at
- * once. The way back is made in as many. */
-SADMM_INLINE int rigid_pieces(vec3 inertia, real energy2, real momentum2, real dt)
+/* In how many pieces of half a radian at most, in which Newton's method closes in at once, a motion without torque goes.
+ * The way back goes in as many. */
+SADMM_INLINE real rigid_pieces(vec3 inertia, real energy2, real momentum2, real dt)
 {
     real scale, square = dt * dt * rigid_rate2_scaled(inertia, energy2, momentum2, &scale);
-    return 4 * square > scale ? (int)real_min(2 * real_sqrt(square / scale) + 1, (real)4096) : 1;
+    return 4 * square > scale ? 2 * real_sqrt(square / scale) + 1 : 1;
 }
+/* The most that are made: what turns by more than that in a step has gone round too often to ask where it is by then, but
+ * its energy and its angular momentum stay. */
+enum { RIGID_PIECES = 4096 };
 
 /* A piece of twice `half`: turned about the mean by 2 atan(half |m|). */
 SADMM_INLINE struct rigid_tumbling rigid_tumble_piece(struct rigid_tumbling from, vec3 c, real half)
@@ -186,9 +189,12 @@ SADMM_ALWAYS_INLINE struct rigid_tumbling rigid_tumble_on(struct rigid_tumbling 
 {
     const vec3 p = v3(inertia.x * from.own.x, inertia.y * from.own.y, inertia.z * from.own.z);
     const real energy2 = v3_dot(p, from.own), momentum2 = v3_norm2(p);
-    const int pieces = rigid_pieces(inertia, energy2, momentum2, dt);
-    const real half = pieces > 1 ? dt / (real)(2 * pieces) : dt / 2, rate2 = energy2 / momentum2 * energy2,
-               stretched = half * rigid_half_tangent(half * half * rate2);
+    const real all = rigid_pieces(inertia, energy2, momentum2, dt);
+    const int pieces = all < RIGID_PIECES ? (int)all : RIGID_PIECES;
+    const real half = all > RIGID_PIECES ? dt / (2 * all)
+                      : pieces > 1       ? dt / (real)(2 * pieces)
+                                         : dt / 2,
+               rate2 = energy2 / momentum2 * energy2, stretched = half * rigid_half_tangent(half * half * rate2);
     const vec3 c = v3(stretched * ((inertia.z - inertia.y) / inertia.x),
                       stretched * ((inertia.x - inertia.z) / inertia.y),
                       stretched * ((inertia.y - inertia.x) / inertia.z));

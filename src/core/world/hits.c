@@ -2,22 +2,24 @@
  *
  * A solve knows one velocity of a body in a step. What is hit within it by a body that was just hit, or hit twice, asks
  * for several. So before contacts are found, bodies that no contact carries are followed along their ways: pairs that
- * approach faster than the threshold of restitution are taken one after the other, in the order of the time at which
- * they first touch, each with the law of impact there (core/math/hit.h), and what the two come near from then on is
- * looked for again. A body is then given the start from which it would be where it is, with the velocity that it has:
+ * bounce and approach faster than the threshold of restitution, or pass (flyers.h), are taken one after the other, in
+ * the order of the time at which they first touch, each with the law of impact there (core/math/hit.h), and what the
+ * two come near from then on is looked for again. A body is then given the start from which it would be where it is,
+ * with the velocity that it has:
  *
  *     x~ = x(t) - t v~ - t^2/2 a,      v~ = v(t)+ - t a
  *
  * and what follows, contact finding, solve and motion, sees an ordinary state; a pair's motion begins at the last hit of
  * either (`since`, collision.h). What rests on something, or has joints, is left to the solve, and so is, from the
- * sub-step's start, what would be hit more often than settings.hits times in it.
+ * sub-step's start, what would be hit more often than settings.hits times in it; what passes, which would go through
+ * then, is from its last hit on.
  *
  * Order: by time, then by the pair's slots: results do not depend on threads. */
 #include <math.h>
 #include <string.h>
 
 #include "collision/broad_phase.h"
-#include "collision/first_touch.h"
+#include "collision/flight_touch.h"
 #include "collision/flyers.h"
 #include "collision/geometry.h"
 #include "core/base/memory.h"
@@ -35,6 +37,8 @@ struct flyer {
     struct sadmm_flight flight;
     uint32_t hits; /* that it has had: what was foreseen before the last one does not hold */
     bool too_many; /* there would be more than it may have */
+    bool passes;   /* it may go through what is thin: the hits it has had are kept then, */
+    bool ended;    /* and what comes after them is left to the solve */
 };
 
 /* A hit that is foreseen. */
@@ -43,7 +47,7 @@ struct foreseen {
     uint32_t child;
     int32_t flyer[2];
     uint32_t hits[2];
-    struct sadmm_first_touch touch;
+    struct sadmm_flight_touch touch;
 };
 
 struct sadmm_hits {
@@ -263,6 +267,9 @@ static struct sadmm_flying_shape shape_of(const struct taking *t, uint32_t slot,
     return out;
 }
 
+/* The body is followed no further. */
+static void give_up(struct flyer *f) { *(f->passes ? &f->ended : &f->too_many) = true; }
+
 /* When do two shapes hit each other, from `from` on? False: out of memory. */
 static bool foresee(struct taking *t, uint64_t key, double from)
 {
@@ -274,12 +281,12 @@ static bool foresee(struct taking *t, uint64_t key, double from)
     const struct flyer *a = &h->list[number[0]], *b = &h->list[number[1]];
     struct sadmm_flying_pair pair = {
         shape_of(t, slot[0], a), shape_of(t, slot[1], b), t->input.hulls, 0, t->settings.restitution_threshold, false};
-    struct sadmm_first_touch touch;
+    struct sadmm_flight_touch touch;
     /* What the triangles of a mesh push along depends on those around them, which one touch by itself does not see: that
      * is left to the solve. */
     if (pair.b.geometry->type == SADMM_SHAPE_MESH) return true;
-    const bool found = sadmm_first_touch(&pair, from, t->settings.dt, &touch);
-    if (pair.lost) h->list[number[0]].too_many = h->list[number[1]].too_many = true;
+    const bool found = sadmm_flight_touch(&pair, from, t->settings.dt, &touch);
+    for (int side = 0; pair.lost && side < 2; ++side) give_up(&h->list[number[side]]);
     if (!found) return true;
     if (!sadmm_grow(&h->foreseen, &h->foreseen_capacity, h->foreseen_count, h->foreseen_count + 1, sizeof *h->foreseen))
         return false;
@@ -349,7 +356,7 @@ static void hit_body_of(const struct flyer *f, const struct sadmm_flight_pose *p
 static void make_hit(const struct taking *t, const struct foreseen *item, const struct sadmm_flight_pose pose[2],
                      struct hit *hit)
 {
-    const struct sadmm_first_touch *touch = &item->touch;
+    const struct sadmm_flight_touch *touch = &item->touch;
     memset(hit, 0, sizeof *hit);
     sadmm_collision_pair_law(t->world->collision, &t->input, item->key, &hit->friction, &hit->restitution);
     hit->threshold = t->settings.restitution_threshold;
@@ -536,16 +543,30 @@ static bool may_hit(struct taking *t, const struct foreseen *item)
     for (int side = 0; side < 2; ++side) {
         struct flyer *f = &t->hits->list[item->flyer[side]];
         if (f->hits < (uint32_t)t->settings.hits) continue;
-        f->too_many = true;
+        give_up(f);
         may = false;
     }
     return may;
+}
+
+/* Both of a pair that may go through each other. False: out of memory. */
+static bool note_passing(struct taking *t, uint64_t key)
+{
+    if (!sadmm_collision_passes(t->world->collision, &t->input, key)) return true;
+    const int32_t number[2] = {flyer_of(t, t->world->shapes[key >> 32].body),
+                               flyer_of(t, t->world->shapes[(uint32_t)key].body)};
+    if (number[0] < 0 || number[1] < 0) return false;
+    t->hits->list[number[0]].passes = t->hits->list[number[1]].passes = true;
+    return true;
 }
 
 static bool take_all(struct taking *t)
 {
     struct sadmm_hits *h = t->hits;
     bool ok = true;
+    for (size_t k = 0; ok && k < h->fast.count; ++k)
+        if (sadmm_collision_may_hit(t->world->collision, h->flyers, h->fast.keys[k]))
+            ok = note_passing(t, h->fast.keys[k]);
     for (size_t k = 0; ok && k < h->fast.count; ++k)
         if (sadmm_collision_may_hit(t->world->collision, h->flyers, h->fast.keys[k]))
             ok = foresee(t, h->fast.keys[k], 0);
@@ -585,7 +606,8 @@ static sadmm_status look_ahead(struct taking *t)
 {
     sadmm_world *world = t->world;
     TRY(sadmm_collision_look_ahead(world->collision, &t->input, &world->error));
-    if (sadmm_collision_list_fast(world->collision, &t->input, t->settings.restitution_threshold, &t->hits->fast))
+    if (sadmm_collision_list_fast(world->collision, &t->input, t->settings.restitution_threshold,
+                                  world->bouncing_count > 0, &t->hits->fast))
         return SADMM_OK;
     sadmm_collision_look_again(world->collision);
     return sadmm_fail_memory(&world->error, "hits");
@@ -622,7 +644,7 @@ sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep)
     forget(world);
     if (substep == 0) world->start.hit_count = 0;
     world->start.hit_first = world->start.hit_count;
-    if (world->bouncing_count == 0 || t.settings.hits == 0 || world->kernels->backend == SADMM_BACKEND_CUDA ||
+    if (t.settings.hits == 0 || world->kernels->backend == SADMM_BACKEND_CUDA ||
         !any_fast(world, t.settings.restitution_threshold))
         return SADMM_OK;
     if (!world->hits) world->hits = (struct sadmm_hits *)sadmm_alloc(1, sizeof *world->hits);
@@ -646,12 +668,20 @@ static double approach_of(const struct sadmm_contact_pair *pair, const struct sa
     return speed;
 }
 
-/* The flight of a shape's body, NULL: it was not followed. */
-static const struct sadmm_flight *flight_of(const sadmm_world *world, int32_t shape)
+/* The flyer of a shape's body, NULL: it was not followed to the end. */
+static const struct flyer *followed_of(const sadmm_world *world, int32_t shape)
 {
     const struct sadmm_hits *h = world->hits;
     const int32_t slot = world->shapes[shape].body, number = h->index[slot] - 1;
-    return number < 0 || h->flyers[slot] == SADMM_FLYER_NONE ? NULL : &h->list[number].flight;
+    return number < 0 || h->flyers[slot] == SADMM_FLYER_NONE || h->list[number].ended ? NULL : &h->list[number];
+}
+
+/* Was the pair followed? */
+static bool is_followed(const sadmm_world *world, const struct sadmm_contact_pair *pair, const struct flyer *a,
+                        const struct flyer *b)
+{
+    return a && b && (pair->restitution > 0 || a->hits > 0 || b->hits > 0) &&
+           world->geometries[world->shapes[pair->shape_b].geometry].type != SADMM_SHAPE_MESH;
 }
 
 static double thinner_of(const sadmm_world *world, const struct sadmm_contact_pair *pair)
@@ -670,13 +700,13 @@ void sadmm_world_open_gaps(sadmm_world *world)
     if (!world->hits || world->hits->count == 0) return;
     for (size_t p = 0; p < world->contacts.pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
-        if (!(pair->restitution > 0)) continue;
-        const struct sadmm_flight *a = flight_of(world, pair->shape_a), *b = flight_of(world, pair->shape_b);
-        if (!a || !b || world->geometries[world->shapes[pair->shape_b].geometry].type == SADMM_SHAPE_MESH) continue;
+        const struct flyer *a = followed_of(world, pair->shape_a), *b = followed_of(world, pair->shape_b);
+        if (!is_followed(world, pair, a, b)) continue;
         const double most = OPENED_MOST * thinner_of(world, pair);
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             struct sadmm_contact_point *point = &world->contacts.points[k];
-            const double speed = approach_of(pair, point, a, b, settings.dt), way = (1 + OPEN) * speed * settings.dt;
+            const double speed = approach_of(pair, point, &a->flight, &b->flight, settings.dt),
+                         way = (1 + OPEN) * speed * settings.dt;
             if (speed > settings.restitution_threshold && way > point->gap && way - point->gap <= most)
                 point->gap = way;
         }

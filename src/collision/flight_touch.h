@@ -2,9 +2,12 @@
  *
  * By conservative advancement: no point of either comes closer along the normal of the distance than the centres of mass
  * and the rotations allow, so that the pair is moved on by what that takes, and again from there. Near the touch the
- * points that approach are followed to where their separation is 0. Host alone, in double. */
-#ifndef SADMM_COLLISION_FIRST_TOUCH_H
-#define SADMM_COLLISION_FIRST_TOUCH_H
+ * points that approach are followed to where their separation is 0. Host alone, in double.
+ *
+ * For hits (core/world/hits.c), along ways that bend. What contact finding moves on by is advance.h, along straight ones
+ * of the whole step, and not as far as a touch. */
+#ifndef SADMM_COLLISION_FLIGHT_TOUCH_H
+#define SADMM_COLLISION_FLIGHT_TOUCH_H
 
 #include "collision.h"
 #include "manifold.h"
@@ -48,7 +51,7 @@ struct sadmm_flying_pair {
 };
 
 /* Where they touch. */
-struct sadmm_first_touch {
+struct sadmm_flight_touch {
     double time;      /* s after the step's start */
     double normal[3]; /* world, from a to b */
     int count;
@@ -57,10 +60,10 @@ struct sadmm_first_touch {
 };
 
 /* False: no point touches in [from, to] that approaches fast enough. Points of the result: all that touch then. */
-bool sadmm_first_touch_of(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_first_touch *touch);
+bool sadmm_flight_touch_of(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_flight_touch *touch);
 
 /* The first of all children of the pair, none of which is a mesh; `child`: which. */
-bool sadmm_first_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_first_touch *touch);
+bool sadmm_flight_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_flight_touch *touch);
 
 #ifdef __cplusplus
 }

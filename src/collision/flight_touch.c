@@ -1,4 +1,4 @@
-#include "first_touch.h"
+#include "flight_touch.h"
 
 #include <string.h>
 
@@ -153,7 +153,7 @@ static double first_point(const struct sadmm_flying_pair *p, const struct moment
     return first;
 }
 
-static void keep(const struct moment *at, double t, double together, struct sadmm_first_touch *touch)
+static void keep(const struct moment *at, double t, double together, struct sadmm_flight_touch *touch)
 {
     touch->time = t;
     touch->count = 0;
@@ -195,7 +195,7 @@ static bool balls_meet(const struct sadmm_flying_pair *p, double from, double to
     return length3(x) <= (1 + NEAR) * (reach + sags);
 }
 
-bool sadmm_first_touch_of(struct sadmm_flying_pair *p, double from, double to, struct sadmm_first_touch *touch)
+bool sadmm_flight_touch_of(struct sadmm_flying_pair *p, double from, double to, struct sadmm_flight_touch *touch)
 {
     const double thin = thinner(p), passed = passed_at_once(p, to - from);
     struct moment at;
@@ -233,15 +233,15 @@ bool sadmm_first_touch_of(struct sadmm_flying_pair *p, double from, double to, s
 
 /* The earlier of the two. */
 static bool is_earlier(struct sadmm_flying_pair *pair, double from, double to, bool found,
-                       const struct sadmm_first_touch *best, struct sadmm_first_touch *touch)
+                       const struct sadmm_flight_touch *best, struct sadmm_flight_touch *touch)
 {
-    return sadmm_first_touch_of(pair, from, found ? best->time : to, touch) && (!found || touch->time < best->time);
+    return sadmm_flight_touch_of(pair, from, found ? best->time : to, touch) && (!found || touch->time < best->time);
 }
 
-bool sadmm_first_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_first_touch *touch)
+bool sadmm_flight_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_flight_touch *touch)
 {
     const uint32_t children = pair_children(pair->a.geometry, pair->b.geometry);
-    struct sadmm_first_touch own;
+    struct sadmm_flight_touch own;
     uint32_t first = 0;
     bool found = false;
     for (pair->child = 0; pair->child < children; ++pair->child) {
