@@ -50,12 +50,6 @@ static __device__ __forceinline__ bool as_planned(const model_view &model, const
            (!joints || guess.rows == (constraints > 0)) && !(guess.apart && step.control->joints.together);
 }
 
-/* Has the step no need of a second problem, or is it planned (step/push.h)? Once all contacts have spoken. */
-static __device__ __forceinline__ bool pushes_as_planned(const push_view &push)
-{
-    return push.planned || !push.bits || *push.due == 0;
-}
-
 /* The grid's first thread compares the statistics with the plan; what runs now and what was assembled is of no use when
  * they differ. Scalars are 0 for the iterations (enum cuda_scalar). */
 static __device__ __forceinline__ void check_plan(const model_view &model, const iteration_view &iteration,

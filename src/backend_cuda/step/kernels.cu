@@ -292,6 +292,19 @@ static __global__ void __launch_bounds__(TURN_THREADS)
     if (again || joined) move_once_more(v, i, again, joined);
 }
 
+/* Has the step no need of a second problem, or one that fits (step/push.h)? Once all contacts have spoken. */
+static __device__ __forceinline__ bool pushes_as_planned(const push_view &push)
+{
+    return !push.bits || (push.planned ? push.due[1] : push.due[0]) == 0;
+}
+
+/* Sub-steps with pushes, this one included. */
+static __device__ __forceinline__ int32_t count_pushed(const push_view &push, int32_t before)
+{
+    if (!push.bits || before < 0) return before;
+    return push.due[1] ? -1 : before + (push.due[0] != 0);
+}
+
 /* ---- turn ------------------------------------------------------------------------------------------------------ */
 
 /* What has become of the sub-step. One thread, once it has ended. */
@@ -306,7 +319,7 @@ static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cu
     const struct cuda_step_totals none = {0, -1, 0, 0, 0, 0, 0, {}};
     const struct cuda_step_control *control = v.step.control;
     struct cuda_step_totals totals = v.step.substep > 0 ? control->totals : none;
-    totals.pushed += v.push.bits && *v.push.due != 0;
+    totals.pushed = count_pushed(v.push, totals.pushed);
     const bool constrained = control->counts.points > 0 || control->joints.constraints > 0;
     const int32_t limited = v.step.limits ? *v.islands.limited : 0, islands = v.model.statistics->islands;
     double iterations = constrained ? args.count : 1;

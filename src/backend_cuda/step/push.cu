@@ -1,11 +1,12 @@
 /* Islands that are pushed apart without a velocity (core/solve/push.h): the second problem of a step, in a context of its
- * own, in tier STREAM, which any contacts fit in. It has all bodies, under their own numbers, and the pairs of the
+ * own. Its partition is made for as many contacts as the step may have. It has all bodies, under their own numbers, and the pairs of the
  * islands that are pushed, one after the other; where there are none its kernels leave at once. */
 #include "backend_cuda/device/double.h"
 
 #include "backend_cuda/device/parallel.h"
 #include "backend_cuda/device/plan_check.h"
 #include "backend_cuda/graph/graph.h"
+#include "backend_cuda/iterate/iterate.h"
 #include "move.h"
 #include "push.h"
 #include "world.h"
@@ -128,6 +129,7 @@ static __device__ __noinline__ void move_island(const cuda_view &v, int32_t labe
 static __global__ void push_move_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t i = thread_index();
+    if (i == 0 && v.push.live->abort_code == ABORT_PARTITION) v.push.due[1] = 1;
     if (i >= v.model.bodies || v.push.live->abort_code) return;
     const int32_t label = v.graph.label[i];
     const double dt = v.model.settings->dt;
@@ -189,15 +191,14 @@ static sadmm_status reserve_second(struct sadmm_context *c, struct sadmm_error *
     TRY(CUDA(wait)(p, error));
     CUDA(plan_second)(c);
     p->bounces = c->bounces;
-    p->partition = {};
-    p->partition.tier = SADMM_CUDA_TIER_STREAM;
-    p->partition.islands = true;
     p->statistics = c->statistics;
+    p->wanted = s->push_streams ? SADMM_CUDA_TIER_STREAM : SADMM_CUDA_TIER_AUTO;
     v->model.bodies = s->bodies;
     v->model.settings = c->view.model.settings; /* the same numbers, whatever edits make of them */
     v->model.points = 0;
     v->contacts.pair_capacity = c->view.contacts.pair_capacity;
     v->raw.system = c->view.raw.system;
+    TRY(CUDA(choose_partition)(p, &c->statistics, &p->partition, error));
     TRY(CUDA(reserve_layout)(p, error));
     TRY(CUDA(reserve_solver)(p, error));
     TRY(CUDA(reserve)(p, BUFFER_RAW_PAIRS, pairs * sizeof(struct sadmm_contact_pair), error));

@@ -162,8 +162,9 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         if (s->misfit == first && known) c->refused |= 1u << c->partition.tier;
         s->misfit = first;
     }
-    if (report->abort_code == ABORT_PLAN && report->totals.pushed > 0) {
+    if (report->abort_code == ABORT_PLAN && report->totals.pushed != 0) {
         s->pushes = true;
+        s->push_streams = s->push_streams || report->totals.pushed < 0;
         s->quiet = 0;
     }
     if (report->abort_code == ABORT_REACH) s->careful = CAREFUL_STEPS;

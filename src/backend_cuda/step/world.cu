@@ -135,6 +135,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->edited = 0;
     s->apart = false;
     s->quiet = 0;
+    s->push_streams = false;
     s->untouched = 0;
     s->patience = LEAST_PATIENCE;
     for (struct queued_step &q : s->queue) q.edit_count = 0;

@@ -64,6 +64,7 @@ struct cuda_step {
         patience; /* steps that could have been so since one could not; that it takes for it to be tried */
 
     bool pushes;                /* planned: islands are pushed apart, in a second problem (push.cu), */
+    bool push_streams;          /* which has not fitted its partition once: tier STREAM */
     int32_t quiet;              /* but none has been for so many steps */
     struct sadmm_context *push; /* of that; made with the first one */
 
