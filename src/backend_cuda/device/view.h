@@ -310,7 +310,7 @@ struct driven_view {
 /* Islands that are pushed apart without a velocity (core/solve/push.h, step/push.h). In worlds alone. */
 struct push_view {
     int32_t planned;           /* the (sub-)step has a second problem */
-    int32_t *due;              /* not 0: some island is pushed; behind it: not 0: the second problem did not fit */
+    int32_t *due;              /* enum push_number: of the sub-step */
     int32_t *bits;             /* bodies: at labels of islands what pairs say (core/model/push_law.h); else NULL */
     unsigned long long *units; /* likewise: int64_t */
     /* where it is planned: */

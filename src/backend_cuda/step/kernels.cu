@@ -295,14 +295,14 @@ static __global__ void __launch_bounds__(TURN_THREADS)
 /* Has the step no need of a second problem, or one that fits (step/push.h)? Once all contacts have spoken. */
 static __device__ __forceinline__ bool pushes_as_planned(const push_view &push)
 {
-    return !push.bits || (push.planned ? push.due[1] : push.due[0]) == 0;
+    return !push.bits || push.due[push.planned ? PUSH_MISFIT : PUSH_DUE] == 0;
 }
 
 /* Sub-steps with pushes, this one included. */
 static __device__ __forceinline__ int32_t count_pushed(const push_view &push, int32_t before)
 {
     if (!push.bits || before < 0) return before;
-    return push.due[1] ? -1 : before + (push.due[0] != 0);
+    return push.due[PUSH_MISFIT] ? -1 : before + (push.due[PUSH_DUE] != 0);
 }
 
 /* ---- turn ------------------------------------------------------------------------------------------------------ */

@@ -48,38 +48,63 @@ static __global__ void push_hold_kernel(const __grid_constant__ cuda_view v, con
 
 /* ---- the second problem ------------------------------------------------------------------------------------------ */
 
+static __device__ __forceinline__ bool carries(const struct sadmm_contact_point *point)
+{
+    return point->impulse[0] != 0 || point->impulse[1] != 0 || point->impulse[2] != 0;
+}
+
 static __device__ __forceinline__ void gather_pair(const cuda_view &v, int32_t p)
 {
     const uint64_t place = v.push.places[p];
     struct sadmm_contact_pair pair = v.raw.pairs[p];
     const int32_t from = pair.first;
+    bool warm = false;
     pair.first = (int32_t)(uint32_t)place;
     v.push.pairs[place >> 32] = pair;
     for (int32_t k = 0; k < pair.count; ++k) {
         struct sadmm_contact_point point = v.step.points[from + k];
         point.error = 0;
         point.migrates = 0;
+        warm = warm || carries(&point);
         v.push.contacts[pair.first + k] = point;
     }
+    if (warm) atomicAdd(&v.push.due[PUSH_WARM_PAIRS], 1);
 }
 
 /* A thread a body or pair, once the step's impulses are in its points. */
 static __global__ void push_gather_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    const int32_t i = thread_index(), last = v.contacts.pair_capacity - 1;
-    const bool on = !v.model.live->abort_code && as_planned(v.model, v.step);
-    if (i == 0) {
-        const uint64_t all = v.push.places[last] + size_of(v.push.points[last]);
-        const struct cuda_live live = {on && all > 0 ? ABORT_NONE : ABORT_PLAN, v.model.bodies, (int32_t)(all >> 32),
-                                       (int32_t)(uint32_t)all};
-        *v.push.live = live;
-    }
-    if (!on) return;
-    if (i <= last && v.push.points[i] > 0) gather_pair(v, i);
+    const int32_t i = thread_index();
+    if (v.model.live->abort_code || !as_planned(v.model, v.step)) return;
+    if (i < v.contacts.pair_capacity && v.push.points[i] > 0) gather_pair(v, i);
     if (i >= v.model.bodies) return;
     solver_real velocity[6];
     end_velocity(v, i, velocity);
     for (int k = 0; k < 6; ++k) v.push.start[6 * (size_t)i + (size_t)k] = (double)velocity[k];
+}
+
+static __device__ __forceinline__ int32_t kind_of(const cuda_view &v, int32_t pairs)
+{
+    if (pairs == 0 || v.model.live->abort_code || !as_planned(v.model, v.step)) return 0;
+    return v.model.warm_start && plan_mostly_warm(pairs, v.push.due[PUSH_WARM_PAIRS]) ? PUSH_WARM : PUSH_COLD;
+}
+
+/* One thread. args.begin: it has been gathered; args.count: kinds that go on. */
+static __global__ void push_kind_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    if (threadIdx.x > 0) return;
+    const int32_t last = v.contacts.pair_capacity - 1;
+    const uint64_t all = v.push.places[last] + size_of(v.push.points[last]);
+    int32_t *kind = &v.push.due[PUSH_KIND];
+    if (args.begin) {
+        *kind = kind_of(v, (int32_t)(all >> 32));
+    } else if (*kind && v.push.live->abort_code == ABORT_PARTITION) { /* of the layout */
+        v.push.due[PUSH_MISFIT] = 1;
+        *kind = 0;
+    }
+    const struct cuda_live live = {*kind & args.count ? ABORT_NONE : ABORT_PLAN, v.model.bodies, (int32_t)(all >> 32),
+                                   (int32_t)(uint32_t)all};
+    *v.push.live = live;
 }
 
 /* ---- the way ----------------------------------------------------------------------------------------------------- */
@@ -88,7 +113,7 @@ static __global__ void push_gather_kernel(const __grid_constant__ cuda_view v, c
 static __global__ void push_way_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t i = thread_index();
-    if (i >= live_bodies(v.model)) return;
+    if (i >= v.model.bodies || !v.push.due[PUSH_KIND]) return;
     solver_real velocity[6];
     end_velocity(v, i, velocity);
     for (size_t k = 6 * (size_t)i; k < 6 * (size_t)i + 6; ++k)
@@ -129,8 +154,7 @@ static __device__ __noinline__ void move_island(const cuda_view &v, int32_t labe
 static __global__ void push_move_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t i = thread_index();
-    if (i == 0 && v.push.live->abort_code == ABORT_PARTITION) v.push.due[1] = 1;
-    if (i >= v.model.bodies || v.push.live->abort_code) return;
+    if (i >= v.model.bodies || !v.push.due[PUSH_KIND]) return;
     const int32_t label = v.graph.label[i];
     const double dt = v.model.settings->dt;
     if (!island_is_pushed(v.push, label)) return;
@@ -172,6 +196,14 @@ sadmm_status CUDA(launch_push_gather)(struct sadmm_context *c, struct sadmm_erro
     return launch(c, push_gather_kernel, "the second problem", bodies > pairs ? bodies : pairs, error);
 }
 
+sadmm_status CUDA(launch_push_kind)(struct sadmm_context *c, bool first, int kinds, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.begin = first;
+    args.count = kinds;
+    return CUDA(launch_late)(c, push_kind_kernel, "kind of the second problem", 1, WARP, &args, error);
+}
+
 sadmm_status CUDA(launch_push_move)(struct sadmm_context *c, struct sadmm_error *error)
 {
     TRY(launch(c->step->push, push_way_kernel, "ways of pushed bodies", c->view.model.bodies, error));
@@ -189,7 +221,7 @@ static sadmm_status reserve_second(struct sadmm_context *c, struct sadmm_error *
     cuda_view *v = &p->view;
     const size_t pairs = (size_t)c->view.contacts.pair_capacity;
     TRY(CUDA(wait)(p, error));
-    CUDA(plan_second)(c);
+    CUDA(plan_second)(c, false);
     p->bounces = c->bounces;
     p->statistics = c->statistics;
     p->wanted = s->push_streams ? SADMM_CUDA_TIER_STREAM : SADMM_CUDA_TIER_AUTO;
@@ -210,8 +242,10 @@ sadmm_status CUDA(reserve_push)(struct sadmm_context *c, struct sadmm_error *err
 {
     const size_t n = (size_t)c->step->bodies, pairs = (size_t)c->view.contacts.pair_capacity;
     size_t temp = 0;
-    TRY(CUDA(reserve)(c, BUFFER_PUSH, n * (sizeof(int64_t) + sizeof(int32_t)) + sizeof(int64_t), error));
-    CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_PUSH), 0, sizeof(int64_t), c->stream), "cudaMemsetAsync(pushes)");
+    TRY(CUDA(reserve)(c, BUFFER_PUSH, n * (sizeof(int64_t) + sizeof(int32_t)) + PUSH_NUMBERS * sizeof(int32_t),
+                      error));
+    CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_PUSH), 0, PUSH_NUMBERS * sizeof(int32_t), c->stream),
+              "cudaMemsetAsync(pushes)");
     if (!c->step->pushes) return SADMM_OK;
     CUDA_CALL(c, COLLISION(sum)(nullptr, &temp, nullptr, nullptr, (int)pairs, c->stream), "sizing of a sum");
     TRY(CUDA(reserve)(c, BUFFER_PUSHED, 12 * n * sizeof(double) + pairs * (sizeof(uint64_t) + 1), error));
@@ -219,13 +253,14 @@ sadmm_status CUDA(reserve_push)(struct sadmm_context *c, struct sadmm_error *err
     return reserve_second(c, error);
 }
 
-void CUDA(plan_second)(struct sadmm_context *c)
+void CUDA(plan_second)(struct sadmm_context *c, bool warm)
 {
     struct sadmm_context *p = c->step->push;
-    struct sadmm_settings settings;
-    struct sadmm_plan step = c->plan;
-    if (step.momentum && step.points == 0) step.points = 1; /* they come in a later sub-step */
-    p->plan = sadmm_push_plan(&step, &c->settings, &settings);
+    const struct sadmm_settings settings = sadmm_push_settings(&c->settings);
+    p->plan = c->plan;
+    if (p->plan.points == 0) p->plan.points = 1; /* they come in a later sub-step */
+    p->plan.row_constraints = 0;
+    sadmm_plan_settle(&p->plan, &settings, warm);
     CUDA(plan_settings)(p, &settings);
     p->view.model.warm_start = p->plan.warm_start;
     p->view.model.contact_rows = c->view.model.contact_rows;
@@ -237,11 +272,11 @@ void CUDA(view_push)(struct sadmm_context *c)
     const size_t n = (size_t)s->bodies, pairs = (size_t)c->view.contacts.pair_capacity;
     struct push_view *push = &c->view.push;
     const struct push_view none = {};
-    int64_t *due = buffer<int64_t>(c, BUFFER_PUSH);
+    int32_t *due = buffer<int32_t>(c, BUFFER_PUSH);
     *push = none;
     if (!due) return; /* nothing is planned yet */
-    push->due = (int32_t *)due;
-    push->units = (unsigned long long *)(due + 1);
+    push->due = due;
+    push->units = (unsigned long long *)(due + PUSH_NUMBERS);
     push->bits = (int32_t *)(push->units + n);
     push->planned = s->pushes && c->plan.momentum && s->planned;
     if (!push->planned) return;
@@ -259,5 +294,5 @@ void CUDA(view_push)(struct sadmm_context *c)
     p->view.raw.points = push->contacts;
     p->view.push.start = push->start;
     p->view.push.way = push->way;
-    CUDA(plan_second)(c);
+    p->view.push.due = push->due;
 }

@@ -245,13 +245,28 @@ static sadmm_status record_second_stage(struct sadmm_context *p, const struct sa
     }
 }
 
+/* Of one kind. */
 static sadmm_status record_second(struct sadmm_context *p, struct sadmm_error *error)
 {
     struct sadmm_stages stages = sadmm_stages_of(&p->plan, &p->settings, false);
     struct sadmm_stage stage;
-    TRY(CUDA(enqueue_statistics_and_layout)(p, true, &p->partition, error));
     while (sadmm_stages_next(&stages, &stage)) TRY(record_second_stage(p, &stage, error));
     return SADMM_OK;
+}
+
+/* As a cold one and as a warm one, of which one does nothing. */
+static sadmm_status record_kinds(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct sadmm_context *p = c->step->push;
+    const bool differ = sadmm_plan_depends_on_warmth(&p->settings);
+    TRY(CUDA(launch_push_kind)(c, true, PUSH_ANY, error));
+    TRY(CUDA(enqueue_statistics_and_layout)(p, true, &p->partition, error));
+    for (int warm = 0; warm <= differ; ++warm) {
+        TRY(CUDA(launch_push_kind)(c, false, !differ ? PUSH_ANY : warm ? PUSH_WARM : PUSH_COLD, error));
+        CUDA(plan_second)(c, warm);
+        TRY(record_second(p, error));
+    }
+    return CUDA(launch_push_move)(c, error);
 }
 
 /* Behind the end of the step. */
@@ -263,8 +278,7 @@ static sadmm_status record_push(struct sadmm_context *c, struct sadmm_error *err
     TRY(CUDA(launch_push_gather)(c, error));
     p->stream = c->stream;
     p->recording = true;
-    sadmm_status status = record_second(p, error);
-    if (status == SADMM_OK) status = CUDA(launch_push_move)(c, error);
+    const sadmm_status status = record_kinds(c, error);
     p->recording = false;
     p->stream = own;
     return status;

@@ -155,10 +155,18 @@ sadmm_status CUDA(launch_carry)(struct sadmm_context *, struct sadmm_error *erro
 /* and the end of a (sub-)step: poses, and what contacts give them. */
 sadmm_status CUDA(launch_driven_finish)(struct sadmm_context *, struct sadmm_error *error);
 
+/* push_view.due: not 0: some island is pushed; not 0: the second problem does not fit its partition; its pairs that carry
+ * an impulse; bits of enum push_kind, 0: there is none. */
+enum push_number { PUSH_DUE, PUSH_MISFIT, PUSH_WARM_PAIRS, PUSH_KIND, PUSH_NUMBERS };
+/* The second problem is a cold one or a warm one, which its contacts say: it is recorded as both. */
+enum push_kind { PUSH_COLD = 1, PUSH_WARM = 2, PUSH_ANY = PUSH_COLD | PUSH_WARM };
+
 /* push.cu: memory; where it is, once the plan of the sub-step is made; that of the second problem, by it; */
 sadmm_status CUDA(reserve_push)(struct sadmm_context *, struct sadmm_error *error);
 void CUDA(view_push)(struct sadmm_context *);
-void CUDA(plan_second)(struct sadmm_context *);
+void CUDA(plan_second)(struct sadmm_context *, bool warm);
+/* of what kind it is (first: gathered just now); its kernels from here on work if it is one of these; */
+sadmm_status CUDA(launch_push_kind)(struct sadmm_context *, bool first, int kinds, struct sadmm_error *error);
 /* which islands are pushed, once A and b and the layout are made, before contacts are; the second problem, after finish
  * and settle; and what bodies move by when it is solved. */
 sadmm_status CUDA(launch_push_choice)(struct sadmm_context *, struct sadmm_error *error);

@@ -230,24 +230,19 @@ static sadmm_status choose_kernels(struct sadmm_push *p, const struct sadmm_kern
     return kernels->create(device, &p->context, error);
 }
 
-struct sadmm_plan sadmm_push_plan(const struct sadmm_plan *step, const struct sadmm_settings *settings,
-                                  struct sadmm_settings *own)
+struct sadmm_settings sadmm_push_settings(const struct sadmm_settings *step)
 {
-    struct sadmm_plan plan = *step;
-    *own = *settings;
-    own->measure_residuals = own->certify = own->recover_wrenches = false;
-    own->penalty_period = 0; /* it goes on from a solution: where nothing moves, balancing residuals is no guide */
-    plan.row_constraints = 0;
-    plan.predict = false;
-    sadmm_plan_settle(&plan, own, false); /* it has no next step: what it leaves is not made up for */
-    return plan;
+    struct sadmm_settings own = *step;
+    own.measure_residuals = own.certify = own.recover_wrenches = false;
+    own.penalty_period = 0; /* it goes on from a solution: where nothing moves, balancing residuals is no guide */
+    return own;
 }
 
 sadmm_status sadmm_push_solve(struct sadmm_push *p, const struct sadmm_kernels *kernels, int device,
-                              const struct sadmm_system *system, const struct sadmm_plan *step_plan,
+                              const struct sadmm_system *system, int contact_rows,
                               const struct sadmm_settings *step_settings, struct sadmm_error *error)
 {
-    struct sadmm_settings settings;
+    const struct sadmm_settings settings = sadmm_push_settings(step_settings);
     struct sadmm_solve_report report;
     TRY(choose_kernels(p, kernels, device, error));
     TRY(gather_contacts(p, system->contacts, error));
@@ -262,10 +257,8 @@ sadmm_status sadmm_push_solve(struct sadmm_push *p, const struct sadmm_kernels *
         .carried = system->carried ? p->carried : NULL,
         .contacts = &p->contacts,
     };
-    struct sadmm_plan plan = sadmm_push_plan(step_plan, step_settings, &settings);
-    plan.bodies = p->system.body_count;
-    plan.pairs = (int32_t)p->contacts.pair_count;
-    plan.points = (int32_t)p->contacts.point_count;
+    struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
+    plan.contact_rows = contact_rows;
     TRY(sadmm_schedule_solve(kernels, p->context, &p->system, &settings, &plan, &report, error));
     for (int32_t k = 0; k < p->system.body_count; ++k)
         for (size_t j = 0; j < 6; ++j)

@@ -42,14 +42,12 @@ sadmm_status sadmm_push_choose(struct sadmm_push *push, struct sadmm_system *sys
 /* Bodies that are pushed in this step. */
 int32_t sadmm_push_count(const struct sadmm_push *push);
 
-/* The plan of the second problem, but for its counts, by that of the step; and its settings. It is a cold one: its start
- * has none of its loads. */
-struct sadmm_plan sadmm_push_plan(const struct sadmm_plan *step, const struct sadmm_settings *settings,
-                                  struct sadmm_settings *own);
+/* Those of the second problem. */
+struct sadmm_settings sadmm_push_settings(const struct sadmm_settings *step);
 
-/* After it: the second problem, from the solution of the first one. */
+/* After it: the second problem, from the solution of the first one. contact_rows: of the step's plan. */
 sadmm_status sadmm_push_solve(struct sadmm_push *push, const struct sadmm_kernels *kernels, int device,
-                              const struct sadmm_system *system, const struct sadmm_plan *plan,
+                              const struct sadmm_system *system, int contact_rows,
                               const struct sadmm_settings *settings, struct sadmm_error *error);
 
 /* The bodies (system->body_count) after the step, by what they are pushed. */

@@ -201,8 +201,8 @@ static sadmm_status solve_pushes(struct host_step *step)
 {
     sadmm_world *world = step->world;
     if (step->pushed == 0) return SADMM_OK;
-    return sadmm_push_solve(world->push, world->kernels, world->def.device, &step->system, &world->plan,
-                            &step->settings, &world->error);
+    return sadmm_push_solve(world->push, world->kernels, world->def.device, &step->system,
+                            world->plan.contact_rows, &step->settings, &world->error);
 }
 
 static sadmm_status make_plan(struct host_step *step)
