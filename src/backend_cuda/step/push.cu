@@ -1,6 +1,6 @@
 /* Islands that are pushed apart without a velocity (core/solve/push.h): the second problem of a step, in a context of its
- * own. Its partition is made for as many contacts as the step may have. It has all bodies, under their own numbers, and the pairs of the
- * islands that are pushed, one after the other; where there are none its kernels leave at once. */
+ * own. Its partition is made for as many contacts as the step may have. It has all bodies, under their own numbers, and
+ * the pairs of the islands that are pushed, one after the other; where there are none its kernels leave at once. */
 #include "backend_cuda/device/double.h"
 
 #include "backend_cuda/device/parallel.h"
@@ -28,7 +28,8 @@ static __global__ void push_tell_kernel(const __grid_constant__ cuda_view v, con
     const int32_t p = thread_index();
     const bool live = p < live_pairs(v.model);
     double gap = 0;
-    for (int32_t k = 0; live && k < v.raw.pairs[p].count; ++k) gap = fmin(gap, v.raw.points[v.raw.pairs[p].first + k].gap);
+    for (int32_t k = 0; live && k < v.raw.pairs[p].count; ++k)
+        gap = fmin(gap, v.raw.points[v.raw.pairs[p].first + k].gap);
     tell_push(v, live ? p : -1, gap);
 }
 
@@ -128,7 +129,8 @@ static __device__ __forceinline__ void keep_pushed(const cuda_view &v, int32_t i
     const struct sadmm_rigid *next = &v.step.after[i];
     steady_keep(&steady, &before.body, next, dt);
     v.step.steady_after[i] = steady;
-    if (!finite_numbers(next->position, 3) || !finite_numbers(next->orientation, 4) || !finite_numbers(next->velocity, 6))
+    if (!finite_numbers(next->position, 3) || !finite_numbers(next->orientation, 4) ||
+        !finite_numbers(next->velocity, 6))
         atomicMin(&v.step.control->offending_body, i);
 }
 
@@ -242,8 +244,7 @@ sadmm_status CUDA(reserve_push)(struct sadmm_context *c, struct sadmm_error *err
 {
     const size_t n = (size_t)c->step->bodies, pairs = (size_t)c->view.contacts.pair_capacity;
     size_t temp = 0;
-    TRY(CUDA(reserve)(c, BUFFER_PUSH, n * (sizeof(int64_t) + sizeof(int32_t)) + PUSH_NUMBERS * sizeof(int32_t),
-                      error));
+    TRY(CUDA(reserve)(c, BUFFER_PUSH, n * (sizeof(int64_t) + sizeof(int32_t)) + PUSH_NUMBERS * sizeof(int32_t), error));
     CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_PUSH), 0, PUSH_NUMBERS * sizeof(int32_t), c->stream),
               "cudaMemsetAsync(pushes)");
     if (!c->step->pushes) return SADMM_OK;

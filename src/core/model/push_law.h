@@ -86,8 +86,12 @@ struct push_island {
 /* m (|d|^2 1 - d d^T) */
 SADMM_INLINE sym3 push_arm_inertia(double m, vec3 d)
 {
-    const sym3 out = {m * (d.y * d.y + d.z * d.z), m * (d.x * d.x + d.z * d.z), m * (d.x * d.x + d.y * d.y),
-                      -(m * d.x * d.y),            -(m * d.x * d.z),            -(m * d.y * d.z)};
+    const sym3 out = {m * (d.y * d.y + d.z * d.z),
+                      m * (d.x * d.x + d.z * d.z),
+                      m * (d.x * d.x + d.y * d.y),
+                      -(m * d.x * d.y),
+                      -(m * d.x * d.z),
+                      -(m * d.y * d.z)};
     return out;
 }
 
