@@ -38,6 +38,11 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     if (i == 0) clear_counts(v.islands);
     if (v.islands.touch) v.islands.touch[i] = 0;
     if (v.joints.count > 0) v.joints.touch[i] = 0;
+    if (v.push.bits) {
+        if (i == 0) v.push.due[0] = v.push.due[1] = v.push.due[2] = 0; /* enum push_number */
+        v.push.bits[i] = 0;
+        v.push.units[i] = 0;
+    }
     if (args.paper && ENERGIES) {
         v.islands.info[i].held = v.islands.info[i].rows = 0;
         v.islands.info[i].slow_down = 1;

@@ -24,6 +24,11 @@
  * `finish`. Where they are apart (cuda_step_guess) all about joints is a branch from `start` to `finish`, and whether
  * the step was one for that is known when it has come to its end.
  *
+ * Whether an island is pushed apart without a velocity (core/solve/push.h) is known when the step has been solved: its
+ * contacts say so in `finish`. A step in which one is has a graph of its own: there they say so behind the layout, e of
+ * what overlaps is made without its push, and behind `finish` the second problem is gathered and solved, in a context of
+ * its own, and bodies are moved by it (step/push.cu).
+ *
  * fast, small islands (c->prologue): `iterate` does penalties and limit too, and the last two check the plan.
  *
  * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, warm or
@@ -52,6 +57,7 @@ struct cuda_step_totals {
     int32_t limited, unmet;  /* most of any; unmet: -1: no stop rule */
     int32_t met;             /* sub-steps that met theirs */
     int32_t constrained;     /* sub-steps with contacts */
+    int32_t pushed;          /* sub-steps in which some island is pushed apart (step/push.h); -1: one did not fit */
     int32_t most_iterations; /* sums: of islands that stopped, the most; */
     double iterations_mean;  /* and of all */
     unsigned long long stamps[STAMPS]; /* ns since the first sub-step began, without what comes between them */

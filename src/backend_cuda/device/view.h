@@ -310,6 +310,22 @@ struct driven_view {
     int32_t *carries;                       /* and some island rides on one */
 };
 
+/* Islands that are pushed apart without a velocity (core/solve/push.h, step/push.h). In worlds alone. */
+struct push_view {
+    int32_t planned;           /* the (sub-)step has a second problem */
+    int32_t *due;              /* enum push_number: of the sub-step */
+    int32_t *bits;             /* bodies: at labels of islands what pairs say (core/model/push_law.h); else NULL */
+    unsigned long long *units; /* likewise: int64_t */
+    /* where it is planned: */
+    uint8_t *points;           /* pairs: points of those that are pushed, else 0; */
+    uint64_t *places;          /* such pairs and their points before it (size_of in device/parallel.h) */
+    double *start;             /* bodies x 6: v_0, where the second problem begins, less what they are carried by */
+    double *way;               /* bodies x 6: v_1 - v_0 */
+    struct cuda_live *live;    /* the second problem's: aborted where there is none; */
+    struct sadmm_contact_pair *pairs; /* and its contacts */
+    struct sadmm_contact_point *contacts;
+};
+
 struct cuda_view {
     struct model_view model;
     struct body_view bodies;
@@ -322,7 +338,8 @@ struct cuda_view {
     struct raw_view raw;
     struct cuda_step_view step; /* whole steps alone; */
     struct joint_view joints;   /* likewise; */
-    struct driven_view driven;  /* likewise */
+    struct driven_view driven;  /* likewise; */
+    struct push_view push;      /* likewise */
 };
 
 /* In pinned memory: the edits of step `sequence`; and them, one after the other. */

@@ -4,6 +4,7 @@
 #include "backend_cuda/device/body.h"
 #include "backend_cuda/device/plan_check.h"
 #include "move.h"
+#include "push.h"
 #include "touch.h"
 #include "world.h"
 
@@ -224,6 +225,12 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
         if (ways & TOUCH_JOLT) v.islands.again[AGAIN] = 1;
         if (ways & TOUCH_CARRIED) v.islands.again[AGAIN_CLOSED] = 1;
         if (ways & TOUCH_ROLLS) v.islands.again[AGAIN_ROLLS] = 1;
+    }
+    if (v.step.limits && !v.push.planned) {
+        double deepest_of_pair = depth;
+        for (int o = 1; o < v.contacts.lanes; o *= 2)
+            deepest_of_pair = fmax(deepest_of_pair, __shfl_xor_sync((unsigned)ALL_LANES, deepest_of_pair, o));
+        tell_push(v, live && lane == 0 ? p : -1, -deepest_of_pair);
     }
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;

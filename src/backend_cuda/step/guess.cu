@@ -156,6 +156,7 @@ sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error
     TRY(tighten(c, &seen, error));
     TRY(CUDA(reserve_solver)(c, error));
     TRY(CUDA(reserve_joined)(c, error));
+    TRY(CUDA(reserve_push)(c, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
     s->planned = true;
     forget_graphs(s);

@@ -282,6 +282,29 @@ static __device__ __forceinline__ bool moves_again(const cuda_view &v)
     return again || (closed && unpressed);
 }
 
+/* What is pushed is moved again before it is. A thread a body. */
+static __global__ void __launch_bounds__(TURN_THREADS)
+    settle_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int32_t i = (int32_t)(blockIdx.x * (unsigned)TURN_THREADS + threadIdx.x);
+    if (i >= v.model.bodies || v.model.live->abort_code || !as_planned(v.model, v.step)) return;
+    const bool again = moves_again(v), joined = v.joints.count > 0 && !v.joints.apart;
+    if (again || joined) move_once_more(v, i, again, joined);
+}
+
+/* Has the step no need of a second problem, or one that fits (step/push.h)? Once all contacts have spoken. */
+static __device__ __forceinline__ bool pushes_as_planned(const push_view &push)
+{
+    return !push.bits || push.due[push.planned ? PUSH_MISFIT : PUSH_DUE] == 0;
+}
+
+/* Sub-steps with pushes, this one included. */
+static __device__ __forceinline__ int32_t count_pushed(const push_view &push, int32_t before)
+{
+    if (!push.bits || before < 0) return before;
+    return push.due[PUSH_MISFIT] ? -1 : before + (push.due[PUSH_DUE] != 0);
+}
+
 /* ---- turn ------------------------------------------------------------------------------------------------------ */
 
 /* What has become of the sub-step. One thread, once it has ended. */
@@ -293,9 +316,10 @@ static __device__ int32_t abort_of(int32_t aborted, bool planned, int32_t offend
 /* The sub-step is added to those before it. args.count: its iterations. */
 static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cuda_args &args)
 {
-    const struct cuda_step_totals none = {0, -1, 0, 0, 0, 0, {}};
+    const struct cuda_step_totals none = {0, -1, 0, 0, 0, 0, 0, {}};
     const struct cuda_step_control *control = v.step.control;
     struct cuda_step_totals totals = v.step.substep > 0 ? control->totals : none;
+    totals.pushed = count_pushed(v.push, totals.pushed);
     const bool constrained = control->counts.points > 0 || control->joints.constraints > 0;
     const int32_t limited = v.step.limits ? *v.islands.limited : 0, islands = v.model.statistics->islands;
     double iterations = constrained ? args.count : 1;
@@ -326,9 +350,9 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
     const int32_t lane = (int32_t)(t % START_LANES);
     struct cuda_step_control *control = v.step.control;
     if (v.model.live->abort_code) return;
-    const bool again = moves_again(v), joined = v.joints.count > 0 && !v.joints.apart,
-               any = again || joined || rolls_again(v);
-    if (any && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
+    const bool joined = v.joints.count > 0 && !v.joints.apart, again = moves_again(v),
+               settles = (again || joined) && !v.push.planned, any = settles || rolls_again(v);
+    if (settles && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
         move_once_more(v, (int32_t)own, again, joined);
     if (joined) end_joints(v, (int32_t)t);
     if (any) __syncthreads(); /* threads of a block start bodies that others of it have moved */
@@ -340,7 +364,8 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
         control->stamps[STAMP_END] = nanoseconds();
         control->totals = totals_of(v, args);
         control->stamps[STAMP_START] = control->stamps[STAMP_END];
-        const int32_t code = abort_of(ABORT_NONE, as_planned(v.model, v.step), control->offending_body);
+        const int32_t code = abort_of(ABORT_NONE, as_planned(v.model, v.step) && pushes_as_planned(v.push),
+                                      control->offending_body);
         if (code) v.model.live->abort_code = code;
         else control->joints = {};
     }
@@ -360,7 +385,7 @@ static __device__ __forceinline__ void commit_bodies(const cuda_view &v, int32_t
 {
     const int32_t lanes = commit_lanes(v.model.bodies), i = thread / lanes, lane = thread % lanes;
     const bool again = moves_again(v), rolls = rolls_again(v);
-    if (lane == 0 && (again || joined) && i < v.model.bodies) move_once_more(v, i, again, joined);
+    if (lane == 0 && (again || joined) && !v.push.planned && i < v.model.bodies) move_once_more(v, i, again, joined);
     if (!rolls) return;
     if (lanes == 1) return keep_rolling_of_warp(v, i);
     __syncwarp(0xffffffffu);
@@ -389,7 +414,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     if (threadIdx.x > 0) return;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
     const int32_t offending_body = control->offending_body,
-                  abort_code = abort_of(aborted, planned, offending_body);
+                  abort_code = abort_of(aborted, planned && pushes_as_planned(v.push), offending_body);
     control->stamps[STAMP_END] = nanoseconds();
     v.model.live->abort_code = abort_code;
     report->sequence = control->sequence++;
@@ -441,6 +466,13 @@ sadmm_status CUDA(launch_turn)(struct sadmm_context *c, struct sadmm_error *erro
     args.checks = c->checks;
     args.count = c->settings.iterations;
     return CUDA(launch_of)(c, turn_kernel, "turn", blocks, TURN_THREADS, &args, error);
+}
+
+sadmm_status CUDA(launch_settle)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const cuda_args args = {};
+    const int64_t blocks = ((int64_t)c->view.model.bodies + TURN_THREADS - 1) / TURN_THREADS;
+    return CUDA(launch_late)(c, settle_kernel, "settle", blocks, TURN_THREADS, &args, error);
 }
 
 sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *error)

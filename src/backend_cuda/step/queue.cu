@@ -112,6 +112,16 @@ static void see_joined(struct sadmm_context *c, const struct cuda_step_report *r
     if (s->untouched >= s->patience) s->planned = false;
 }
 
+/* A step was done that was planned to have pushes. */
+static void see_pushes(struct sadmm_context *c, const struct cuda_step_report *report)
+{
+    struct cuda_step *s = c->step;
+    if (!s->pushes) return;
+    s->quiet = report->totals.pushed > 0 ? 0 : s->quiet + 1;
+    if (s->quiet < QUIET_STEPS) return;
+    s->pushes = s->planned = false;
+}
+
 /* The step `first` of the queue has failed, and nothing behind it has been done. */
 static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct cuda_step_report *report,
                             struct sadmm_error *error)
@@ -152,6 +162,11 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         if (s->misfit == first && known) c->refused |= 1u << c->partition.tier;
         s->misfit = first;
     }
+    if (report->abort_code == ABORT_PLAN && report->totals.pushed != 0) {
+        s->pushes = true;
+        s->push_streams = s->push_streams || report->totals.pushed < 0;
+        s->quiet = 0;
+    }
     if (report->abort_code == ABORT_REACH) s->careful = CAREFUL_STEPS;
     else if (together) s->learned.step = -1; /* nothing is known of it with its rows */
     else if (report->substep > 0) learn(c, first, report);
@@ -191,6 +206,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     ++s->done;
     if (s->careful > 0 && --s->careful == 0) s->planned = false;
     see_joined(c, &report);
+    see_pushes(c, &report);
     /* A plan with far too large capacities wastes launches. */
     if (report.counts.pairs < c->view.contacts.pair_capacity / 4 - 256) s->planned = false;
     return SADMM_OK;

@@ -119,6 +119,7 @@ static sadmm_status record_driven_plan(struct sadmm_context *c, struct sadmm_err
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     TRY(CUDA(launch_carry)(c, error));
     TRY(CUDA(enqueue_bodies)(c, error));
+    if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error));
     TRY(CUDA(assemble_contacts)(c, error));
     if (c->view.joints.count == 0) return SADMM_OK;
     TRY(CUDA(assemble_rows)(c, error));
@@ -135,7 +136,7 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
     const bool together = c->view.joints.count > 0 && !c->view.joints.apart, beside = together && joined_is_small(c);
     if (together) TRY(wait_for_joints(c, error)); /* the graph is of their rows, too */
     if (beside) TRY(record_joined(c, error));
-    {
+    if (!c->view.push.planned) {
         side_branch side(c, c->side);
         CUDA_CALL(c, side.code, "a branch of the step");
         TRY(CUDA(assemble_contacts)(c, error));
@@ -143,6 +144,10 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
     }
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
+    if (c->view.push.planned) { /* which islands are pushed says what their contacts are */
+        TRY(CUDA(launch_push_choice)(c, error));
+        TRY(CUDA(assemble_contacts)(c, error));
+    }
     if (together && !beside) TRY(record_joined(c, error));
     return together ? wait_for_joints(c, error) : SADMM_OK;
 }
@@ -200,6 +205,85 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
     return SADMM_OK;
 }
 
+/* ---- the second problem (push.cu) -------------------------------------------------------------------------------- */
+
+/* Stages that both problems have alike. */
+static sadmm_status record_solving(struct sadmm_context *c, const struct sadmm_stage *stage, bool *residuals,
+                                   enum cuda_limit limit, struct sadmm_error *error)
+{
+    switch (stage->kind) {
+    case SADMM_STAGE_ITERATE:
+        return CUDA(enqueue_iterations)(c, stage->count, stage->measure && (stage->last || !stop_rule_checked(c)),
+                                        stage->last || stage->checked ? limit : LIMIT_NONE, error);
+    case SADMM_STAGE_RESIDUALS: /* not reported where islands stop by themselves */
+        *residuals = stage->last;
+        return stage->last || stop_rule_checked(c) ? SADMM_OK : CUDA(enqueue_residuals)(c, error);
+    case SADMM_STAGE_CHECK: return CUDA(enqueue_convergence_check)(c, stage->done, error);
+    case SADMM_STAGE_REWEIGH: return CUDA(enqueue_weights)(c, true, error);
+    case SADMM_STAGE_BALANCE: /* the ratio of (15) is found on the device */
+        TRY(CUDA(enqueue_balance)(c, error));
+        return CUDA(factorize)(c, error);
+    default: return SADMM_OK;
+    }
+}
+
+static sadmm_status record_second_stage(struct sadmm_context *p, const struct sadmm_stage *stage,
+                                        struct sadmm_error *error)
+{
+    bool residuals = false;
+    switch (stage->kind) {
+    case SADMM_STAGE_BODIES: return CUDA(enqueue_bodies)(p, error);
+    case SADMM_STAGE_CONTACTS: return CUDA(assemble_contacts)(p, error);
+    case SADMM_STAGE_PENALTY: /* nothing is compared with a plan */
+        TRY(CUDA(init_penalty)(p, error));
+        return CUDA(factorize)(p, error);
+    case SADMM_STAGE_LIMIT:
+        TRY(CUDA(enqueue_pushed)(p, error));
+        TRY(CUDA(enqueue_motions)(p, error));
+        return CUDA(enqueue_limit)(p, false, error);
+    default: return record_solving(p, stage, &residuals, LIMIT_NONE, error);
+    }
+}
+
+/* Of one kind. */
+static sadmm_status record_second(struct sadmm_context *p, struct sadmm_error *error)
+{
+    struct sadmm_stages stages = sadmm_stages_of(&p->plan, &p->settings, false);
+    struct sadmm_stage stage;
+    while (sadmm_stages_next(&stages, &stage)) TRY(record_second_stage(p, &stage, error));
+    return SADMM_OK;
+}
+
+/* As a cold one and as a warm one, of which one does nothing. */
+static sadmm_status record_kinds(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct sadmm_context *p = c->step->push;
+    const bool differ = sadmm_plan_depends_on_warmth(&p->settings);
+    TRY(CUDA(launch_push_kind)(c, true, PUSH_ANY, error));
+    TRY(CUDA(enqueue_statistics_and_layout)(p, true, &p->partition, error));
+    for (int warm = 0; warm <= differ; ++warm) {
+        TRY(CUDA(launch_push_kind)(c, false, !differ ? PUSH_ANY : warm ? PUSH_WARM : PUSH_COLD, error));
+        CUDA(plan_second)(c, warm);
+        TRY(record_second(p, error));
+    }
+    return CUDA(launch_push_move)(c, error);
+}
+
+/* Behind the end of the step. */
+static sadmm_status record_push(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct sadmm_context *p = c->step->push;
+    const cudaStream_t own = p->stream;
+    TRY(CUDA(launch_settle)(c, error));
+    TRY(CUDA(launch_push_gather)(c, error));
+    p->stream = c->stream;
+    p->recording = true;
+    const sadmm_status status = record_kinds(c, error);
+    p->recording = false;
+    p->stream = own;
+    return status;
+}
+
 /* *residuals: those of the last iteration are wanted. */
 static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_stage *stage, bool *residuals,
                                  struct sadmm_error *error)
@@ -213,19 +297,15 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
         TRY(CUDA(enqueue_penalties)(c, error));
         return motions_beside(c) ? record_motions(c, error) : SADMM_OK;
     case SADMM_STAGE_ITERATE:
-        return CUDA(enqueue_iterations)(c, stage->count, stage->measure && (stage->last || !stop_rule_checked(c)),
-                                        stage->last || stage->checked ? limit : LIMIT_NONE, error);
-    case SADMM_STAGE_RESIDUALS: /* not reported where islands stop by themselves */
-        *residuals = stage->last;
-        return stage->last || stop_rule_checked(c) ? SADMM_OK : CUDA(enqueue_residuals)(c, error);
-    case SADMM_STAGE_CHECK: return CUDA(enqueue_convergence_check)(c, stage->done, error);
-    case SADMM_STAGE_REWEIGH: return CUDA(enqueue_weights)(c, true, error);
-    case SADMM_STAGE_BALANCE: /* the ratio of (15) is found on the device */
-        TRY(CUDA(enqueue_balance)(c, error));
-        return CUDA(factorize)(c, error);
+    case SADMM_STAGE_RESIDUALS:
+    case SADMM_STAGE_CHECK:
+    case SADMM_STAGE_REWEIGH:
+    case SADMM_STAGE_BALANCE: return record_solving(c, stage, residuals, limit, error);
     case SADMM_STAGE_LIMIT:
         return limit == LIMIT_WHOLE ? SADMM_OK : record_limit(c, limit == LIMIT_SUSPECTS, error);
-    case SADMM_STAGE_INTEGRATE: return record_finish(c, *residuals, error);
+    case SADMM_STAGE_INTEGRATE:
+        TRY(record_finish(c, *residuals, error));
+        return c->view.push.planned ? record_push(c, error) : SADMM_OK;
     case SADMM_STAGE_TURN:
         TRY(CUDA(launch_turn)(c, error));
         view_substep(c, c->view.step.substep + 1);

@@ -49,6 +49,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     CUDA(view_driven)(c, into);
     CUDA(view_joints)(c, into, substep);
     CUDA(view_joined)(c);
+    CUDA(view_push)(c);
 }
 
 /* Counts and settings of the view; pairs: their capacity. */
@@ -87,6 +88,7 @@ void CUDA(step_destroy)(struct sadmm_context *c)
     for (const struct step_graphs &graphs : s->graphs)
         for (cudaGraphExec_t graph : graphs.into)
             if (graph) (void)cudaGraphExecDestroy(graph);
+    CUDA(destroy)(s->push);
     COLLISION(destroy)(s->collision);
     sadmm_free(s);
     c->step = nullptr;
@@ -132,6 +134,8 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->careful = 0;
     s->edited = 0;
     s->apart = false;
+    s->quiet = 0;
+    s->push_streams = false;
     s->untouched = 0;
     s->patience = LEAST_PATIENCE;
     for (struct queued_step &q : s->queue) q.edit_count = 0;

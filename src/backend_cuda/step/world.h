@@ -5,6 +5,7 @@
  *   record.cu  a step as a graph
  *   queue.cu   run steps and see what became of them; repeat those whose plan did not hold
  *   read.cu    bring the world and the report back
+ *   push.cu    islands that are pushed apart by a second problem
  *   driven.cu, joints.cu, gears.cu, joined.cu   driven bodies, joints, gears, and bodies joined by them
  */
 #ifndef SADMM_CUDA_STEP_WORLD_H
@@ -13,6 +14,7 @@
 #include "backend_cuda/collide/pipeline.h"
 #include "backend_cuda/device/context.h"
 #include "core/model/settings.h"
+#include "core/solve/push.h"
 
 /* Of a step that was enqueued, until its report has been seen. */
 struct queued_step {
@@ -43,6 +45,9 @@ struct learned {
 
 /* Steps that joined bodies are left alone until it is planned that they are; twice as many each time they were not. */
 enum { LEAST_PATIENCE = 16, MOST_PATIENCE = 1 << 16 };
+/* Steps without a push until they are planned to have none: to plan takes what a second problem's empty kernels do in as
+ * many. */
+enum { QUIET_STEPS = 32 };
 
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
@@ -57,6 +62,11 @@ struct cuda_step {
     bool apart;                 /* they are planned to be solved beside the rest (cuda_step_guess) */
     int32_t untouched,
         patience; /* steps that could have been so since one could not; that it takes for it to be tried */
+
+    bool pushes;                /* planned: islands are pushed apart, in a second problem (push.cu), */
+    bool push_streams;          /* which has not fitted its partition once: tier STREAM */
+    int32_t quiet;              /* but none has been for so many steps */
+    struct sadmm_context *push; /* of that; made with the first one */
 
     bool planned;               /* capacities, partition and guess are for the world as it is */
     struct step_graphs graphs[2]; /* of steps without edits, and with (queue.cu) */
@@ -144,6 +154,26 @@ sadmm_status CUDA(launch_driven_start)(struct sadmm_context *, struct sadmm_erro
 sadmm_status CUDA(launch_carry)(struct sadmm_context *, struct sadmm_error *error);
 /* and the end of a (sub-)step: poses, and what contacts give them. */
 sadmm_status CUDA(launch_driven_finish)(struct sadmm_context *, struct sadmm_error *error);
+
+/* push_view.due: not 0: some island is pushed; not 0: the second problem does not fit its partition; its pairs that carry
+ * an impulse; bits of enum push_kind, 0: there is none. */
+enum push_number { PUSH_DUE, PUSH_MISFIT, PUSH_WARM_PAIRS, PUSH_KIND, PUSH_NUMBERS };
+/* The second problem is a cold one or a warm one, which its contacts say: it is recorded as both. */
+enum push_kind { PUSH_COLD = 1, PUSH_WARM = 2, PUSH_ANY = PUSH_COLD | PUSH_WARM };
+
+/* push.cu: memory; where it is, once the plan of the sub-step is made; that of the second problem, by it; */
+sadmm_status CUDA(reserve_push)(struct sadmm_context *, struct sadmm_error *error);
+void CUDA(view_push)(struct sadmm_context *);
+void CUDA(plan_second)(struct sadmm_context *, bool warm);
+/* of what kind it is (first: gathered just now); its kernels from here on work if it is one of these; */
+sadmm_status CUDA(launch_push_kind)(struct sadmm_context *, bool first, int kinds, struct sadmm_error *error);
+/* which islands are pushed, once A and b and the layout are made, before contacts are; the second problem, after finish
+ * and settle; and what bodies move by when it is solved. */
+sadmm_status CUDA(launch_push_choice)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_push_gather)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_push_move)(struct sadmm_context *, struct sadmm_error *error);
+/* kernels.cu: bodies that have to be moved again, before commit or turn would. */
+sadmm_status CUDA(launch_settle)(struct sadmm_context *, struct sadmm_error *error);
 
 /* gears.cu: the same for gears, of which joints.cu sees to all of this: */
 sadmm_status CUDA(load_gears)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);

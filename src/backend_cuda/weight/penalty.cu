@@ -8,6 +8,7 @@
 
 #include "core/math/momentum.h"
 #include "core/math/penalty.h"
+#include "core/model/push_law.h"
 
 /* ---- C ----------------------------------------------------------------------------------------------------------- */
 
@@ -65,6 +66,7 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
             add_rows(v.rows, record - v.contacts.pair_capacity, side, C);
             holds = true; /* left alone */
             if (v.islands.info) v.islands.info[v.graph.label[t.body]].rows = 1;
+            if (v.push.bits) v.push.bits[v.graph.label[t.body]] = PUSH_ROWS;
         }
     }
     if (t.live && holds && v.islands.info) v.islands.info[v.graph.label[t.body]].held = 1;

@@ -15,6 +15,8 @@
 #include "weigh.h"
 #include "weight.h"
 
+#include "core/model/push_law.h"
+
 /* ---- pairs ------------------------------------------------------------------------------------------------------- */
 
 /* Records of sides again, but for what depends on arms alone. */
@@ -102,6 +104,7 @@ static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, co
     if (about.rows == 0) return; /* a joint may have fewer than there is room for */
     cuda_island *island = &v.islands.info[label];
     if (args.start) island->rows = island->held = 1; /* left alone */
+    if (args.start && v.push.bits) v.push.bits[label] = PUSH_ROWS;
     const double share = weight_share(&island->weights, sums.load2);
     for (int r = 0; r < about.rows; ++r) {
         const struct weight_law law = {

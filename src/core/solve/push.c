@@ -5,41 +5,23 @@
 
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
-#include "core/math/array3.h"
-#include "core/math/contact.h"
-#include "core/math/rigid.h"
 #include "core/model/islands.h"
+#include "core/model/push_law.h"
 #include "schedule.h"
 
-/* Of a pair: its island; how much of gravity its push takes (contact_push_takes), 0: it has none; is it with what is
- * not dynamic, and has it friction then? */
+/* Of a pair: its island, and what it adds to it. */
 struct push_pair {
-    double takes;
+    struct push_share share;
     int32_t label;
-    bool stands, rests;
-};
-
-/* Pushes add up on the way from the ground: of an island, at its label, their sum, the largest, and over how many pairs
- * such ways begin; whether gravity takes velocities back at all; whether it has constraints given by rows. */
-struct push_sum {
-    double takes, most;
-    int32_t ways;
-    bool rests, rows;
-};
-
-/* Of an island, at the first of its bodies among those that are pushed. */
-struct push_island {
-    double mass;
-    vec3 middle, turn; /* sum of m d, about that body's place; what pushes have changed the angular momentum by */
-    sym3 inertia;      /* about that place */
 };
 
 struct sadmm_push {
-    const struct sadmm_kernels *kernels; /* of `context` */
+    const struct sadmm_kernels *kernels; /* of `context`, on `device` */
     struct sadmm_context *context;
+    int device;
     int32_t *label;          /* all bodies: islands */
     int32_t *index;          /* all bodies: among those that are pushed, -1: none of them */
-    struct push_sum *sums;   /* all bodies, at labels */
+    struct push_share *sums; /* all bodies, at labels: of islands */
     struct push_pair *pairs; /* all pairs */
     size_t label_capacity, index_capacity, sum_capacity, pair_capacity;
 
@@ -80,24 +62,6 @@ struct choosing {
     double gravity; /* its size */
 };
 
-static double push_speed(const struct sadmm_settings *s, double gap)
-{
-    const double e = contact_error(gap, s->dt, s->baumgarte, s->slop, s->correction_speed);
-    return e < 0 ? -e : 0;
-}
-
-/* In the method `paper` impulses creep: velocities follow a push down by no more than 0.3 of gravity. */
-#define PUSH_PAPER_SHARE 0.25
-
-/* The least acceleration by which gravity takes back a velocity of one of the pair's bodies. */
-static double pull_of(const struct choosing *c, const struct sadmm_contact_pair *pair)
-{
-    double scale = INFINITY;
-    if (pair->body_a >= 0) scale = fmin(scale, c->system->rigid[pair->body_a].gravity_scale);
-    if (pair->body_b >= 0) scale = fmin(scale, c->system->rigid[pair->body_b].gravity_scale);
-    return scale * c->gravity * (c->settings->method == SADMM_METHOD_PAPER ? PUSH_PAPER_SHARE : 1);
-}
-
 static void find_pair(const struct choosing *c, size_t index)
 {
     const struct sadmm_settings *s = c->settings;
@@ -106,11 +70,10 @@ static void find_pair(const struct choosing *c, size_t index)
     const struct sadmm_contact_point *points = &c->system->contacts->points[pair->first];
     double gap = points[0].gap; /* the deepest point is pushed fastest */
     for (int32_t k = 1; k < pair->count; ++k) gap = points[k].gap < gap ? points[k].gap : gap;
-    const double speed = push_speed(s, gap);
-    found->takes = speed > 0 ? contact_push_takes(speed, s->baumgarte, pull_of(c, pair) * s->dt) : 0;
+    const double speed = push_speed(s, gap),
+                 pull = speed > 0 ? push_pull(c->system->rigid, pair, c->gravity, s->method == SADMM_METHOD_PAPER) : 0;
+    found->share = push_share_of(pair, speed, s->baumgarte, pull * s->dt);
     found->label = c->push->label[pair->body_a >= 0 ? pair->body_a : pair->body_b];
-    found->stands = pair->body_a < 0 || pair->body_b < 0;
-    found->rests = found->stands && pair->friction > 0;
 }
 
 static void find_share(void *argument, int thread, int threads)
@@ -121,25 +84,20 @@ static void find_share(void *argument, int thread, int threads)
     for (size_t p = begin; p < end; ++p) find_pair(c, p);
 }
 
-/* In the order of pairs. */
 static void add_up(struct sadmm_push *p, size_t pairs)
 {
     for (size_t k = 0; k < pairs; ++k) {
-        const struct push_pair *pair = &p->pairs[k];
-        struct push_sum *sum = &p->sums[pair->label];
-        sum->ways += pair->stands;
-        sum->rests = sum->rests || pair->rests;
-        sum->takes += pair->takes;
-        if (pair->takes > sum->most) sum->most = pair->takes;
+        struct push_share *sum = &p->sums[p->pairs[k].label];
+        sum->bits |= p->pairs[k].share.bits;
+        sum->units += p->pairs[k].share.units;
     }
 }
 
 /* Is the island of the body pushed? */
 static bool is_pushed(const struct sadmm_push *p, int32_t body)
 {
-    const struct push_sum *sum = &p->sums[p->label[body]];
-    if (sum->rows || sum->most == 0) return false;
-    return !sum->rests || sum->most > 1 || sum->takes > sum->ways;
+    const struct push_share *sum = &p->sums[p->label[body]];
+    return push_is_due(sum->bits, sum->units);
 }
 
 static sadmm_status number_bodies(struct sadmm_push *p, int32_t all, struct sadmm_error *error)
@@ -167,7 +125,7 @@ static sadmm_status number_bodies(struct sadmm_push *p, int32_t all, struct sadm
         if (!is_pushed(p, i)) continue;
         p->index[i] = count;
         p->bodies[count] = i;
-        p->free[count] = p->sums[p->label[i]].ways == 0;
+        p->free[count] = !(p->sums[p->label[i]].bits & PUSH_STANDS);
         p->first[count++] = p->index[p->label[i]]; /* the smallest of the island: it has its number */
     }
     return SADMM_OK;
@@ -208,7 +166,7 @@ sadmm_status sadmm_push_choose(struct sadmm_push *p, struct sadmm_system *system
     memset(p->sums, 0, n * sizeof *p->sums);
     for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k) {
         const struct sadmm_row_constraint *rows = &system->rows->constraints[k];
-        p->sums[p->label[rows->body_a >= 0 ? rows->body_a : rows->body_b]].rows = true;
+        p->sums[p->label[rows->body_a >= 0 ? rows->body_a : rows->body_b]].bits |= PUSH_ROWS;
     }
     sadmm_parallel(system->team, sadmm_pass_threads(threads, pairs), find_share, &choosing);
     add_up(p, pairs);
@@ -261,22 +219,32 @@ static void gather_bodies(struct sadmm_push *p, const struct sadmm_system *from)
     }
 }
 
-static sadmm_status choose_kernels(struct sadmm_push *p, const struct sadmm_kernels *kernels, struct sadmm_error *error)
+static sadmm_status choose_kernels(struct sadmm_push *p, const struct sadmm_kernels *kernels, int device,
+                                   struct sadmm_error *error)
 {
-    if (p->kernels == kernels && p->context) return SADMM_OK;
+    if (p->kernels == kernels && p->device == device && p->context) return SADMM_OK;
     if (p->context) p->kernels->destroy(p->context);
     p->context = NULL;
     p->kernels = kernels;
-    return kernels->create(0, &p->context, error);
+    p->device = device;
+    return kernels->create(device, &p->context, error);
 }
 
-sadmm_status sadmm_push_solve(struct sadmm_push *p, const struct sadmm_kernels *kernels,
-                              const struct sadmm_system *system, const struct sadmm_settings *step_settings,
-                              struct sadmm_error *error)
+struct sadmm_settings sadmm_push_settings(const struct sadmm_settings *step)
 {
-    sadmm_settings settings = *step_settings;
+    struct sadmm_settings own = *step;
+    own.measure_residuals = own.certify = own.recover_wrenches = false;
+    own.penalty_period = 0; /* it goes on from a solution: where nothing moves, balancing residuals is no guide */
+    return own;
+}
+
+sadmm_status sadmm_push_solve(struct sadmm_push *p, const struct sadmm_kernels *kernels, int device,
+                              const struct sadmm_system *system, int contact_rows,
+                              const struct sadmm_settings *step_settings, struct sadmm_error *error)
+{
+    const struct sadmm_settings settings = sadmm_push_settings(step_settings);
     struct sadmm_solve_report report;
-    TRY(choose_kernels(p, kernels, error));
+    TRY(choose_kernels(p, kernels, device, error));
     TRY(gather_contacts(p, system->contacts, error));
     gather_bodies(p, system);
     p->system = (struct sadmm_system){
@@ -289,9 +257,8 @@ sadmm_status sadmm_push_solve(struct sadmm_push *p, const struct sadmm_kernels *
         .carried = system->carried ? p->carried : NULL,
         .contacts = &p->contacts,
     };
-    settings.measure_residuals = settings.certify = settings.recover_wrenches = false;
-    settings.penalty_period = 0; /* it goes on from a solution: where nothing moves, balancing residuals is no guide */
-    const struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
+    struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
+    plan.contact_rows = contact_rows;
     TRY(sadmm_schedule_solve(kernels, p->context, &p->system, &settings, &plan, &report, error));
     for (int32_t k = 0; k < p->system.body_count; ++k)
         for (size_t j = 0; j < 6; ++j)
@@ -302,68 +269,18 @@ sadmm_status sadmm_push_solve(struct sadmm_push *p, const struct sadmm_kernels *
 
 /* ---- the way ----------------------------------------------------------------------------------------------------- */
 
-/* m (|d|^2 1 - d d^T) */
-static void add_arm_inertia(double m, vec3 d, sym3 *to)
-{
-    to->xx += m * (d.y * d.y + d.z * d.z);
-    to->yy += m * (d.x * d.x + d.z * d.z);
-    to->zz += m * (d.x * d.x + d.y * d.y);
-    to->xy -= m * d.x * d.y;
-    to->xz -= m * d.x * d.z;
-    to->yz -= m * d.y * d.z;
-}
-
-/* R diag(inertia) R^T of a body where it is. */
-static sym3 inertia_of(const struct sadmm_rigid *body)
-{
-    return rigid_world_inertia(q_matrix(q_load(body->orientation)), v3_load(body->inertia));
-}
-
-/* Moves a body; its island, if it is in the air, gets to know. */
-static void move(const struct sadmm_push *p, int32_t k, double dt, struct sadmm_rigid *next)
-{
-    struct sadmm_rigid *body = &next[p->bodies[k]];
-    const double *way = p->way + 6 * (size_t)k;
-    const vec3 v = v3_load(body->velocity), w = v3_load(body->velocity + 3), before = v3_load(body->position),
-               after = rigid_move(before, v3_load(way), dt), spin = s3_mul(inertia_of(body), w);
-    v3_store(after, body->position);
-    q_store(rigid_turn(q_load(body->orientation), v3_load(way + 3), dt), body->orientation);
-    if (!p->free[k]) return;
-    struct push_island *island = &p->islands[p->first[k]];
-    const sym3 inertia = inertia_of(body);
-    const vec3 d = v3_sub(after, v3_load(p->rigid[p->first[k]].position));
-    island->mass += body->mass;
-    island->middle = v3_madd(island->middle, body->mass, d);
-    island->turn = v3_add(island->turn, v3_add(v3_cross(v3_sub(after, before), v3_scale(v, body->mass)),
-                                               v3_sub(s3_mul(inertia, w), spin)));
-    island->inertia.xx += inertia.xx, island->inertia.yy += inertia.yy, island->inertia.zz += inertia.zz;
-    island->inertia.xy += inertia.xy, island->inertia.xz += inertia.xz, island->inertia.yz += inertia.yz;
-    add_arm_inertia(body->mass, d, &island->inertia);
-}
-
-/* In place of `turn` the turn about the middle that takes it back, rad/s; in place of `middle` where that is. */
-static void find_turn(struct push_island *island)
-{
-    island->middle = v3_scale(island->middle, 1 / island->mass);
-    add_arm_inertia(-island->mass, island->middle, &island->inertia);
-    const sym3 s = island->inertia;
-    const mat3 m = {{v3(s.xx, s.xy, s.xz), v3(s.xy, s.yy, s.yz), v3(s.xz, s.yz, s.zz)}};
-    island->turn = v3_max_abs(island->turn) > 0 ? m3_solve(m, v3_neg(island->turn)) : v3(0, 0, 0);
-}
+/* The place about which an island is turned. */
+static vec3 place_of(const struct sadmm_push *p, int32_t k) { return v3_load(p->rigid[p->first[k]].position); }
 
 void sadmm_push_move(const struct sadmm_push *p, double dt, struct sadmm_rigid *next)
 {
     const int32_t n = p->system.body_count;
     memset(p->islands, 0, (size_t)n * sizeof *p->islands);
-    for (int32_t k = 0; k < n; ++k) move(p, k, dt, next);
     for (int32_t k = 0; k < n; ++k)
-        if (p->free[k] && p->first[k] == k) find_turn(&p->islands[k]);
-    for (int32_t k = 0; k < n; ++k) {
-        if (!p->free[k]) continue;
-        const struct push_island *island = &p->islands[p->first[k]];
-        struct sadmm_rigid *body = &next[p->bodies[k]];
-        const vec3 d = v3_sub(v3_sub(v3_load(body->position), v3_load(p->rigid[p->first[k]].position)), island->middle);
-        v3_store(v3_add(v3_load(body->velocity), v3_cross(island->turn, d)), body->velocity);
-        v3_store(v3_add(v3_load(body->velocity + 3), island->turn), body->velocity + 3);
-    }
+        push_move_body(&next[p->bodies[k]], p->way + 6 * (size_t)k, dt, place_of(p, k),
+                       p->free[k] ? &p->islands[p->first[k]] : NULL);
+    for (int32_t k = 0; k < n; ++k)
+        if (p->free[k] && p->first[k] == k) push_find_turn(&p->islands[k]);
+    for (int32_t k = 0; k < n; ++k)
+        if (p->free[k]) push_turn_body(&p->islands[p->first[k]], place_of(p, k), &next[p->bodies[k]]);
 }

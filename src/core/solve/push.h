@@ -15,11 +15,14 @@
  * math/contact.h): velocities follow the overlap down, and nothing is left of them. That is so where no push takes more
  * than all of gravity, nor do those that add up on the way from the ground: all of an island's, over the number of pairs
  * that it stands on. Heaps, where nearly everything overlaps a little, are solved once. Islands with constraints given by
- * rows are, too. In double; which islands, and what they move by, depends on no threads. */
+ * rows are, too. In double; which islands, and what they move by (model/push_law.h), depends on no threads.
+ *
+ * Backends that make whole steps do the same by themselves. */
 #ifndef SADMM_CORE_SOLVE_PUSH_H
 #define SADMM_CORE_SOLVE_PUSH_H
 
 #include "kernels.h"
+#include "plan.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -39,10 +42,13 @@ sadmm_status sadmm_push_choose(struct sadmm_push *push, struct sadmm_system *sys
 /* Bodies that are pushed in this step. */
 int32_t sadmm_push_count(const struct sadmm_push *push);
 
-/* After it: the second problem, from the solution of the first one. */
-sadmm_status sadmm_push_solve(struct sadmm_push *push, const struct sadmm_kernels *kernels,
-                              const struct sadmm_system *system, const struct sadmm_settings *settings,
-                              struct sadmm_error *error);
+/* Those of the second problem. */
+struct sadmm_settings sadmm_push_settings(const struct sadmm_settings *step);
+
+/* After it: the second problem, from the solution of the first one. contact_rows: of the step's plan. */
+sadmm_status sadmm_push_solve(struct sadmm_push *push, const struct sadmm_kernels *kernels, int device,
+                              const struct sadmm_system *system, int contact_rows,
+                              const struct sadmm_settings *settings, struct sadmm_error *error);
 
 /* The bodies (system->body_count) after the step, by what they are pushed. */
 void sadmm_push_move(const struct sadmm_push *push, double dt, struct sadmm_rigid *next);

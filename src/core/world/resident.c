@@ -372,6 +372,8 @@ sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status)
     if (world->resident.loaded && !save(world)) fall_back(world);
     world->kernels->destroy(world->context);
     world->context = NULL;
+    sadmm_push_destroy(world->push); /* it has a context of the same device */
+    world->push = NULL;
     return sadmm_fail(&world->error, SADMM_ERROR_DEVICE, "%s; the world is as after step %lld", cause.message,
                       (long long)world->report.step);
 }

@@ -200,8 +200,7 @@ static sadmm_status choose_pushes(struct host_step *step, double depth)
 {
     sadmm_world *world = step->world;
     step->pushed = 0;
-    /* a backend that makes steps by itself has pushes in velocities, and the host is to make the same ones */
-    if (depth <= step->settings.slop || world->kernels->resident) return SADMM_OK;
+    if (depth <= step->settings.slop) return SADMM_OK;
     if (!world->push) world->push = sadmm_push_create();
     if (!world->push) return sadmm_fail_memory(&world->error, "bodies that overlap");
     TRY(sadmm_push_choose(world->push, &step->system, &step->settings, world->plan.threads, &world->error));
@@ -211,9 +210,10 @@ static sadmm_status choose_pushes(struct host_step *step, double depth)
 
 static sadmm_status solve_pushes(struct host_step *step)
 {
+    sadmm_world *world = step->world;
     if (step->pushed == 0) return SADMM_OK;
-    return sadmm_push_solve(step->world->push, step->world->kernels, &step->system, &step->settings,
-                            &step->world->error);
+    return sadmm_push_solve(world->push, world->kernels, world->def.device, &step->system,
+                            world->plan.contact_rows, &step->settings, &world->error);
 }
 
 static sadmm_status make_plan(struct host_step *step)
