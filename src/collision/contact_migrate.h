@@ -188,16 +188,22 @@ SADMM_INLINE void migration_begin(const struct sadmm_proxy *a, const struct sadm
     }
 }
 
-/* What two dynamic bodies' arms grow apart by: the same for all points of a pair. */
-SADMM_INLINE void migrate_apart(const struct migration_pair *pair, struct migration_set old,
-                                const struct sadmm_contact_point *point, double apart[3])
+/* Two dynamic bodies that roll on each other move by means, so that it is halfway through the step that an impulse acts:
+ * the arms are those to where they touch there, not those that were moved to one point in space of the start
+ * (contact_emit.h). They go back, and the gap with them; dt: of the step, half of which they are ahead. */
+SADMM_INLINE void migrate_from_halfway(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt,
+                                       const double normal[3], struct sadmm_contact_point *point)
 {
-    const struct sadmm_contact_point *head = &old.points[pair->before->first];
-    const struct sadmm_contact_migration *own = sadmm_migration_of(old.points, old.migrations, pair->before->first);
+    double across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0};
     int k;
+    add_cross(normal, a->angular, 1, across_a);
+    add_cross(normal, b->angular, 1, across_b);
     for (k = 0; k < 3; ++k) {
-        const double now = point->arm_b[k] - point->arm_a[k], then = head->arm_b[k] - head->arm_a[k];
-        apart[k] = pair->share * (now - then + (own ? own->arm_b[k] - own->arm_a[k] : 0));
+        const double way = way_ahead(a, b, dt / 2, k), shift_a = proxy_share(a, b) * way,
+                     shift_b = proxy_share(b, a) * way;
+        point->arm_a[k] += shift_a;
+        point->arm_b[k] -= shift_b;
+        point->gap += dt * (across_a[k] * shift_a + across_b[k] * shift_b);
     }
 }
 
@@ -210,12 +216,13 @@ SADMM_INLINE bool migrate_arm(double share, const double arm[3], const double ol
     return dot3(change, change) <= MIGRATION_MOST * MIGRATION_MOST * dot3(arm, arm);
 }
 
-/* The point goes on to the step's end; false: it has no migration worth keeping. guess: its index in the pair. */
+/* The point goes on to the step's end; false: it has no migration worth keeping. guess: its index in the pair; normal:
+ * halfway. */
 SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                 const struct migration_pair *pair, struct migration_set old, int32_t guess,
-                                double radius, struct sadmm_contact_point *point, struct sadmm_contact_migration *out)
+                                double radius, double dt, const double normal[3], struct sadmm_contact_point *point,
+                                struct sadmm_contact_migration *out)
 {
-    const bool both = a->system_body >= 0 && b->system_body >= 0;
     int32_t at = -1;
     int k;
     out->radius = radius;
@@ -224,8 +231,9 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
         out->arm_a[k] = out->arm_b[k] = 0;
     }
     if (!pair->before && !(radius > 0)) return false;
-    point->migrates = 1;
+    point->migrates = pair->before ? MIGRATES_ON : MIGRATES_NOWHERE;
     if (!pair->before) return true;
+    if (a->system_body >= 0 && b->system_body >= 0) migrate_from_halfway(a, b, dt, normal, point);
     at = contact_find_feature(old.points + pair->before->first, pair->before->count, point->feature, guess);
     if (at >= 0) {
         const struct sadmm_contact_point *from = &old.points[pair->before->first + at];
@@ -235,11 +243,6 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
                    small_b = migrate_arm(pair->share, point->arm_b, from->arm_b, own ? own->arm_b : 0, out->arm_b);
         if (!(small_a && small_b))
             for (k = 0; k < 3; ++k) out->arm_a[k] = out->arm_b[k] = 0;
-    }
-    if (both) {
-        double apart[3];
-        migrate_apart(pair, old, point, apart);
-        for (k = 0; k < 3; ++k) out->arm_a[k] = out->arm_b[k] - apart[k];
     }
     for (k = 0; k < 3; ++k) {
         point->arm_a[k] += out->arm_a[k];

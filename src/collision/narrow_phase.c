@@ -112,7 +112,8 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
                                  friction, ratio, point);
         const double radius = midway ? contact_radius(pa, pb, m->count, normal, point) : 0;
         if ((rolling.before || radius > 0) &&
-            migrate_point(pa, pb, &rolling, last, i, radius, point, &out->migrations[out->point_count]))
+            migrate_point(pa, pb, &rolling, last, i, radius, input->dt, normal, point,
+                          &out->migrations[out->point_count]))
             ++out->migrating;
         ++out->point_count;
     }

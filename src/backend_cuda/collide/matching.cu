@@ -70,15 +70,16 @@ static __device__ __forceinline__ emit_in_place emit_source_of(const collision_v
 /* The point goes on to the step's end, and its normal (core/model/rolling.h). */
 static __device__ __forceinline__ void migrate(const collision_view &v, const struct sadmm_proxy *a,
                                                const struct sadmm_proxy *b, const struct sadmm_contact_pair *before,
-                                               double ratio, int32_t count, int32_t lane, int32_t at, double normal[3],
-                                               struct sadmm_contact_point *point)
+                                               const step_lengths &dt, int32_t count, int32_t lane, int32_t at,
+                                               double normal[3], struct sadmm_contact_point *point)
 {
     const struct migration_set last = {v.before.points, v.before.migrations};
     const double radius = contact_radius(a, b, count, normal, point);
     struct sadmm_contact_migration migration;
     struct migration_pair pair;
-    migration_begin(a, b, before, last, ratio, count, normal, &pair);
-    if (migrate_point(a, b, &pair, last, lane, radius, point, &migration)) v.after.migrations[at] = migration;
+    migration_begin(a, b, before, last, step_ratio(dt.now, dt.before), count, normal, &pair);
+    if (migrate_point(a, b, &pair, last, lane, radius, dt.now, normal, point, &migration))
+        v.after.migrations[at] = migration;
     for (int k = 0; k < 3; ++k) normal[k] = pair.normal[k];
 }
 
@@ -261,7 +262,7 @@ static __device__ __forceinline__ void emit_general(const collision_view &v, con
     if (is_midway(source.head.ahead, dt.now)) {
         place_point(source, dt.now, normal, &point);
         if (contact_may_migrate(pa, pb, before, v.before.points, start.count))
-            migrate(v, pa, pb, before, ratio, start.count, lane, first + lane, normal, &point);
+            migrate(v, pa, pb, before, dt, start.count, lane, first + lane, normal, &point);
     } else {
         contact_emit_turned(pa, pb, source.head.normal, source.head.ahead, dt.now, &source.point, normal, &point);
     }
