@@ -101,28 +101,42 @@ SADMM_INLINE double contact_radius(const struct sadmm_proxy *a, const struct sad
 /* Shapes that overlap by more than this share of the thinner one touch at no point that goes anywhere. */
 #define ROLLING_DEPTH 0.05
 
-/* Did both bodies move by means, and is the manifold of the same kind as before? */
+/* Did both bodies move by means? */
+SADMM_INLINE bool contact_by_means(const struct sadmm_proxy *a, const struct sadmm_proxy *b)
+{
+    return (a->mean != 0) & (b->mean != 0);
+}
+
+/* And is the manifold of the same kind as before? */
 SADMM_INLINE bool contact_kind_rolls(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                      const struct sadmm_contact_pair *before, int32_t count)
 {
-    return (a->mean != 0) & (b->mean != 0) & (before->count == count) & (count <= ROLLING_POINTS);
+    return contact_by_means(a, b) & (before->count == count) & (count <= ROLLING_POINTS);
 }
 
-/* Do the pair's points go on as they went since the last step? They did then, and pressed: what hits in this step hits
- * as it is found. points: of the set that `before` is of. */
-SADMM_INLINE bool contact_rolls(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+/* Did the pair press in the last step, by as many points? What hits in this step hits as it is found. points: of the set
+ * that `before` is of. */
+SADMM_INLINE bool contact_lasts(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                 const struct sadmm_contact_pair *before, const struct sadmm_contact_point *points,
                                 int32_t count)
 {
     const double deep = ROLLING_DEPTH * smaller_of(a->thin, b->thin);
     bool presses = false;
     int32_t k;
-    if (!contact_kind_rolls(a, b, before, count)) return false;
+    if (before->count != count || count > ROLLING_POINTS) return false;
     for (k = before->first; k < before->first + count; ++k) {
         if (points[k].gap < -deep) return false;
         presses = presses || sadmm_normal_impulse(before, &points[k]) > 0;
     }
     return presses;
+}
+
+/* Do its points go on as they went since the last step? They did then, too. */
+SADMM_INLINE bool contact_rolls(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                const struct sadmm_contact_pair *before, const struct sadmm_contact_point *points,
+                                int32_t count)
+{
+    return contact_by_means(a, b) && contact_lasts(a, b, before, points, count);
 }
 
 /* May any point of it have a migration? before: NULL, none. */
@@ -161,17 +175,24 @@ struct migration_set {
 /* What the points of a pair have in common. before: the pair that it goes on from, NULL: none. */
 struct migration_pair {
     const struct sadmm_contact_pair *before; /* NULL: nothing rolls */
+    bool soon;                               /* but did press, and is curved */
     double share, normal[3];                 /* of the step's end */
     double change[3];                        /* of the normal */
 };
 
+/* What turns by less than this in a step, rad, has a normal that leads close by less than they may (math/lead.h). */
+#define MIGRATION_LEAST 1e-3
+
 /* normal: halfway. ratio: step_ratio. */
 SADMM_INLINE void migration_begin(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                  const struct sadmm_contact_pair *before, struct migration_set old, double ratio,
-                                  int32_t count, const double normal[3], struct migration_pair *pair)
+                                  const struct sadmm_contact_pair *before, struct migration_set old, double dt,
+                                  double ratio, int32_t count, const double normal[3], struct migration_pair *pair)
 {
     int k;
     pair->before = before && contact_rolls(a, b, before, old.points, count) ? before : 0;
+    pair->soon = !pair->before && before && contact_is_curved(a, b, count) &&
+                 dt * (size3(a->angular) + size3(b->angular)) > MIGRATION_LEAST &&
+                 contact_lasts(a, b, before, old.points, count);
     pair->share = migration_share(ratio);
     for (k = 0; k < 3; ++k) {
         pair->change[k] = 0;
@@ -230,8 +251,8 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
         out->normal[k] = pair->change[k];
         out->arm_a[k] = out->arm_b[k] = 0;
     }
-    if (!pair->before && !(radius > 0)) return false;
-    point->migrates = pair->before ? MIGRATES_ON : MIGRATES_NOWHERE;
+    if (!pair->before && !pair->soon && !(radius > 0)) return false;
+    point->migrates = pair->before ? MIGRATES_ON : pair->soon ? MIGRATES_SOON : MIGRATES_NOWHERE;
     if (!pair->before) return true;
     if (a->system_body >= 0 && b->system_body >= 0) migrate_from_halfway(a, b, dt, normal, point);
     at = contact_find_feature(old.points + pair->before->first, pair->before->count, point->feature, guess);

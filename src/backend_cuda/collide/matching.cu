@@ -77,7 +77,7 @@ static __device__ __forceinline__ void migrate(const collision_view &v, const st
     const double radius = contact_radius(a, b, count, normal, point);
     struct sadmm_contact_migration migration;
     struct migration_pair pair;
-    migration_begin(a, b, before, last, step_ratio(dt.now, dt.before), count, normal, &pair);
+    migration_begin(a, b, before, last, dt.now, step_ratio(dt.now, dt.before), count, normal, &pair);
     if (migrate_point(a, b, &pair, last, lane, radius, dt.now, normal, point, &migration))
         v.after.migrations[at] = migration;
     for (int k = 0; k < 3; ++k) normal[k] = pair.normal[k];
