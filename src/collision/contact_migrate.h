@@ -139,6 +139,22 @@ SADMM_INLINE bool contact_rolls(const struct sadmm_proxy *a, const struct sadmm_
     return contact_by_means(a, b) && contact_lasts(a, b, before, points, count);
 }
 
+/* The old pair that a round body goes on from where it rolls over a mesh: of the triangle itself, or of another one of the
+ * same plane. [first, last): the old pairs of the two shapes. NULL: none. */
+SADMM_INLINE const struct sadmm_contact_pair *contact_rolls_from(
+    const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct sadmm_contact_pair *before,
+    const struct sadmm_contact_pair *pairs, int64_t first, int64_t last, const struct sadmm_contact_point *points,
+    int32_t count, const double normal[3])
+{
+    const uint32_t revision = word_of_pair(a->revision, b->revision);
+    int64_t i;
+    if ((before && contact_lasts(a, b, before, points, count)) || !contact_is_curved(a, b, count)) return before;
+    for (i = first; i < last; ++i)
+        if (contact_is_beside(&pairs[i], revision, normal) && contact_lasts(a, b, &pairs[i], points, count))
+            return &pairs[i];
+    return before;
+}
+
 /* May any point of it have a migration? before: NULL, none. */
 SADMM_INLINE bool contact_may_migrate(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                       const struct sadmm_contact_pair *before, const struct sadmm_contact_point *points,
@@ -176,6 +192,7 @@ struct migration_set {
 struct migration_pair {
     const struct sadmm_contact_pair *before; /* NULL: nothing rolls */
     bool soon;                               /* but did press, and is curved */
+    bool across;                             /* before: of another triangle */
     double share, normal[3];                 /* of the step's end */
     double change[3];                        /* of the normal */
 };
@@ -194,6 +211,7 @@ SADMM_INLINE void migration_begin(const struct sadmm_proxy *a, const struct sadm
                  dt * (size3(a->angular) + size3(b->angular)) > MIGRATION_LEAST &&
                  contact_lasts(a, b, before, old.points, count);
     pair->share = migration_share(ratio);
+    pair->across = false;
     for (k = 0; k < 3; ++k) {
         pair->change[k] = 0;
         pair->normal[k] = normal[k];
@@ -255,7 +273,8 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
     point->migrates = pair->before ? MIGRATES_ON : pair->soon ? MIGRATES_SOON : MIGRATES_NOWHERE;
     if (!pair->before) return true;
     if (a->system_body >= 0 && b->system_body >= 0) migrate_from_halfway(a, b, dt, normal, point);
-    at = contact_find_feature(old.points + pair->before->first, pair->before->count, point->feature, guess);
+    if (!pair->across || contact_is_of_body(point->feature))
+        at = contact_find_feature(old.points + pair->before->first, pair->before->count, point->feature, guess);
     if (at >= 0) {
         const struct sadmm_contact_point *from = &old.points[pair->before->first + at];
         const struct sadmm_contact_migration *own =
