@@ -8,8 +8,8 @@ static void opened(sadmm_world *world) { use_device(world, used_precision, 0); }
 
 START_TEST(errors_have_their_order)
 {
-    static const char *const names[] = {"thrown, three moments", "a ball skids until it rolls",
-                                        "cylinders and capsules rock", "a body on a ball joint"};
+    static const char *const names[] = {"a ball skids until it rolls", "a ball rolls, off centre",
+                                        "a ball off centre on triangles", "a ball rocks on a ball that rocks"};
     sadmm_world_def def = sadmm_world_def_default();
     used_precision = _i;
     def.backend = SADMM_BACKEND_CPU;
