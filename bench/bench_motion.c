@@ -1,7 +1,8 @@
 /* subadmm-bench motion: total error against run time of scenes in motion. Trajectories with the scene's time step, half
  * of it, a quarter, ... by numbers of iterations are compared with one at a 64th of the step and with many iterations,
  * at the same simulated times; heaps, whose trajectories part whatever one does, after a short time from states on one
- * run. Overlaps are measured apart from the library (overlap.h). docs/motion.md. */
+ * run. Overlaps are measured apart from the library (overlap.h). Or motions whose answers are known (known_motions.h).
+ * docs/motion.md. */
 #include <math.h>
 #include <string.h>
 
@@ -9,15 +10,16 @@
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/base/memory.h"
+#include "known_rows.h"
 #include "motion_rows.h"
 
-static const char command[] = "motion";
+static const char command[] = "motion", default_scene[] = "pile:300";
 
 struct options {
     const char *scene, *json;
     int backend, precision, method;
     long device, threads, halvings, substeps[BENCH_LIST], iterations[BENCH_LIST], match, seeds, repeats, starts,
-        reference, reference_iterations;
+        reference, reference_iterations, known;
     int substep_count, iteration_count;
     double dt, seconds, horizon;
 };
@@ -26,6 +28,9 @@ static int parse(int argc, char **argv, struct options *o)
 {
     const struct bench_option options[] = {
         BENCH_TEXT("scene", "SPEC", &o->scene, "default pile:300"),
+        BENCH_NUMBER("known", &o->known, 1, 1000,
+                     "in place of a scene: N motions of every kind with a known answer, against that; goes with "
+                     "halvings, iterations (the last), method, backend, precision, threads and device"),
         BENCH_REAL("dt", "S", &o->dt, 1, "time step of a frame, default the scene's"),
         BENCH_NUMBER("halvings", &o->halvings, 0, MOST_HALVINGS, "of it: dt, dt/2, ...; default 2"),
         BENCH_NUMBERS("substeps", o->substeps, &o->substep_count, 1, SADMM_MOST_SUBSTEPS,
@@ -152,10 +157,28 @@ static int study_plan(const struct options *o, const struct motion_plan *plan)
     return code;
 }
 
+static int run_known(const struct options *o)
+{
+    struct sadmm_error error = {SADMM_OK, ""};
+    sadmm_world_def def = sadmm_world_def_default();
+    if (o->json || o->scene != default_scene) return wrong("--known takes neither --scene nor --json");
+    if (o->halvings < 1 || o->halvings >= KNOWN_LEVELS)
+        return bad_number("halvings", o->halvings, "1 to 4 with --known");
+    def.backend = (sadmm_backend)o->backend;
+    def.precision = (sadmm_precision)(o->precision < 0 ? SADMM_F64 : o->precision);
+    def.device = (int)o->device;
+    def.settings.method = (sadmm_method)o->method;
+    def.settings.threads = (int)o->threads;
+    def.settings.iterations = (int)o->iterations[o->iteration_count - 1];
+    if (known_print(&def, (int)o->known, (int)o->halvings + 1, stdout, &error) == SADMM_OK) return 0;
+    fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
+    return 1;
+}
+
 int bench_motion(int argc, char **argv)
 {
     struct options o = {
-        .scene = "pile:300", .backend = SADMM_BACKEND_CPU, .precision = SADMM_F32, .method = SADMM_METHOD_FAST,
+        .scene = default_scene, .backend = SADMM_BACKEND_CPU, .precision = SADMM_F32, .method = SADMM_METHOD_FAST,
         .threads = 1, .halvings = 2, .substeps = {1}, .substep_count = 1, .iterations = {20, 60},
         .iteration_count = 2, .match = -1, .seeds = 3,
         .starts = 9, .horizon = 0.05, .reference = 6, .reference_iterations = 300,
@@ -163,6 +186,7 @@ int bench_motion(int argc, char **argv)
     struct motion_plan plan = {0};
     int code = parse(argc, argv, &o);
     if (code) return code < 0 ? 0 : code;
+    if (o.known > 0) return run_known(&o);
     code = make_plan(&o, &plan);
     if (code == 0) code = study_plan(&o, &plan);
     sadmm_scene_close(&plan.scene);

@@ -51,30 +51,33 @@ START_TEST(points)
     static const struct {
         double gap, push, speed, lead[2];
         int island, body[2];
-        bool rolls;
+        uint32_t migrates;
     } cases[] = {
         /* rest, and sliding: nothing along the normal */
-        {0, 1, 0, {0, 0}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, false},
+        {0, 1, 0, {0, 0}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, MIGRATES_NOT},
         /* a landing: it stops, from 1 m/s */
-        {0.003, 1, -0.3, {0, 0.35}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, false},
+        {0.003, 1, -0.3, {0, 0.35}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, MIGRATES_NOT},
         /* what falls is lifted */
-        {0.003, 0, -0.2, {0, -0.05}, 0, {0, 0}, false},
+        {0.003, 0, -0.2, {0, -0.05}, 0, {0, 0}, MIGRATES_NOT},
         /* what flies up to something has room for it, or for half of it, or has not */
-        {0.003, 0, -0.2, {0, 0.04}, 0, {0, 0}, false},
-        {0.003, 0, -0.2, {0, 0.06}, 0, {0, TOUCH_CARRIED}, false},
-        {0.003, 0, -0.2, {0, 0.11}, TOUCH_JOLT, {0, TOUCH_CARRIED}, false},
+        {0.003, 0, -0.2, {0, 0.04}, 0, {0, 0}, MIGRATES_NOT},
+        {0.003, 0, -0.2, {0, 0.06}, 0, {0, TOUCH_CARRIED}, MIGRATES_NOT},
+        {0.003, 0, -0.2, {0, 0.11}, TOUCH_JOLT, {0, TOUCH_CARRIED}, MIGRATES_NOT},
         /* two that fall as one */
-        {0.0001, 0, 0, {0.05, -0.05}, 0, {TOUCH_CARRIED, 0}, false},
+        {0.0001, 0, 0, {0.05, -0.05}, 0, {TOUCH_CARRIED, 0}, MIGRATES_NOT},
         /* overlapping ones, and noise */
-        {-0.003, 1, 0.1, {0, 0.05}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, false},
-        {0, 0, 0, {0, 4e-5}, 0, {0, 0}, false},
+        {-0.003, 1, 0.1, {0, 0.05}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, MIGRATES_NOT},
+        {0, 0, 0, {0, 4e-5}, 0, {0, 0}, MIGRATES_NOT},
         /* a bounce that keeps all of its speed goes back to where it was */
-        {0.003, 1, 1, {0, 1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, false},
+        {0.003, 1, 1, {0, 1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, MIGRATES_NOT},
         /* what rolls stays as deep as it is, by the mean of an end where it opens as fast as it closed */
-        {-0.003, 1, 0.1, {0, 0.1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, true},
-        {-0.003, 1, 0.1, {0, 0.11}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, true},
+        {-0.003, 1, 0.1, {0, 0.1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, MIGRATES_NOWHERE},
+        {-0.003, 1, 0.1, {0, 0.11}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, MIGRATES_NOWHERE},
+        /* where a round surface pressed before, half of what the lead moves it by */
+        {-0.003, 1, 0.1, {0, 0.11}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}, MIGRATES_SOON},
+        {-0.003, 1, 0.1, {0, 0.3}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}, MIGRATES_SOON},
         /* of 0.2 m 5 % would be 10 mm more than there is room for; of an arm of 0.1 m it is 5 mm */
-        {0.1925, 0, 0, {0, 20}, TOUCH_JOLT, {0, TOUCH_CARRIED}, false},
+        {0.1925, 0, 0, {0, 20}, TOUCH_JOLT, {0, TOUCH_CARRIED}, MIGRATES_NOT},
     };
     const double size[2] = {fabs(cases[_i].lead[0]), fabs(cases[_i].lead[1])};
     static const double arm[2] = {0.1, 0.1};
@@ -82,7 +85,7 @@ START_TEST(points)
     static const double gravity[3] = {0, 0, -20}, force[3] = {0, 0, 8}; /* 1 kg: 0.01 x 2 m/s a step by itself */
     const double at_rest = lead_rest_speed(gravity, 0.5, force, 1, 0.01), rest[2] = {at_rest, at_rest};
     const double moves[2] = {0.0019, 0.0021};
-    const struct lead_gap gap = {cases[_i].gap, cases[_i].speed, {arm[0], arm[1]}, cases[_i].rolls};
+    const struct lead_gap gap = {cases[_i].gap, cases[_i].speed, {arm[0], arm[1]}, cases[_i].migrates};
     lead_add_point(&touch, gap, cases[_i].push, cases[_i].lead, size, moves, rest, 0.01, 1e-5);
     ck_assert_int_eq(touch.island, cases[_i].island);
     for (int s = 0; s < 2; ++s) {
@@ -91,7 +94,7 @@ START_TEST(points)
     }
 }
 END_TEST
-enum { POINTS = 13 };
+enum { POINTS = 15 };
 
 int main(void)
 {

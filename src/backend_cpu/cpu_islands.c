@@ -1,5 +1,5 @@
 /* begin: islands of the step, and which of them are loose: those that no static pair is known to hold
- * (momentum_is_held). Most are held, which one of their pairs decides; lists are made for the others alone. */
+ * (momentum_is_held), and in which no bodies roll on each other. Most are held, which one of their pairs decides; lists are made for the others alone. */
 #include "core/base/memory.h"
 #include "core/math/momentum.h"
 #include "core/model/islands.h"
@@ -14,6 +14,7 @@ static bool holds(const struct sadmm_context *c, const struct sadmm_contact_pair
 {
     const struct sadmm_contact_point *points = &c->system->contacts->points[pair->first];
     struct arm_sums arms = {0};
+    if (!is_static(pair)) return sadmm_pair_rolls(pair, points);
     if (pair->count < 3 || !(pair->friction > 0)) return false;
     for (int32_t k = 0; k < pair->count; ++k) add_arm(&arms, pair->body_a >= 0 ? points[k].arm_a : points[k].arm_b, 1);
     return momentum_is_held(pair->friction, &arms);
@@ -34,7 +35,7 @@ static size_t mark_held(struct sadmm_context *c)
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
         int32_t *island = island_of(c, pair->body_a, pair->body_b);
         if (*island == HELD) continue;
-        *island = is_static(pair) && holds(c, pair) ? HELD : TOUCHED;
+        *island = holds(c, pair) ? HELD : TOUCHED;
         pairs += is_static(pair);
     }
     for (size_t k = 0; k < sadmm_row_constraint_count(c->system); ++k) /* left alone */

@@ -111,7 +111,7 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
             n, point, sadmm_migration_of(c->system->contacts->points, c->system->contacts->migrations, k));
         const double leads[2] = {-lead_along(at.normal, a->lead, at.arm_a), lead_along(at.normal, b->lead, at.arm_b)};
         const double speed = lead_along(at.normal, v_b, at.arm_b) - lead_along(at.normal, v_a, at.arm_a);
-        const struct lead_gap gap = {point->gap, speed, {size3(arm_a), size3(arm_b)}, point->migrates != 0};
+        const struct lead_gap gap = {point->gap, speed, {size3(arm_a), size3(arm_b)}, point->migrates};
         lead_add_way(&touch, gap, leads, size, dt, slop);
     }
     return touch;

@@ -93,7 +93,7 @@ static void touch_point(struct sadmm_context *c, const struct sadmm_contact_pair
     }
     const struct sadmm_contact_point *point = &contacts->points[k];
     const struct lead_gap gap = {
-        point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates != 0};
+        point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
     lead_add_point(&touch, gap,
                    constraint->lambda[0], lead, size, moves, rest,
                    c->settings->dt, c->settings->slop);

@@ -72,6 +72,8 @@ static void find_loose(struct sadmm_context *c)
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
         struct arm_sums arms = {0};
+        if (sadmm_pair_rolls(pair, &contacts->points[pair->first]))
+            island_of(c, &c->constraints[pair->first])->loose = false;
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
             add_arm(&arms, pair->body_a >= 0 ? contacts->points[k].arm_a : contacts->points[k].arm_b, 1);
         if ((pair->body_a < 0 || pair->body_b < 0) && momentum_is_held(pair->friction, &arms))

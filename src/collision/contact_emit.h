@@ -69,8 +69,7 @@ SADMM_INLINE void pair_motion_at(const struct sadmm_proxy *a, double ahead_a, co
                                  struct pair_motion *m)
 {
     const bool both = a->system_body >= 0 && b->system_body >= 0;
-    const double inertia = a->inertia + b->inertia, share_a = !both ? 0 : inertia > 0 ? a->inertia / inertia : 0.5,
-                 share_b = !both ? 0 : inertia > 0 ? b->inertia / inertia : 0.5;
+    const double share_a = both ? proxy_share(a, b) : 0, share_b = both ? proxy_share(b, a) : 0;
     double across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0}; /* n x w, since n . (w x r) = r . (n x w) */
     double way[3], take;
     int k;

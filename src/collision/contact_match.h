@@ -124,6 +124,22 @@ SADMM_INLINE bool contact_carry(const struct sadmm_contact_pair *old, const stru
 /* Difference of unit normals below which two triangles are of one plane: rounding of single precision. */
 #define CONTACT_SAME_PLANE 1e-4
 
+/* Is it a point of the body, the same on every triangle that it slides over? */
+SADMM_INLINE bool contact_is_of_body(uint32_t feature)
+{
+    const uint32_t kind = feature >> AXIS_KIND_SHIFT;
+    return kind == FEATURE_VERTEX_A || kind == FEATURE_NEAREST;
+}
+
+/* Is the old pair one of the same plane as a triangle with this normal? */
+SADMM_INLINE bool contact_is_beside(const struct sadmm_contact_pair *old, uint32_t revision, const double normal[3])
+{
+    double apart2 = 0;
+    int k;
+    for (k = 0; k < 3; ++k) apart2 += (old->normal[k] - normal[k]) * (old->normal[k] - normal[k]);
+    return old->revision == revision && apart2 <= CONTACT_SAME_PLANE * CONTACT_SAME_PLANE;
+}
+
 /* The same of a point that slides over a mesh: the triangle that it was over in the last step may be another one of
  * the same plane. Only points of the body are the same on both (mesh_leaves_out). [first, last): the old pairs of the
  * two shapes. */
@@ -132,17 +148,12 @@ SADMM_INLINE void contact_carry_across(const struct sadmm_contact_pair *pairs, i
                                        const double normal[3], double friction, double ratio,
                                        struct sadmm_contact_point *point)
 {
-    const uint32_t kind = point->feature >> AXIS_KIND_SHIFT;
     int64_t i;
-    if (kind != FEATURE_VERTEX_A && kind != FEATURE_NEAREST) return;
-    for (i = first; i < last; ++i) {
-        double apart2 = 0;
-        int k;
-        for (k = 0; k < 3; ++k) apart2 += (pairs[i].normal[k] - normal[k]) * (pairs[i].normal[k] - normal[k]);
-        if (pairs[i].revision == revision && apart2 <= CONTACT_SAME_PLANE * CONTACT_SAME_PLANE &&
+    if (!contact_is_of_body(point->feature)) return;
+    for (i = first; i < last; ++i)
+        if (contact_is_beside(&pairs[i], revision, normal) &&
             contact_carry(&pairs[i], old_points, guess, normal, friction, ratio, point))
             return;
-    }
 }
 
 #endif

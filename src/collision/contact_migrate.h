@@ -101,28 +101,58 @@ SADMM_INLINE double contact_radius(const struct sadmm_proxy *a, const struct sad
 /* Shapes that overlap by more than this share of the thinner one touch at no point that goes anywhere. */
 #define ROLLING_DEPTH 0.05
 
-/* Did both bodies move by means, and is the manifold of the same kind as before? */
+/* Did both bodies move by means? */
+SADMM_INLINE bool contact_by_means(const struct sadmm_proxy *a, const struct sadmm_proxy *b)
+{
+    return (a->mean != 0) & (b->mean != 0);
+}
+
+/* And is the manifold of the same kind as before? */
 SADMM_INLINE bool contact_kind_rolls(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                      const struct sadmm_contact_pair *before, int32_t count)
 {
-    return (a->mean != 0) & (b->mean != 0) & (before->count == count) & (count <= ROLLING_POINTS);
+    return contact_by_means(a, b) & (before->count == count) & (count <= ROLLING_POINTS);
 }
 
-/* Do the pair's points go on as they went since the last step? They did then, and pressed: what hits in this step hits
- * as it is found. points: of the set that `before` is of. */
-SADMM_INLINE bool contact_rolls(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+/* Did the pair press in the last step, by as many points? What hits in this step hits as it is found. points: of the set
+ * that `before` is of. */
+SADMM_INLINE bool contact_lasts(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                 const struct sadmm_contact_pair *before, const struct sadmm_contact_point *points,
                                 int32_t count)
 {
     const double deep = ROLLING_DEPTH * smaller_of(a->thin, b->thin);
     bool presses = false;
     int32_t k;
-    if (!contact_kind_rolls(a, b, before, count)) return false;
+    if (before->count != count || count > ROLLING_POINTS) return false;
     for (k = before->first; k < before->first + count; ++k) {
         if (points[k].gap < -deep) return false;
         presses = presses || sadmm_normal_impulse(before, &points[k]) > 0;
     }
     return presses;
+}
+
+/* Do its points go on as they went since the last step? They did then, too. */
+SADMM_INLINE bool contact_rolls(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                const struct sadmm_contact_pair *before, const struct sadmm_contact_point *points,
+                                int32_t count)
+{
+    return contact_by_means(a, b) && contact_lasts(a, b, before, points, count);
+}
+
+/* The old pair that a round body goes on from where it rolls over a mesh: of the triangle itself, or of another one of the
+ * same plane. [first, last): the old pairs of the two shapes. NULL: none. */
+SADMM_INLINE const struct sadmm_contact_pair *contact_rolls_from(
+    const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct sadmm_contact_pair *before,
+    const struct sadmm_contact_pair *pairs, int64_t first, int64_t last, const struct sadmm_contact_point *points,
+    int32_t count, const double normal[3])
+{
+    const uint32_t revision = word_of_pair(a->revision, b->revision);
+    int64_t i;
+    if ((before && contact_lasts(a, b, before, points, count)) || !contact_is_curved(a, b, count)) return before;
+    for (i = first; i < last; ++i)
+        if (contact_is_beside(&pairs[i], revision, normal) && contact_lasts(a, b, &pairs[i], points, count))
+            return &pairs[i];
+    return before;
 }
 
 /* May any point of it have a migration? before: NULL, none. */
@@ -161,18 +191,27 @@ struct migration_set {
 /* What the points of a pair have in common. before: the pair that it goes on from, NULL: none. */
 struct migration_pair {
     const struct sadmm_contact_pair *before; /* NULL: nothing rolls */
+    bool soon;                               /* but did press, and is curved */
+    bool across;                             /* before: of another triangle */
     double share, normal[3];                 /* of the step's end */
     double change[3];                        /* of the normal */
 };
 
+/* What turns by less than this in a step, rad, has a normal that leads close by less than they may (math/lead.h). */
+#define MIGRATION_LEAST 1e-3
+
 /* normal: halfway. ratio: step_ratio. */
 SADMM_INLINE void migration_begin(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                  const struct sadmm_contact_pair *before, struct migration_set old, double ratio,
-                                  int32_t count, const double normal[3], struct migration_pair *pair)
+                                  const struct sadmm_contact_pair *before, struct migration_set old, double dt,
+                                  double ratio, int32_t count, const double normal[3], struct migration_pair *pair)
 {
     int k;
     pair->before = before && contact_rolls(a, b, before, old.points, count) ? before : 0;
+    pair->soon = !pair->before && before && contact_is_curved(a, b, count) &&
+                 dt * (size3(a->angular) + size3(b->angular)) > MIGRATION_LEAST &&
+                 contact_lasts(a, b, before, old.points, count);
     pair->share = migration_share(ratio);
+    pair->across = false;
     for (k = 0; k < 3; ++k) {
         pair->change[k] = 0;
         pair->normal[k] = normal[k];
@@ -188,16 +227,22 @@ SADMM_INLINE void migration_begin(const struct sadmm_proxy *a, const struct sadm
     }
 }
 
-/* What two dynamic bodies' arms grow apart by: the same for all points of a pair. */
-SADMM_INLINE void migrate_apart(const struct migration_pair *pair, struct migration_set old,
-                                const struct sadmm_contact_point *point, double apart[3])
+/* Two dynamic bodies that roll on each other move by means, so that it is halfway through the step that an impulse acts:
+ * the arms are those to where they touch there, not those that were moved to one point in space of the start
+ * (contact_emit.h). They go back, and the gap with them; dt: of the step, half of which they are ahead. */
+SADMM_INLINE void migrate_from_halfway(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt,
+                                       const double normal[3], struct sadmm_contact_point *point)
 {
-    const struct sadmm_contact_point *head = &old.points[pair->before->first];
-    const struct sadmm_contact_migration *own = sadmm_migration_of(old.points, old.migrations, pair->before->first);
+    double across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0};
     int k;
+    add_cross(normal, a->angular, 1, across_a);
+    add_cross(normal, b->angular, 1, across_b);
     for (k = 0; k < 3; ++k) {
-        const double now = point->arm_b[k] - point->arm_a[k], then = head->arm_b[k] - head->arm_a[k];
-        apart[k] = pair->share * (now - then + (own ? own->arm_b[k] - own->arm_a[k] : 0));
+        const double way = way_ahead(a, b, dt / 2, k), shift_a = proxy_share(a, b) * way,
+                     shift_b = proxy_share(b, a) * way;
+        point->arm_a[k] += shift_a;
+        point->arm_b[k] -= shift_b;
+        point->gap += dt * (across_a[k] * shift_a + across_b[k] * shift_b);
     }
 }
 
@@ -210,12 +255,13 @@ SADMM_INLINE bool migrate_arm(double share, const double arm[3], const double ol
     return dot3(change, change) <= MIGRATION_MOST * MIGRATION_MOST * dot3(arm, arm);
 }
 
-/* The point goes on to the step's end; false: it has no migration worth keeping. guess: its index in the pair. */
+/* The point goes on to the step's end; false: it has no migration worth keeping. guess: its index in the pair; normal:
+ * halfway. */
 SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                 const struct migration_pair *pair, struct migration_set old, int32_t guess,
-                                double radius, struct sadmm_contact_point *point, struct sadmm_contact_migration *out)
+                                double radius, double dt, const double normal[3], struct sadmm_contact_point *point,
+                                struct sadmm_contact_migration *out)
 {
-    const bool both = a->system_body >= 0 && b->system_body >= 0;
     int32_t at = -1;
     int k;
     out->radius = radius;
@@ -223,10 +269,12 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
         out->normal[k] = pair->change[k];
         out->arm_a[k] = out->arm_b[k] = 0;
     }
-    if (!pair->before && !(radius > 0)) return false;
-    point->migrates = 1;
+    if (!pair->before && !pair->soon && !(radius > 0)) return false;
+    point->migrates = pair->before ? MIGRATES_ON : pair->soon ? MIGRATES_SOON : MIGRATES_NOWHERE;
     if (!pair->before) return true;
-    at = contact_find_feature(old.points + pair->before->first, pair->before->count, point->feature, guess);
+    if (a->system_body >= 0 && b->system_body >= 0) migrate_from_halfway(a, b, dt, normal, point);
+    if (!pair->across || contact_is_of_body(point->feature))
+        at = contact_find_feature(old.points + pair->before->first, pair->before->count, point->feature, guess);
     if (at >= 0) {
         const struct sadmm_contact_point *from = &old.points[pair->before->first + at];
         const struct sadmm_contact_migration *own =
@@ -235,11 +283,6 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
                    small_b = migrate_arm(pair->share, point->arm_b, from->arm_b, own ? own->arm_b : 0, out->arm_b);
         if (!(small_a && small_b))
             for (k = 0; k < 3; ++k) out->arm_a[k] = out->arm_b[k] = 0;
-    }
-    if (both) {
-        double apart[3];
-        migrate_apart(pair, old, point, apart);
-        for (k = 0; k < 3; ++k) out->arm_a[k] = out->arm_b[k] - apart[k];
     }
     for (k = 0; k < 3; ++k) {
         point->arm_a[k] += out->arm_a[k];

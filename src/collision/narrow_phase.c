@@ -100,7 +100,11 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
     pair_motion_of(pa, pb, normal, m->ahead, input->dt, &motion);
     const bool midway =
         since == 0 && is_midway(m->ahead, input->dt); /* what is found elsewhere has no half step left */
-    migration_begin(pa, pb, midway ? before : NULL, last, ratio, m->count, normal, &rolling);
+    const struct sadmm_contact_pair *from = before;
+    if (beside.first < beside.last)
+        from = contact_rolls_from(pa, pb, before, old->pairs, beside.first, beside.last, old->points, m->count, normal);
+    migration_begin(pa, pb, midway ? from : NULL, last, input->dt, ratio, m->count, normal, &rolling);
+    rolling.across = from != before;
     contact_emit_pair(a, b, child, pa, pb, m, rolling.normal, friction, (int32_t)out->point_count, pair);
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count];
@@ -111,8 +115,9 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
             contact_carry_across(old->pairs, beside.first, beside.last, old->points, pair->revision, i, rolling.normal,
                                  friction, ratio, point);
         const double radius = midway ? contact_radius(pa, pb, m->count, normal, point) : 0;
-        if ((rolling.before || radius > 0) &&
-            migrate_point(pa, pb, &rolling, last, i, radius, point, &out->migrations[out->point_count]))
+        if ((rolling.before || rolling.soon || radius > 0) &&
+            migrate_point(pa, pb, &rolling, last, i, radius, input->dt, normal, point,
+                          &out->migrations[out->point_count]))
             ++out->migrating;
         ++out->point_count;
     }

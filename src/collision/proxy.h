@@ -191,6 +191,14 @@ SADMM_INLINE double way_ahead(const struct sadmm_proxy *a, const struct sadmm_pr
     return ahead > 0 ? ahead * (b->velocity[axis] - a->velocity[axis]) : 0;
 }
 
+/* Of two dynamic bodies, what share of the way to one point in space the arms of p's take: most of it those of the one that
+ * is harder to turn. */
+SADMM_INLINE double proxy_share(const struct sadmm_proxy *p, const struct sadmm_proxy *other)
+{
+    const double inertia = p->inertia + other->inertia;
+    return inertia > 0 ? p->inertia / inertia : 0.5;
+}
+
 /* Does the box come within `reach` of the plane? */
 SADMM_INLINE bool proxy_plane_meets(const struct sadmm_proxy *plane, const struct sadmm_box3 *box, double reach)
 {

@@ -214,7 +214,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
     if (FAST)
         store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, (double)about.w, difference,
-                    true, inverse, &sums);
+                    true, live && sadmm_pair_rolls(pair, points), inverse, &sums);
 }
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */

@@ -168,12 +168,12 @@ static __device__ __forceinline__ bool pair_holds(const model_view &model, int32
     return momentum_is_held(friction, &arms);
 }
 
-/* The records of a pair from its lanes' sums. `first`: also what depends on arms alone. `inverse`: of the body at the
- * lane's side. Every lane of the warp comes here. */
+/* The records of a pair from its lanes' sums. `first`: also what depends on arms alone; rolls: sadmm_pair_rolls.
+ * `inverse`: of the body at the lane's side. Every lane of the warp comes here. */
 static __device__ __forceinline__ void store_sides(const model_view &model, const body_view &bodies,
                                                    const contact_view &contacts, const weight_view &weights, bool live,
                                                    int32_t p, int32_t lane, int32_t count, const pair_bodies &joined,
-                                                   double friction, const real4 &difference, bool first,
+                                                   double friction, const real4 &difference, bool first, bool rolls,
                                                    const rigid_inverse &inverse,
                                                    struct pair_sums *sums)
 {
@@ -183,7 +183,7 @@ static __device__ __forceinline__ void store_sides(const model_view &model, cons
     sum_pair<0, LOAD_SUMS>(contacts, sums);
     if (first && model.contact_rows == 3) sum_pair<LOAD_SUMS, ARM_END>(contacts, sums);
     if (first && model.contact_rows == 1) sum_pair<ARM_END, PAIR_SUMS>(contacts, sums);
-    const bool holds = first && live && pair_holds(model, count, joined, friction, sums);
+    const bool holds = first && live && (rolls || pair_holds(model, count, joined, friction, sums));
 #pragma unroll
     for (int32_t side = 0; side < 2; ++side) {
         const int32_t body = side ? joined.body_b : joined.body_a;

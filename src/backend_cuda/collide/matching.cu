@@ -70,15 +70,24 @@ static __device__ __forceinline__ emit_in_place emit_source_of(const collision_v
 /* The point goes on to the step's end, and its normal (core/model/rolling.h). */
 static __device__ __forceinline__ void migrate(const collision_view &v, const struct sadmm_proxy *a,
                                                const struct sadmm_proxy *b, const struct sadmm_contact_pair *before,
-                                               double ratio, int32_t count, int32_t lane, int32_t at, double normal[3],
-                                               struct sadmm_contact_point *point)
+                                               const step_lengths &dt, uint64_t shapes, int32_t count, int32_t lane,
+                                               int32_t at, double normal[3], struct sadmm_contact_point *point)
 {
     const struct migration_set last = {v.before.points, v.before.migrations};
     const double radius = contact_radius(a, b, count, normal, point);
     struct sadmm_contact_migration migration;
     struct migration_pair pair;
-    migration_begin(a, b, before, last, ratio, count, normal, &pair);
-    if (migrate_point(a, b, &pair, last, lane, radius, point, &migration)) v.after.migrations[at] = migration;
+    const struct sadmm_contact_pair *from = before;
+    if (b->geometry.type == SADMM_SHAPE_MESH) {
+        const int64_t pairs = v.before.counts->pairs, first = contact_lower_bound(v.before.pairs, 0, pairs, shapes, 0);
+        int64_t end = first;
+        while (end < pairs && contact_shapes(&v.before.pairs[end]) == shapes) ++end;
+        from = contact_rolls_from(a, b, before, v.before.pairs, first, end, v.before.points, count, normal);
+    }
+    migration_begin(a, b, from, last, dt.now, step_ratio(dt.now, dt.before), count, normal, &pair);
+    pair.across = from != before;
+    if (migrate_point(a, b, &pair, last, lane, radius, dt.now, normal, point, &migration))
+        v.after.migrations[at] = migration;
     for (int k = 0; k < 3; ++k) normal[k] = pair.normal[k];
 }
 
@@ -261,7 +270,8 @@ static __device__ __forceinline__ void emit_general(const collision_view &v, con
     if (is_midway(source.head.ahead, dt.now)) {
         place_point(source, dt.now, normal, &point);
         if (contact_may_migrate(pa, pb, before, v.before.points, start.count))
-            migrate(v, pa, pb, before, ratio, start.count, lane, first + lane, normal, &point);
+            migrate(v, pa, pb, before, dt, ordered_key(start.own.a, start.own.b), start.count, lane, first + lane,
+                    normal, &point);
     } else {
         contact_emit_turned(pa, pb, source.head.normal, source.head.ahead, dt.now, &source.point, normal, &point);
     }

@@ -144,7 +144,7 @@ static sadmm_status download_migrations(struct sadmm_cuda_collision *c, size_t p
     const struct sadmm_contact_point *from = in<struct sadmm_contact_point>(c, PINNED_POINTS);
     const size_t bytes = points * sizeof *contacts->migrations;
     *migrating = 0;
-    for (size_t k = 0; k < points; ++k) *migrating += from[k].migrates;
+    for (size_t k = 0; k < points; ++k) *migrating += from[k].migrates != MIGRATES_NOT;
     if (*migrating == 0) return SADMM_OK;
     TRY(reserve(c, PINNED_MIGRATIONS, bytes, 1, error));
     TRY(copy(c, in<void>(c, PINNED_MIGRATIONS), set_of(c, c->current).migrations, bytes, false, error));

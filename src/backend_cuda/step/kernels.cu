@@ -209,10 +209,10 @@ static __device__ __forceinline__ bool rolls_again(const cuda_view &v)
     return v.step.limits && v.islands.again[AGAIN_ROLLS];
 }
 
-/* Has the momentum of body i's island been restored? */
-static __device__ __forceinline__ bool is_restored(const cuda_view &v, int32_t i)
+/* Have joints to do with body i's island: ISLAND_JOINED; has its momentum been restored: ISLAND_RESTORED? */
+static __device__ __forceinline__ bool island_is(const cuda_view &v, int32_t i, int what)
 {
-    return v.joints.count > 0 && !v.joints.apart && v.joints.touch[joined_label(v, i)] & ISLAND_RESTORED;
+    return v.joints.count > 0 && !v.joints.apart && v.joints.touch[joined_label(v, i)] & what;
 }
 
 /* What contacts that roll give body i to take along, which has been moved; -1: none. LANES threads a body, each with
@@ -221,7 +221,7 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
 {
     const double dt = v.model.settings->dt;
     const int32_t slot = i >= 0 ? v.graph.slot_of[i] : 0, end = i >= 0 ? v.graph.offsets[slot + 1] : 0;
-    const bool restored = i >= 0 && is_restored(v, i);
+    const bool restored = i >= 0 && island_is(v, i, ISLAND_RESTORED);
     double sums[12] = {}, *owed = sums, *stiffness = sums + 6;
     for (int32_t at = i >= 0 ? v.graph.offsets[slot] + lane : 0; at < end; at += LANES) {
         const int32_t code = v.graph.incident[at], side = code & 1;
@@ -240,7 +240,8 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
         }
     }
     sum_lanes<12>(sums);
-    if (i >= 0 && lane == 0) rolling_keep(&v.step.after[i], v.step.before[i].position, dt, owed, stiffness);
+    if (i >= 0 && lane == 0)
+        rolling_keep(&v.step.after[i], v.step.before[i].position, dt, island_is(v, i, ISLAND_JOINED), owed, stiffness);
 }
 
 /* Body i, where its island has joints as they let it go; else again, if need be. */

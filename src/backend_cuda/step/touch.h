@@ -213,7 +213,7 @@ static __device__ __forceinline__ pair_ends fetch_ends(const struct sadmm_contac
 /* What leads of bodies at a contact close: its normal and point, halfway through the step. */
 static __device__ __forceinline__ void add_way(const cuda_view &v, const lead_body sides[2], const double normal[3],
                                                const double arm_a[3], const double arm_b[3],
-                                               const struct sadmm_contact_point *point, bool rolls,
+                                               const struct sadmm_contact_point *point, uint32_t migrates,
                                                struct lead_touch *touch)
 {
     const double dt = v.model.settings->dt, slop = v.model.settings->slop;
@@ -221,7 +221,7 @@ static __device__ __forceinline__ void add_way(const cuda_view &v, const lead_bo
                  size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)},
                  speed = lead_along(normal, sides[1].velocity, arm_b) - lead_along(normal, sides[0].velocity, arm_a);
     if (lead_is_still(size, dt, slop)) return;
-    const struct lead_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, rolls};
+    const struct lead_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, migrates};
     lead_add_way(touch, gap, leads, size, dt, slop);
 }
 
@@ -239,7 +239,7 @@ static __device__ __noinline__ int add_rolling_ways(const cuda_view &v, pair_end
         const struct sadmm_contact_point *point = &v.raw.points[k];
         if (!point->migrates) continue;
         const struct rolling_halfway at = rolling_halfway_of(ends.normal, point, &v.raw.migrations[k]);
-        add_way(v, sides, at.normal, at.arm_a, at.arm_b, point, true, &touch);
+        add_way(v, sides, at.normal, at.arm_a, at.arm_b, point, point->migrates, &touch);
     }
     return touch.island | touch.body[0] << 8 | touch.body[1] << 16;
 }
@@ -258,7 +258,7 @@ static __device__ __forceinline__ int add_ways(const cuda_view &v, const pair_en
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
         const struct sadmm_contact_point *point = wide_at(v.raw.points, (size_t)(first + k));
         if (point->migrates) rolls = true;
-        else add_way(v, sides, ends.normal, point->arm_a, point->arm_b, point, false, &touch);
+        else add_way(v, sides, ends.normal, point->arm_a, point->arm_b, point, MIGRATES_NOT, &touch);
     }
     const int rolling = rolls ? add_rolling_ways<WHOLE>(v, ends, first, count, lane) : 0;
     touch.island |= rolling & 0xff;

@@ -60,8 +60,9 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
         if (record < v.contacts.pair_capacity) {
             const struct sadmm_contact_pair *pair = wide_at(v.raw.pairs, (size_t)record);
             add_pair(v.model, v.raw, pair, side, &sums, C);
-            if (!holds && v.islands.info && (side ? pair->body_a : pair->body_b) < 0)
-                holds = static_pair_holds(v.raw, pair, side);
+            if (!holds && v.islands.info)
+                holds = (side ? pair->body_a : pair->body_b) < 0 ? static_pair_holds(v.raw, pair, side)
+                                                                 : sadmm_pair_rolls(pair, &v.raw.points[pair->first]);
         } else {
             add_rows(v.rows, record - v.contacts.pair_capacity, side, C);
             holds = true; /* left alone */

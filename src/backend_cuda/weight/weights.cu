@@ -39,7 +39,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         add_point(v.model, v.bodies, joined, about, difference, point.arm, point.lambda, false, &sums);
     }
     store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, (double)about.w, difference,
-                false, no_inverse, &sums);
+                false, false, no_inverse, &sums);
 }
 
 /* ---- terms and islands ------------------------------------------------------------------------------------------- */

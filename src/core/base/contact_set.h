@@ -43,8 +43,13 @@ struct sadmm_contact_point {
                                   math/contact.h: a push that bodies are to be moved by alone (solve/push.h), mostly 0 */
     double impulse[3];         /* lambda on b, world frame, N s: warm start in, solution out */
     uint32_t feature;
-    uint32_t migrates; /* 1: the set's `migrations` has an entry of it, 0: none */
+    uint32_t migrates; /* enum contact_migrates */
 };
+
+/* Has the set's `migrations` an entry of a point? It may be no more than its radius; or the point pressed in the last step,
+ * so that it will go on from this one if its bodies move by means; or it goes on from that step, and its arms are those of
+ * this one's end. */
+enum contact_migrates { MIGRATES_NOT, MIGRATES_NOWHERE, MIGRATES_SOON, MIGRATES_ON };
 
 /* How the point of a contact moves on its two bodies while these roll on each other. Normal and arms of a pair whose
  * points migrate are those of the step's end (core/model/rolling.h). */
@@ -94,6 +99,13 @@ SADMM_INLINE const struct sadmm_contact_migration *sadmm_migration_of(const stru
                                                                       int32_t k)
 {
     return points[k].migrates ? &migrations[k] : 0;
+}
+
+/* A pair of dynamic bodies that roll on each other: its impulses act at one point in space of the step's end, not of its
+ * start, so that the momentum of its island is not known from that. points: the pair's. */
+SADMM_INLINE bool sadmm_pair_rolls(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points)
+{
+    return pair->body_a >= 0 && pair->body_b >= 0 && points[0].migrates == MIGRATES_ON;
 }
 
 /* For so many points; those that there are stay. False when memory runs out. */

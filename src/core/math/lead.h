@@ -12,6 +12,7 @@
 
 #include <stdbool.h>
 
+#include "core/base/contact_set.h"
 #include "array3.h"
 #include "max.h"
 
@@ -92,6 +93,9 @@ SADMM_INLINE double lead_speed(const double before[6], const double v[6], const 
  * through a plate. */
 #define LEAD_SHARE 0.05
 #define LEAD_SLOP  0.1
+/* Where a round surface pressed in the last step, nothing lands: its lead closes it by what its normal turns. This share
+ * it may, so that a body that rolls goes on by means after a step in which it did not. */
+#define LEAD_ROLLS 0.5
 /* A body that is carried and moves its points by less than this share of what it would gain in a step by itself rests.
  * Contacts that are solved in part are springs, on which it sways; a mean of two velocities would let that grow, for it
  * does not show the contacts what they corrected by. */
@@ -134,7 +138,7 @@ SADMM_INLINE bool lead_is_still(const double size[2], double dt, double slop)
  * arms on a and b (size3), m. */
 struct lead_gap {
     double start, speed, arm[2];
-    bool rolls; /* it may stay as deep as it is (model/rolling.h) */
+    uint32_t migrates; /* enum contact_migrates: it may stay as deep as it is (model/rolling.h) */
 };
 
 /* Of a point whose leads are not still, and what the leads of a and b add to its speed. Each of two bodies may close
@@ -144,8 +148,9 @@ SADMM_INLINE void lead_add_way(struct lead_touch *touch, struct lead_gap gap, co
 {
     const double way = (dt * size[0] < gap.arm[0] ? dt * size[0] : gap.arm[0]) +
                        (dt * size[1] < gap.arm[1] ? dt * size[1] : gap.arm[1]),
-                 end = gap.start + dt * gap.speed, deep = gap.rolls && gap.start < 0 ? -gap.start : 0,
-                 room = (end > -deep ? end + deep : 0) + max_of(LEAD_SHARE * way, LEAD_SLOP * slop);
+                 share = gap.migrates >= MIGRATES_SOON ? LEAD_ROLLS : LEAD_SHARE, end = gap.start + dt * gap.speed,
+                 deep = gap.migrates != MIGRATES_NOT && gap.start < 0 ? -gap.start : 0,
+                 room = (end > -deep ? end + deep : 0) + max_of(share * way, LEAD_SLOP * slop);
     if (dt * (lead[0] + lead[1]) > room) touch->island |= TOUCH_JOLT;
     SADMM_UNROLL
     for (int s = 0; s < 2; ++s)

@@ -67,7 +67,7 @@ SADMM_INLINE void joint_contact_touches(const double normal[3], const struct sad
         rest[s] = lead_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
                                   body->rigid->mass, settings->dt);
     }
-    const struct lead_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates != 0};
+    const struct lead_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
     lead_add_point(touch, gap, dot3(normal, point->impulse), lead, size, moves, rest, settings->dt, settings->slop);
 }
 SADMM_INLINE bool joint_contacts_hold(const struct lead_touch *touch, const struct joint_lead bodies[2])

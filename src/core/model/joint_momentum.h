@@ -57,7 +57,7 @@ SADMM_INLINE void joint_add_momentum(struct joint_momentum *to, const struct sad
 {
     const double none[6] = {0, 0, 0, 0, 0, 0};
     double mass, b[6], halfway[3], end[3], A[PACKED6];
-    const struct spin_system spin = spin_system_at(from, turned);
+    const struct spin_system spin = spin_system_at(from, turned, settings->dt);
     /* stiffness of joints moves no momentum to anything */
     sym3 inertia = sadmm_rigid_body_by(from, &spin, rolling_is_stiff(from), settings, &mass, b);
     int k;

@@ -6,6 +6,11 @@
  * on from the last step's and this step's, which are both found halfway (collision/contact_migrate.h). Impulses act
  * along J, though: what J^T lambda differs from J_1^T lambda by is `owed`, and each body is given it with the next step.
  *
+ * Spin. Where moments differ a solution is the spin halfway (spin.h), and the body goes on by itself from there to the
+ * step's end. So the next step of a body that rolls is solved for the spin at its end: what it will gain by itself, to
+ * first order, is in b, and taken off again before the body turns on. Not in islands with joints, whose rows are of the
+ * spin halfway.
+ *
  * Stiffness. A body that rocks on a radius of curvature r, its centre of mass h above the contact, has the stiffness
  * N (r - h), N the load, against turning across the normal. Its torque is that of the pose halfway, explicit, and
  * stable for omega dt < 2; beyond, and without friction from less, rocking would grow out of rounding. So where
@@ -24,7 +29,7 @@
 /* What a body takes along from contacts that rolled. Few have any of it, so that it is not read, or cleared, where a bit
  * does not say that it is there: records of bodies are what large worlds move. STIFFENED: in the step at hand its
  * stiffness has what joints add (stiffening.h). */
-enum rolling_kept { ROLLING_OWES = 1, ROLLING_IS_STIFF = 2, ROLLING_IS_STIFFENED = 4 };
+enum rolling_kept { ROLLING_OWES = 1, ROLLING_IS_STIFF = 2, ROLLING_TURNS_ON = 4, ROLLING_IS_STIFFENED = 8 };
 
 /* Does rocking have to be taken out of the body? */
 SADMM_INLINE bool rolling_is_stiff(const struct sadmm_rigid *body) { return (body->rolls & ROLLING_IS_STIFF) != 0; }
@@ -34,6 +39,9 @@ SADMM_INLINE bool rolling_stiffens(const struct sadmm_rigid *body)
 {
     return (body->rolls & (ROLLING_IS_STIFF | ROLLING_IS_STIFFENED)) != 0;
 }
+
+/* Is it solved for the spin at the step's end? */
+SADMM_INLINE bool rolling_turns_on(const struct sadmm_rigid *body) { return (body->rolls & ROLLING_TURNS_ON) != 0; }
 
 /* Nothing of the last step counts: its state was set. */
 SADMM_INLINE void rolling_forget(struct sadmm_rigid *body) { body->rolls = body->mean = 0; }
@@ -94,13 +102,15 @@ SADMM_INLINE void rolling_begin(struct sadmm_rigid *body)
     body->rolls = ROLLING_OWES | ROLLING_IS_STIFF;
 }
 
-/* Sums over its contacts, which may be the body's own; from: where it was as the step began. */
-SADMM_INLINE void rolling_keep(struct sadmm_rigid *body, const double from[3], double dt, double owed[6],
+/* Sums over its contacts, which may be the body's own; from: where it was as the step began; joined: its island has
+ * joints. */
+SADMM_INLINE void rolling_keep(struct sadmm_rigid *body, const double from[3], double dt, bool joined, double owed[6],
                                const double stiffness[6])
 {
     int k;
     rolling_moved(from, body->position, owed);
-    body->rolls = ROLLING_OWES | (rolling_is_unresolved(body->inertia, dt, stiffness) ? ROLLING_IS_STIFF : 0);
+    body->rolls = ROLLING_OWES | (rolling_is_unresolved(body->inertia, dt, stiffness) ? ROLLING_IS_STIFF : 0) |
+                  (joined ? 0 : ROLLING_TURNS_ON);
     for (k = 0; k < 6; ++k) {
         body->owed[k] = owed[k];
         body->stiffness[k] = stiffness[k];

@@ -7,7 +7,7 @@
 #define SADMM_CORE_MODEL_SPIN_H
 
 #include "core/math/rigid.h"
-#include "system.h"
+#include "rolling.h"
 
 #ifndef SADMM_REAL_IS_DOUBLE
 #error "spin.h is double only: do not include it in a source compiled per precision"
@@ -25,11 +25,22 @@ SADMM_INLINE struct rigid_spin spin_halfway(const struct sadmm_rigid *body, doub
     return rigid_drift(spin_start(body), v3_load(body->inertia), dt / 2);
 }
 
+/* What the spin of a body that rolls (rolling.h) changes by from there to the step's end without a torque, to first order;
+ * momentum: angular, in the world. Of others 0. */
+SADMM_INLINE vec3 spin_ahead(const struct sadmm_rigid *body, quat halfway, vec3 momentum, double dt)
+{
+    const vec3 inertia = v3_load(body->inertia);
+    if (!rolling_turns_on(body) || rigid_is_isotropic(inertia)) return v3(0, 0, 0);
+    const vec3 angular = rigid_angular_velocity(halfway, inertia, momentum);
+    return v3_scale(rigid_angular_velocity(halfway, inertia, v3_cross(momentum, angular)), dt / 2);
+}
+
 /* The same for what A and b are of: where moments are equal, the start. With its matrix, and the angular momentum. */
 struct spin_system {
     quat orientation;
     mat3 R;
     vec3 angular, momentum; /* world */
+    vec3 ahead;             /* spin_ahead, which is part of `angular` */
 };
 
 SADMM_INLINE struct spin_system spin_of_system(const struct sadmm_rigid *body, double dt)
@@ -42,23 +53,26 @@ SADMM_INLINE struct spin_system spin_of_system(const struct sadmm_rigid *body, d
     out.R = t.R = q_matrix(t.orientation);
     t.own = m3_tmul(t.R, out.angular);
     out.momentum = m3_mul(t.R, v3(inertia.x * t.own.x, inertia.y * t.own.y, inertia.z * t.own.z));
+    out.ahead = v3(0, 0, 0);
     if (rigid_is_isotropic(inertia) || v3_max_abs(t.own) == 0) return out;
     t = rigid_tumble_on(t, inertia, dt / 2);
     out.orientation = t.orientation;
     out.R = t.R;
-    out.angular = m3_mul(t.R, t.own);
+    out.ahead = spin_ahead(body, out.orientation, out.momentum, dt);
+    out.angular = v3_add(m3_mul(t.R, t.own), out.ahead);
     return out;
 }
 
 /* The same by the orientation halfway. */
-SADMM_INLINE struct spin_system spin_system_at(const struct sadmm_rigid *body, const double halfway[4])
+SADMM_INLINE struct spin_system spin_system_at(const struct sadmm_rigid *body, const double halfway[4], double dt)
 {
     const vec3 inertia = v3_load(body->inertia);
     struct spin_system out;
     out.momentum = rigid_angular_momentum(q_load(body->orientation), inertia, v3_load(body->velocity + 3));
     out.orientation = rigid_is_isotropic(inertia) ? q_load(body->orientation) : q_load(halfway);
     out.R = q_matrix(out.orientation);
-    out.angular = rigid_angular_velocity(out.orientation, inertia, out.momentum);
+    out.ahead = spin_ahead(body, out.orientation, out.momentum, dt);
+    out.angular = v3_add(rigid_angular_velocity(out.orientation, inertia, out.momentum), out.ahead);
     return out;
 }
 
@@ -70,7 +84,8 @@ SADMM_INLINE quat spin_turned_halfway(const struct sadmm_rigid *body, double dt)
     return rigid_is_isotropic(inertia) ? start.orientation : rigid_tumble(start, inertia, dt / 2).orientation;
 }
 
-/* Velocities of the start with the spin halfway, to first order, which is enough to compare a solution with (leads). */
+/* Velocities of the start with the spin that a solution is of, to first order, which is enough to compare it with
+ * (leads). */
 SADMM_INLINE void spin_before(const struct sadmm_rigid *body, double dt, double before[6])
 {
     const vec3 inertia = v3_load(body->inertia), spin = v3_load(body->velocity + 3);
@@ -79,13 +94,19 @@ SADMM_INLINE void spin_before(const struct sadmm_rigid *body, double dt, double 
     if (rigid_is_isotropic(inertia) || v3_max_abs(spin) == 0) return;
     const quat q = q_load(body->orientation);
     const vec3 torque = v3_cross(rigid_angular_momentum(q, inertia, spin), spin);
-    v3_store(v3_madd(spin, dt / 2, rigid_angular_velocity(q, inertia, torque)), before + 3);
+    v3_store(v3_madd(spin, rolling_turns_on(body) ? dt : dt / 2, rigid_angular_velocity(q, inertia, torque)),
+             before + 3);
 }
 
 /* Where a body whose moments differ gets to: on from halfway by the spin that the step has left it with. */
 SADMM_INLINE struct rigid_spin spin_end(const struct sadmm_rigid *body, quat halfway, const double spin[3], double dt)
 {
-    const struct rigid_spin from = {halfway, v3_load(spin)};
+    struct rigid_spin from = {halfway, v3_load(spin)};
+    if (rolling_turns_on(body)) {
+        const vec3 momentum =
+            rigid_angular_momentum(q_load(body->orientation), v3_load(body->inertia), v3_load(body->velocity + 3));
+        from.angular = v3_sub(from.angular, spin_ahead(body, halfway, momentum, dt));
+    }
     return rigid_tumble(from, v3_load(body->inertia), dt / 2);
 }
 

@@ -48,6 +48,7 @@ SADMM_INLINE sym3 sadmm_rigid_body_by(const struct sadmm_rigid *body, const stru
     rolling_pay(body, b);
     *mass = linear.mass * body->mass;
     const sym3 I = rigid_world_inertia(spin->R, v3_scale(v3_load(body->inertia), angular.mass));
+    if (rolling_turns_on(body)) v3_store(v3_add(v3_load(b + 3), s3_mul(I, spin->ahead)), b + 3);
     return stiffens ? sadmm_stiffened(body, spin->angular, dt, I, b) : I;
 }
 
@@ -159,6 +160,7 @@ SADMM_INLINE mat3 sadmm_contact_frame(const double normal[3])
  * step, and its response to an impulse. */
 struct sadmm_impact_body {
     vec3 linear, angular, push, turn;
+    vec3 ahead; /* spin_ahead: a part of what is solved for that is none of an impact's */
     double inverse_mass;
     mat3 inverse_inertia; /* world frame */
 };
@@ -181,7 +183,8 @@ SADMM_INLINE struct sadmm_impact_body sadmm_impact_body_of(const struct sadmm_sy
     const vec3 heavy = v3_scale(inertia, angular.mass);
     const sym3 inverse = rigid_world_inertia(spin.R, v3(1 / heavy.x, 1 / heavy.y, 1 / heavy.z));
     out.linear = v3_scale(v3_load(body->velocity), linear.keep / linear.mass);
-    out.angular = v3_scale(spin.angular, angular.keep / angular.mass);
+    out.angular = v3_scale(v3_sub(spin.angular, spin.ahead), angular.keep / angular.mass);
+    out.ahead = spin.ahead;
     out.push = v3_scale(v3_madd(v3_scale(v3_load(settings->gravity), body->gravity_scale), 1 / body->mass,
                                 v3_load(body->wrench)), dt / 2 / linear.mass);
     out.turn = v3_scale(s3_mul(inverse, v3_load(body->wrench + 3)), dt / 2);
@@ -238,11 +241,14 @@ SADMM_RARE double sadmm_impact_e(const struct sadmm_system *system, const struct
                                               sadmm_impact_body_of(system, settings, pair->body_b)};
     const vec3 normal = v3_load(pair->normal);
     vec3 middle[2] = {v3(0, 0, 0), v3(0, 0, 0)};
-    double approach = 0, hits = 0, restitution = pair->restitution;
+    double approach = 0, ahead = 0, hits = 0, restitution = pair->restitution;
     for (int32_t k = 0; k < pair->count; ++k) {
         const vec3 arm[2] = {v3_load(points[k].arm_a), v3_load(points[k].arm_b)};
         const double closing = v3_dot(normal, sadmm_impact_velocity(body, arm));
-        if (k == at) approach = closing;
+        if (k == at) {
+            approach = closing;
+            ahead = v3_dot(normal, v3_sub(v3_cross(body[1].ahead, arm[1]), v3_cross(body[0].ahead, arm[0])));
+        }
         if (!contact_hits(points[k].gap, closing, dt, threshold)) continue;
         hits += 1;
         for (int side = 0; side < 2; ++side) middle[side] = v3_add(middle[side], arm[side]);
@@ -251,8 +257,8 @@ SADMM_RARE double sadmm_impact_e(const struct sadmm_system *system, const struct
         for (int side = 0; side < 2; ++side) middle[side] = v3_scale(middle[side], 1 / hits);
         restitution = sadmm_impact_restitution(body, pair, middle);
     }
-    if (contact_hits(points[at].gap, approach, dt, threshold)) return fmin(e, restitution * approach);
-    return approach > 0 ? fmax(e, restitution * approach) : e;
+    if (contact_hits(points[at].gap, approach, dt, threshold)) return fmin(e, restitution * approach - ahead);
+    return approach > 0 ? fmax(e, restitution * approach - ahead) : e;
 }
 
 /* e of a point along the normal, m/s, of a pair without restitution. */

@@ -137,7 +137,7 @@ static bool body_fits(const sadmm_world *world, const struct sadmm_world_body *b
          sadmm_check_orientation("orientation", body->target.orientation, ignored, error) != SADMM_OK))
         return false;
     if (!sadmm_all_finite(rigid->owed, 6) || !sadmm_all_finite(rigid->stiffness, 6) ||
-        (rigid->rolls & ~(ROLLING_OWES | ROLLING_IS_STIFF)))
+        (rigid->rolls & ~(ROLLING_OWES | ROLLING_IS_STIFF | ROLLING_TURNS_ON)))
         return false;
     return sadmm_all_finite(&rigid->gravity_scale, 1) && sadmm_all_finite(rigid->damping, 2) && sadmm_all_finite(body->steady.change, 6) &&
            body->steady.dt >= 0 && sadmm_all_finite(&body->steady.dt, 1) && body->steady.streak[0] >= 0 &&

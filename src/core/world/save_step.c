@@ -55,7 +55,7 @@ static bool contacts_fit(const sadmm_world *world)
     for (size_t k = 0; k < points; ++k) {
         const struct sadmm_contact_point *point = &set->points[k];
         if (!sadmm_all_finite(point->impulse, 3) || !sadmm_all_finite(point->arm_a, 3) || !sadmm_all_finite(point->arm_b, 3) ||
-            !isfinite(point->gap) || !isfinite(point->error) || point->migrates > 1 ||
+            !isfinite(point->gap) || !isfinite(point->error) || point->migrates > MIGRATES_ON ||
             (point->migrates && !migration_fits(&set->migrations[k])))
             return false;
     }

@@ -272,6 +272,12 @@ static bool is_restored(const sadmm_world *world, const struct sadmm_contact_pai
            joint_island_is_loose(world->joint_touch[world->joint_labels[pair->body_a]]);
 }
 
+static bool is_joined(const sadmm_world *world, int32_t body)
+{
+    return world->start.rows.constraint_count > 0 &&
+           world->joint_touch[world->joint_labels[body]] & ISLAND_JOINED;
+}
+
 static void keep_rolling_contacts(sadmm_world *world, double dt)
 {
     const struct sadmm_contact_set *contacts = &world->contacts;
@@ -282,7 +288,8 @@ static void keep_rolling_contacts(sadmm_world *world, double dt)
                 keep_rolling(world, &contacts->pairs[p], k, dt);
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_rigid *next = &world->next[i];
-        if (next->rolls) rolling_keep(next, world->start.rigid[i].position, dt, next->owed, next->stiffness);
+        if (next->rolls)
+            rolling_keep(next, world->start.rigid[i].position, dt, is_joined(world, i), next->owed, next->stiffness);
     }
 }
 
