@@ -191,7 +191,8 @@ struct migration_set {
 /* What the points of a pair have in common. before: the pair that it goes on from, NULL: none. */
 struct migration_pair {
     const struct sadmm_contact_pair *before; /* NULL: nothing rolls */
-    bool soon;                               /* but did press, and is curved */
+    bool round;                              /* contact_is_curved */
+    bool soon;                               /* it is, and pressed, but nothing rolls */
     bool across;                             /* before: of another triangle */
     double share, normal[3];                 /* of the step's end */
     double change[3];                        /* of the normal */
@@ -207,7 +208,8 @@ SADMM_INLINE void migration_begin(const struct sadmm_proxy *a, const struct sadm
 {
     int k;
     pair->before = before && contact_rolls(a, b, before, old.points, count) ? before : 0;
-    pair->soon = !pair->before && before && contact_is_curved(a, b, count) &&
+    pair->round = contact_is_curved(a, b, count);
+    pair->soon = !pair->before && before && pair->round &&
                  dt * (size3(a->angular) + size3(b->angular)) > MIGRATION_LEAST &&
                  contact_lasts(a, b, before, old.points, count);
     pair->share = migration_share(ratio);
@@ -224,6 +226,19 @@ SADMM_INLINE void migration_begin(const struct sadmm_proxy *a, const struct sadm
     for (k = 0; k < 3; ++k) {
         pair->normal[k] /= length;
         pair->change[k] = pair->normal[k] - normal[k];
+    }
+}
+
+/* What two dynamic bodies' arms grow apart by, where edges or corners touch: the same for all points of a pair. */
+SADMM_INLINE void migrate_apart(const struct migration_pair *pair, struct migration_set old,
+                                const struct sadmm_contact_point *point, double apart[3])
+{
+    const struct sadmm_contact_point *head = &old.points[pair->before->first];
+    const struct sadmm_contact_migration *own = sadmm_migration_of(old.points, old.migrations, pair->before->first);
+    int k;
+    for (k = 0; k < 3; ++k) {
+        const double now = point->arm_b[k] - point->arm_a[k], then = head->arm_b[k] - head->arm_a[k];
+        apart[k] = pair->share * (now - then + (own ? own->arm_b[k] - own->arm_a[k] : 0));
     }
 }
 
@@ -262,6 +277,7 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
                                 double radius, double dt, const double normal[3], struct sadmm_contact_point *point,
                                 struct sadmm_contact_migration *out)
 {
+    const bool both = a->system_body >= 0 && b->system_body >= 0;
     int32_t at = -1;
     int k;
     out->radius = radius;
@@ -270,9 +286,9 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
         out->arm_a[k] = out->arm_b[k] = 0;
     }
     if (!pair->before && !pair->soon && !(radius > 0)) return false;
-    point->migrates = pair->before ? MIGRATES_ON : pair->soon ? MIGRATES_SOON : MIGRATES_NOWHERE;
+    point->migrates = pair->soon ? MIGRATES_SOON : pair->before && pair->round ? MIGRATES_ON : MIGRATES_NOWHERE;
     if (!pair->before) return true;
-    if (a->system_body >= 0 && b->system_body >= 0) migrate_from_halfway(a, b, dt, normal, point);
+    if (both && pair->round) migrate_from_halfway(a, b, dt, normal, point);
     if (!pair->across || contact_is_of_body(point->feature))
         at = contact_find_feature(old.points + pair->before->first, pair->before->count, point->feature, guess);
     if (at >= 0) {
@@ -283,6 +299,11 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
                    small_b = migrate_arm(pair->share, point->arm_b, from->arm_b, own ? own->arm_b : 0, out->arm_b);
         if (!(small_a && small_b))
             for (k = 0; k < 3; ++k) out->arm_a[k] = out->arm_b[k] = 0;
+    }
+    if (both && !pair->round) {
+        double apart[3];
+        migrate_apart(pair, old, point, apart);
+        for (k = 0; k < 3; ++k) out->arm_a[k] = out->arm_b[k] - apart[k];
     }
     for (k = 0; k < 3; ++k) {
         point->arm_a[k] += out->arm_a[k];

@@ -222,7 +222,7 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
     const double dt = v.model.settings->dt;
     const int32_t slot = i >= 0 ? v.graph.slot_of[i] : 0, end = i >= 0 ? v.graph.offsets[slot + 1] : 0;
     const bool restored = i >= 0 && island_is(v, i, ISLAND_RESTORED);
-    double sums[12] = {}, *owed = sums, *stiffness = sums + 6;
+    double sums[13] = {}, *owed = sums, *stiffness = sums + 6, *round = sums + 12; /* on round surfaces: how many */
     for (int32_t at = i >= 0 ? v.graph.offsets[slot] + lane : 0; at < end; at += LANES) {
         const int32_t code = v.graph.incident[at], side = code & 1;
         if (code / 2 >= v.contacts.pair_capacity) continue; /* rows */
@@ -231,6 +231,7 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             const struct sadmm_contact_point *point = &v.raw.points[k];
             if (!point->migrates) continue;
+            *round += point->migrates >= MIGRATES_SOON;
             const struct rolling_halfway halfway = rolling_halfway_of(pair->normal, point, &v.raw.migrations[k]);
             const double *arm = side ? point->arm_b : point->arm_a;
             rolling_owe(pair->normal, arm, halfway.normal, side ? halfway.arm_b : halfway.arm_a, point->impulse,
@@ -239,9 +240,10 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
                             sadmm_normal_impulse(pair, point), dt, stiffness);
         }
     }
-    sum_lanes<12>(sums);
+    sum_lanes<13>(sums);
     if (i >= 0 && lane == 0)
-        rolling_keep(&v.step.after[i], v.step.before[i].position, dt, island_is(v, i, ISLAND_JOINED), owed, stiffness);
+        rolling_keep(&v.step.after[i], v.step.before[i].position, dt, island_is(v, i, ISLAND_JOINED) || *round == 0,
+                     owed, stiffness);
 }
 
 /* Body i, where its island has joints as they let it go; else again, if need be. */

@@ -46,9 +46,9 @@ struct sadmm_contact_point {
     uint32_t migrates; /* enum contact_migrates */
 };
 
-/* Has the set's `migrations` an entry of a point? It may be no more than its radius; or the point pressed in the last step,
- * so that it will go on from this one if its bodies move by means; or it goes on from that step, and its arms are those of
- * this one's end. */
+/* Has the set's `migrations` an entry of a point? Of its radius, or of an edge or a corner that goes on from the last step;
+ * of a round surface that pressed in that step, so that it will go on from this one if its bodies move by means; or of
+ * one that goes on from there, with the arms of this step's end. */
 enum contact_migrates { MIGRATES_NOT, MIGRATES_NOWHERE, MIGRATES_SOON, MIGRATES_ON };
 
 /* How the point of a contact moves on its two bodies while these roll on each other. Normal and arms of a pair whose

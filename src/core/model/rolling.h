@@ -7,9 +7,9 @@
  * along J, though: what J^T lambda differs from J_1^T lambda by is `owed`, and each body is given it with the next step.
  *
  * Spin. Where moments differ a solution is the spin halfway (spin.h), and the body goes on by itself from there to the
- * step's end. So the next step of a body that rolls is solved for the spin at its end: what it will gain by itself, to
- * first order, is in b, and taken off again before the body turns on. Not in islands with joints, whose rows are of the
- * spin halfway.
+ * step's end. So the next step of a body that rolls on a round surface is solved for the spin at its end: what it gains
+ * by itself, to first order, is in b, and taken off again before the body turns on. Not in islands with joints, whose
+ * rows are of the spin halfway, nor where it turns about edges and corners.
  *
  * Stiffness. A body that rocks on a radius of curvature r, its centre of mass h above the contact, has the stiffness
  * N (r - h), N the load, against turning across the normal. Its torque is that of the pose halfway, explicit, and
@@ -103,7 +103,7 @@ SADMM_INLINE void rolling_begin(struct sadmm_rigid *body)
 }
 
 /* Sums over its contacts, which may be the body's own; from: where it was as the step began; joined: its island has
- * joints. */
+ * joints, or nothing round rolls. */
 SADMM_INLINE void rolling_keep(struct sadmm_rigid *body, const double from[3], double dt, bool joined, double owed[6],
                                const double stiffness[6])
 {

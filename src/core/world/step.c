@@ -259,6 +259,7 @@ static void keep_rolling(sadmm_world *world, const struct sadmm_contact_pair *pa
         struct sadmm_rigid *next = &world->next[body[s]];
         const double *arm = s ? point->arm_b : point->arm_a;
         rolling_begin(next);
+        if (point->migrates >= MIGRATES_SOON) next->rolls |= ROLLING_TURNS_ON; /* on a round surface */
         rolling_owe(pair->normal, arm, at.normal, s ? at.arm_b : at.arm_a, point->impulse, s ? 1 : -1, next->owed);
         rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->gap), migration->radius, push, dt,
                         next->stiffness);
@@ -289,7 +290,8 @@ static void keep_rolling_contacts(sadmm_world *world, double dt)
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_rigid *next = &world->next[i];
         if (next->rolls)
-            rolling_keep(next, world->start.rigid[i].position, dt, is_joined(world, i), next->owed, next->stiffness);
+            rolling_keep(next, world->start.rigid[i].position, dt, is_joined(world, i) || !rolling_turns_on(next),
+                         next->owed, next->stiffness);
     }
 }
 
