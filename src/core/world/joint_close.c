@@ -4,6 +4,7 @@
 
 #include "core/base/memory.h"
 #include "core/model/joint_close.h"
+#include "core/model/forces.h"
 #include "core/model/joint_lead.h"
 #include "core/solve/joined.h"
 #include "world_internal.h"
@@ -59,6 +60,18 @@ static void open_bodies(sadmm_world *world, const struct sadmm_world_joint *join
     }
 }
 
+/* May its joints be opened by more than the order of the step: is its island loaded beyond what explicit forces bear
+ * (joint_stiffen.c), or does a row turn by more than a step resolves? Others are left as they are, since a body that is
+ * moved to close a joint has another orientation for its spin. */
+static bool may_open(const sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    for (int s = 0; s < 2; ++s) {
+        const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
+        if (body >= 0 && world->joint_touch[world->joint_labels[body]] & (ISLAND_STRAYS | ISLAND_TURNS)) return true;
+    }
+    return false;
+}
+
 /* Which bodies have joints that are to be closed; the largest error, m. Are there any? */
 static bool find_open(sadmm_world *world, const sadmm_settings *settings, double *off)
 {
@@ -71,6 +84,7 @@ static bool find_open(sadmm_world *world, const sadmm_settings *settings, double
         const struct joint_opening opening = joint_opening_of(&joint->def, &a, &b);
         *off = opening.off > *off ? opening.off : *off;
         if (opening.little || world->kernels->resident) continue; /* a device would not do it */
+        if (!may_open(world, joint)) continue;
         if (!(closing_of(world, joint, settings).share > JOINT_CLOSE_FROM)) continue;
         if (!any) memset(world->opened, 0, (size_t)world->dynamic_count);
         open_bodies(world, joint);
@@ -120,18 +134,73 @@ static bool make_rows(sadmm_world *world, const sadmm_settings *settings)
     return true;
 }
 
+/* ---- what it costs ----------------------------------------------------------------------------------------------- */
+
+/* Twice the energy of a body's motion, J. */
+static double motion_energy2(const struct sadmm_rigid *body)
+{
+    const vec3 spin = v3_load(body->velocity + 3);
+    return body->mass * dot3(body->velocity, body->velocity) +
+           v3_dot(spin, rigid_angular_momentum(q_load(body->orientation), v3_load(body->inertia), spin));
+}
+/* That and its energy in the field of gravity. */
+static double energy2(const struct sadmm_rigid *body, const sadmm_settings *settings)
+{
+    double energy = motion_energy2(body);
+    for (int k = 0; k < 3; ++k)
+        energy -= 2 * body->mass * forces_gravity(body, settings->gravity, k) * body->position[k];
+    return energy;
+}
+
+/* Of a body; then by island, at its first body. */
+struct joint_closing_cost {
+    double gained, moving; /* twice the energy that closing has given it, and that of its motion, J */
+};
+
+static void begin_costs(sadmm_world *world, const sadmm_settings *settings)
+{
+    for (int32_t i = 0; i < world->dynamic_count; ++i)
+        world->closing_costs[i].gained = -energy2(&world->next[i], settings);
+}
+
+/* What closing has lifted, motion pays. */
+static void pay_costs(sadmm_world *world, const sadmm_settings *settings)
+{
+    struct joint_closing_cost *costs = world->closing_costs;
+    for (int32_t i = 0; i < world->dynamic_count; ++i) { /* an island's first body comes first */
+        struct joint_closing_cost *sum = &costs[world->joint_labels[i]];
+        costs[i].gained += energy2(&world->next[i], settings);
+        costs[i].moving = motion_energy2(&world->next[i]);
+        if (sum == &costs[i]) continue;
+        sum->gained += costs[i].gained;
+        sum->moving += costs[i].moving;
+    }
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        const struct joint_closing_cost *sum = &costs[world->joint_labels[i]];
+        if (!(sum->gained > 0) || !(world->joint_touch[world->joint_labels[i]] & ISLAND_STRAYS)) continue;
+        const double keep = sum->gained < sum->moving ? sqrt(1 - sum->gained / sum->moving) : 0;
+        for (int k = 0; k < 6; ++k) world->next[i].velocity[k] *= keep;
+    }
+}
+
 sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *settings, double *off)
 {
     struct sadmm_system system = sadmm_world_system(world);
-    if (!sadmm_grow_empty(&world->opened, &world->opened_capacity, (size_t)world->dynamic_count, sizeof *world->opened))
+    const size_t n = (size_t)world->dynamic_count;
+    if (!sadmm_grow_empty(&world->opened, &world->opened_capacity, n, sizeof *world->opened) ||
+        !sadmm_grow_empty(&world->closing_costs, &world->closing_cost_capacity, n, sizeof *world->closing_costs))
         return sadmm_fail_memory(&world->error, "joints that close");
+    bool any = false;
     system.rows = &world->closing;
     for (int step = 0; find_open(world, settings, off) && step < JOINT_CLOSE_STEPS; ++step) {
+        if (!any) begin_costs(world, settings);
+        any = true;
         if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
         for (int32_t i = 0; i < world->dynamic_count; ++i)
             if (world->opened[i]) world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
         TRY(sadmm_joined_close(world->joined, &system, world->closing_slots, world->joint_constraint_count, settings,
                                world->opened, world->next, &world->error));
     }
+    if (any) pay_costs(world, settings);
     return SADMM_OK;
 }
