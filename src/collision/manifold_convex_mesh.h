@@ -188,11 +188,15 @@ SADMM_INLINE uint32_t convex_best_axis(const struct convex_triangle *p, struct c
     return cache;
 }
 
-/* The middle of the body: a cone's origin is halfway up, and comes through with the tip. */
-SADMM_INLINE vec3 convex_middle(const struct convex_pair *pair)
+/* Has the body come through the triangle by its front? Its middle says so; of a cone that or its centre of mass: with its
+ * tip, or its base, one of them is through before most of it is. */
+SADMM_INLINE bool convex_came_through(const struct convex_triangle *p, const struct manifold *m)
 {
-    const vec3 centroid = v3(0, 0, pair->a.form == CONVEX_CONE ? -pair->a.size.y / 2 : 0);
-    return v3_add(m3_mul(pair->R, centroid), pair->t);
+    const struct convex_pair *pair = &p->pair;
+    const vec3 down = m3_mul(pair->R, v3(0, 0, -pair->a.size.y / 2));
+    return mesh_came_through_front(&p->mesh, &p->triangle, pair->t, m) ||
+           (pair->a.form == CONVEX_CONE &&
+            mesh_came_through_front(&p->mesh, &p->triangle, v3_add(pair->t, down), m));
 }
 
 /* Where the surface does not push along the axis of least depth, or of the nearest points (mesh_by_surface). */
@@ -222,7 +226,7 @@ SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct 
     if (!front || (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5)) {
         const real more = front ? MESH_SHALLOW : MANIFOLD_KEEP_EXTENT;
         if (m->count > 0 && least < 4 * real_min(nearest->separation, 0) - more * pair->thin &&
-            !(front && mesh_came_through_front(&p->mesh, &p->triangle, convex_middle(pair), m)))
+            !(front && convex_came_through(p, m)))
             m->count = 0;
     }
     convex_mesh_give(p, cache, axis.separation, m);
@@ -247,7 +251,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     shallow = p.front.separation >= -MESH_SHALLOW * p.pair.thin;
     if (convex_lies_on(&p, flat || cache == of_front, limit, m) || flat) {
         if (flat && m->count > 0 && !shallow && cache != of_front &&
-            !mesh_came_through_front(&p.mesh, &p.triangle, convex_middle(&p.pair), m))
+            !convex_came_through(&p, m))
             m->count = 0;
         m->cache = of_front;
         convex_mesh_give(&p, of_front, p.front.separation, m);
