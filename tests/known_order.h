@@ -7,7 +7,7 @@
 
 /* What is off by less than this share of a body's length has no order left: rounding, and what the solve leaves in some
  * hundred steps. */
-static inline double known_floor(sadmm_precision precision) { return precision == SADMM_F64 ? 1e-6 : 3e-5; }
+static inline double known_floor(sadmm_precision precision) { return precision == SADMM_F64 ? 1e-6 : 1e-4; }
 
 /* Errors of second order are a quarter at half the step. A third is allowed for: at the longer one higher powers of the
  * step count as well. */

@@ -63,9 +63,9 @@ SADMM_RARE double arms_take(const struct sadmm_proxy *a, const struct sadmm_prox
 
 /* ahead: manifold.ahead; by how much the shapes are turned ahead. The point stays where it is on a body beside one that is
  * not dynamic. Of two dynamic bodies the arms of the one that is harder to turn take up most of the way: those of a bullet
- * must be its own. */
-SADMM_INLINE void pair_motion_at(const struct sadmm_proxy *a, double ahead_a, const struct sadmm_proxy *b,
-                                 double ahead_b, const double normal[3], double ahead, double dt,
+ * must be its own. halfway: it was found there, where arms take up all of it. */
+SADMM_INLINE void pair_motion_by(const struct sadmm_proxy *a, double ahead_a, const struct sadmm_proxy *b,
+                                 double ahead_b, const double normal[3], double ahead, bool halfway, double dt,
                                  struct pair_motion *m)
 {
     const bool both = a->system_body >= 0 && b->system_body >= 0;
@@ -76,7 +76,7 @@ SADMM_INLINE void pair_motion_at(const struct sadmm_proxy *a, double ahead_a, co
     add_cross(normal, a->angular, 1, across_a);
     add_cross(normal, b->angular, 1, across_b);
     for (k = 0; k < 3; ++k) way[k] = way_ahead(a, b, ahead, k);
-    take = both && !is_midway(ahead, dt) ? arms_take(a, b, normal, way, dt) : 1;
+    take = both && !halfway ? arms_take(a, b, normal, way, dt) : 1;
     m->closed = 0;
     for (k = 0; k < 3; ++k) {
         m->between[k] = b->com[k] - a->com[k] + way[k];
@@ -93,7 +93,13 @@ SADMM_INLINE void pair_motion_at(const struct sadmm_proxy *a, double ahead_a, co
 SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
                                  double ahead, double dt, struct pair_motion *m)
 {
-    pair_motion_at(a, a->ahead, b, b->ahead, normal, ahead, dt, m);
+    pair_motion_by(a, a->ahead, b, b->ahead, normal, ahead, is_midway(ahead, dt), dt, m);
+}
+/* The same of a pair that was found halfway. */
+SADMM_INLINE void pair_motion_halfway(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
+                                      double ahead, double dt, struct pair_motion *m)
+{
+    pair_motion_by(a, a->ahead, b, b->ahead, normal, ahead, true, dt, m);
 }
 
 /* Without an impulse. Rb, b_arm: of b, at which it is turned ahead. */
@@ -134,7 +140,8 @@ SADMM_RARE void contact_emit_turned(const struct sadmm_proxy *a, const struct sa
     struct pair_motion motion;
     proxy_place_at(b, ahead, dt, &of_b);
     rotate_to_world(of_b.R, manifold_normal, normal);
-    pair_motion_at(a, ahead, b, ahead, normal, ahead, dt, &motion); /* what does not turn is turned by nothing */
+    /* what does not turn is turned by nothing */
+    pair_motion_by(a, ahead, b, ahead, normal, ahead, is_midway(ahead, dt), dt, &motion);
     contact_emit_point_at(a, b, of_b.R, of_b.arm, &motion, from, point);
 }
 

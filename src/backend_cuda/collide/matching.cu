@@ -129,7 +129,7 @@ static __device__ __forceinline__ void place_point(const Source &source, double 
 {
     struct pair_motion motion;
     rotate_to_world(source.b.R, source.head.normal, normal);
-    pair_motion_of(&source.a, &source.b, normal, source.head.ahead, dt, &motion);
+    pair_motion_halfway(&source.a, &source.b, normal, source.head.ahead, dt, &motion);
     contact_emit_point(&source.a, &source.b, &motion, &source.point, point);
 }
 
