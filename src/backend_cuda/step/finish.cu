@@ -226,7 +226,7 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
         if (ways & TOUCH_CARRIED) v.islands.again[AGAIN_CLOSED] = 1;
         if (ways & TOUCH_ROLLS) v.islands.again[AGAIN_ROLLS] = 1;
     }
-    if (v.step.limits && !v.push.planned) {
+    if (v.step.limits && v.push.bits && !v.push.planned) {
         double deepest_of_pair = depth;
         for (int o = 1; o < v.contacts.lanes; o *= 2)
             deepest_of_pair = fmax(deepest_of_pair, __shfl_xor_sync((unsigned)ALL_LANES, deepest_of_pair, o));
