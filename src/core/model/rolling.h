@@ -27,8 +27,9 @@
 #define ROLLING_STIFF 0.25
 
 /* What a body takes along from contacts that rolled. Few have any of it, so that it is not read, or cleared, where a bit
- * does not say that it is there: records of bodies are what large worlds move. STIFFENED: in the step at hand its
- * stiffness has what joints add (stiffening.h). */
+ * does not say that it is there: records of bodies are what large worlds move. TURNS_ON: the step's solution is
+ * the spin at its end, not halfway (spin.h). STIFFENED: in the step at hand its stiffness has what joints add
+ * (stiffening.h). */
 enum rolling_kept { ROLLING_OWES = 1, ROLLING_IS_STIFF = 2, ROLLING_TURNS_ON = 4, ROLLING_IS_STIFFENED = 8 };
 
 /* Does rocking have to be taken out of the body? */
