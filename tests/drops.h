@@ -306,10 +306,12 @@ static inline void drop_worlds(int form, uint64_t first, int worlds)
                 SADMM_F64, first + (uint64_t)k};
             const struct drop_result r = drop_all(&c);
             through += r.through;
-            ck_assert_msg(counted || r.through == 0,
-                          "form %d, ground %d, world %d: %d of %d are through, the first is %d", form, ground,
-                          (int)c.seed, r.through, r.dropped, (int)r.first);
+            if (r.through > 0 && !counted)
+                printf("form %d, ground %d, world %d: %d of %d are through, the first is %d\n", form, ground,
+                       (int)c.seed, r.through, r.dropped, (int)r.first);
         }
+        if (worlds > 1) printf("form %d, ground %d: %d of %d through\n", form, ground, through, worlds * DROP_BODIES);
+        ck_assert_msg(counted || through == 0, "form %d, ground %d: %d through", form, ground, through);
         ck_assert_msg(1000 * through <= 2 * worlds * DROP_BODIES + 999, "form %d, ground %d: %d through", form, ground,
                       through);
     }

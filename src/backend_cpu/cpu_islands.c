@@ -1,5 +1,6 @@
 /* begin: islands of the step, and which of them are loose: those that no static pair is known to hold
- * (momentum_is_held), and in which no bodies roll on each other. Most are held, which one of their pairs decides; lists are made for the others alone. */
+ * (momentum_is_held), and in which no bodies roll on each other. Most are held, which one of their pairs decides; lists
+ * are made for the others alone. */
 #include "core/base/memory.h"
 #include "core/math/momentum.h"
 #include "core/model/islands.h"

@@ -95,7 +95,7 @@ SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sad
     found->radius = (real)ball->geometry.size[0];
     m.count = 0;
     m.cache = 0;
-    m.normal = v3(0, 0, 1);
+    m.normal = v3(0, 0, 1); /* set in any case, for compilers that do not see that it is where there is a point */
     ball_manifold(&first->geometry, &second->geometry, hulls, child, &pose, &m);
     if (m.count == 0) return false;
     point = &m.points[0];

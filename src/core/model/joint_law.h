@@ -54,8 +54,8 @@ struct sadmm_joint_source {
     int32_t joint;
     int8_t role, coordinate, sign;
     double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step.
-                          Of any row, slack: INFINITY where the step does not resolve its turning. Of springs, gap: the way to where a steep part of a table stops the coordinate, INFINITY where
-                          there is none */
+                          Of any row, slack: INFINITY where the step does not resolve its turning. Of springs, gap:
+                          the way to where a steep part of a table stops the coordinate, INFINITY: none does */
     double steered;    /* of the row's rate what sides give that are steered; it is in the bias */
 };
 

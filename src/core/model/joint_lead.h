@@ -10,9 +10,10 @@
 #include "rolling.h"
 #include "spin.h"
 
-/* Of islands. TOUCHED: by a contact; HELD: by one that leaves it no motion (math/momentum.h); RESTORED: on a device, it
- * is (joint_momentum.h); TURNS: rows of it turn by more than a step resolves; POWERED: springs, drives or armatures act;
- * MOORED: rows hold it to what does not move by itself; STRAYS: joints stiffen its bodies, or have been closed. */
+/* Of islands. TOUCHED: by a contact; HELD: by one, or by a joint, that leaves it no motion (math/momentum.h); RESTORED: on
+ * a device, its momentum is (joint_momentum.h); TURNS: rows of it turn by more than a step resolves; POWERED: springs,
+ * drives or armatures act; MOORED: rows hold it to what does not move by itself; STRAYS: joints stiffen its bodies, or
+ * have been closed. */
 enum {
     ISLAND_JOINED = 1,
     ISLAND_LEADS_STAY = 2,

@@ -14,8 +14,8 @@
 #include "system_math.h"
 
 /* Is there something to restore? bits: of an island, but for ISLAND_HELD where that is not known yet. What nothing
- * touches has it already, but where the stiffness of joints holds on to some, or they have been closed; and what hangs on rows that turn by more than a step resolves (joint_law.h) has neither its
- * impulses nor its weight where they act. */
+ * touches has it already, but where the stiffness of joints holds on to some, or they have been closed; and what hangs on
+ * rows that turn by more than a step resolves (joint_law.h) has neither its impulses nor its weight where they act. */
 SADMM_INLINE bool joint_island_is_loose(int bits)
 {
     if (!(bits & ISLAND_JOINED) || bits & ISLAND_HELD) return false;
@@ -52,8 +52,9 @@ SADMM_INLINE double joint_free_energy(double mass, sym3 inertia, const double b[
 
 /* A body that the step moves to this pose and velocity. turned: its orientation halfway (spin.h). */
 SADMM_INLINE void joint_add_momentum(struct joint_momentum *to, const struct sadmm_rigid *from,
-                                     const double turned[4], const double position[3], const double orientation[4], const double velocity[6],
-                                     const double origin[3], const struct sadmm_settings *settings)
+                                     const double turned[4], const double position[3],
+                                     const double orientation[4], const double velocity[6], const double origin[3],
+                                     const struct sadmm_settings *settings)
 {
     const double none[6] = {0, 0, 0, 0, 0, 0};
     double mass, b[6], halfway[3], end[3], A[PACKED6];
