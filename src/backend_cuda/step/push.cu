@@ -276,8 +276,7 @@ void CUDA(view_push)(struct sadmm_context *c)
     int32_t *due = buffer<int32_t>(c, BUFFER_PUSH);
     *push = none;
     if (!due) return; /* nothing is planned yet */
-    /* Where iterations are launched one by one, a second problem takes as long as the first. */
-    if (c->partition.tier == SADMM_CUDA_TIER_STREAM && c->wanted == SADMM_CUDA_TIER_AUTO) return;
+    if (!push_is_apart(true, s->bodies, s->driven)) return;
     push->due = due;
     push->units = (unsigned long long *)(due + PUSH_NUMBERS);
     push->bits = (int32_t *)(push->units + n);

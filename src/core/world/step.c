@@ -9,6 +9,7 @@
 #include "core/solve/registry.h"
 #include "core/model/joint_momentum.h"
 #include "core/model/steady.h"
+#include "core/model/push_law.h"
 #include "world_internal.h"
 
 /* Settled boxes have about ten contacts each; AUTO needs an order of magnitude before the first contact is known. */
@@ -200,7 +201,9 @@ static sadmm_status choose_pushes(struct host_step *step, double depth)
 {
     sadmm_world *world = step->world;
     step->pushed = 0;
-    if (depth <= step->settings.slop) return SADMM_OK;
+    if (depth <= step->settings.slop || !push_is_apart(world->kernels->backend == SADMM_BACKEND_CUDA,
+                                                       step->system.body_count, step->system.driven_count))
+        return SADMM_OK;
     if (!world->push) world->push = sadmm_push_create();
     if (!world->push) return sadmm_fail_memory(&world->error, "bodies that overlap");
     TRY(sadmm_push_choose(world->push, &step->system, &step->settings, world->plan.threads, &world->error));
