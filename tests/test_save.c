@@ -66,7 +66,7 @@ static const struct {
 } scenes[] = {
     {"sliding_cubes:30", 8, 8}, {"vertical_stacks:2", 60, 10}, {"card_houses:1", 15, 10}, {"pile:40", 90, 15},
     {"kicked_cubes:2", 105, 10}, {"dominoes:6", 40, 10}, {"falling_chain:4", 20, 10}, {"chain:5", 30, 20},
-    {"four_bar:2", 30, 20}, {"bricard", 10, 10}, {"slider_crank", 10, 20}, {"bridge", 15, 8}, {"grippers:2", 150, 20},
+    {"four_bar:2", 174, 20}, {"bricard", 10, 10}, {"slider_crank", 10, 20}, {"bridge", 15, 8}, {"grippers:2", 150, 20},
     {"ragdolls:2", 120, 20}, {"mixer:30", 60, 10}, {"arch:9", 15, 8}, {"mesh_pile:30", 70, 10}, {"terrain:16", 150, 15},
     {"marble_run", 60, 20}, {"nuts_and_bolts:1", 15, 5}, {"hand_demo", 12, 4}, {"rolling", 30, 10}, {"burst:2", 30, 10},
 };

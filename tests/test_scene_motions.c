@@ -223,6 +223,20 @@ START_TEST(bricards_linkage_moves_and_stays_closed)
 }
 END_TEST
 
+/* Windows of a row fold as they go round: all of their rods lie in one line, and could go on the other way. 1 %: the order
+ * of the step leaves 0.1 to 0.2 %; solved as elsewhere they lose 6 and 11 % there. */
+START_TEST(folding_windows_keep_their_energy)
+{
+    struct sadmm_scene scene;
+    sadmm_world *world = open_world(_i ? "four_bar:10" : "four_bar:5", 0, 60, &scene);
+    const double before = energy_of(world);
+    step_world(world, 2000); /* 10 s */
+    ck_assert_double_eq_tol(energy_of(world) / before, 1, 0.01);
+    ck_assert_double_lt(world_report(world).joint_drift, 1e-4); /* m: of rods of 1 m */
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("scene motions");
@@ -233,6 +247,7 @@ int main(void)
     tcase_add_test(cases, balls_part_as_newton_and_coulomb_say);
     tcase_add_test(cases, a_chain_of_contacts_closes_from_below);
     tcase_add_test(cases, bricards_linkage_moves_and_stays_closed);
+    tcase_add_loop_test(cases, folding_windows_keep_their_energy, 0, 2);
     tcase_add_test(cases, dominoes_fall_in_turn);
     tcase_add_test(cases, a_kicked_cube_stops_where_coulomb_says);
     suite_add_tcase(suite, cases);

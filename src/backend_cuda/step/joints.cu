@@ -82,6 +82,7 @@ static __device__ __forceinline__ void begin_memory(const joint_view &joints, in
         for (int role = 0; role < SADMM_ROLE_COUNT; ++role) after->force[role][lane] = 0;
         after->wrench[lane] = after->local[lane] = 0;
         after->angle[lane] = winds ? angle : before->angle[lane];
+        after->left[lane] = before->left[lane];
         if (lane < 3) after->point[lane] = acts ? v3_part(point, lane) : 0;
         return;
     }

@@ -320,6 +320,16 @@ SADMM_INLINE bool joined_change_row(const struct joined_view *v, int32_t r)
     return true;
 }
 
+/* The share of a hard row's scale that is left of its response once all before it are met, in a part that is factored: next
+ * to nothing where it says what they say. 0: the row is not held by what it is. */
+SADMM_INLINE double joined_left(const struct joined_view *v, int32_t r)
+{
+    const struct joined_row *row = &v->rows[r];
+    if (v->state[r] != JOINED_INSIDE || !sadmm_law_is_coupled(row->compliance, row->lo, row->hi)) return 0;
+    const double left = JOINED_GIVE / (v->give[r] * v->pivot[r]);
+    return isfinite(left) ? left : 0;
+}
+
 SADMM_INLINE double joined_bounded(const struct joined_view *v, int32_t r)
 {
     return joined_clamp(v->rows[r].lambda + v->change[r], v->rows[r].lo, v->rows[r].hi);

@@ -8,6 +8,8 @@
 
 /* A joint is closed once it is off by more than this share of its bodies' arms and radii of gyration, or rad. */
 #define JOINT_CLOSE_FROM 5e-4
+/* Where a loop folds: what is off by e there lets its bodies turn by the root of e. */
+#define JOINT_CLOSE_FOLDING 1e-8
 /* By so many Newton steps at most. */
 enum { JOINT_CLOSE_STEPS = 8 };
 
@@ -48,6 +50,18 @@ SADMM_INLINE struct joint_opening joint_opening_of(const sadmm_joint_def *def, c
     out.little = out.off * out.off <= JOINT_CLOSE_FROM * JOINT_CLOSE_FROM * (v3_norm2(a->arm) + v3_norm2(b->arm)) &&
                  joint_turns_little(a, b, def->locks);
     return out;
+}
+
+/* Is a pose in which a loop may fold within so many steps? There a row says what others say, and near it the root of what
+ * is left of it grows as the way to that pose. was, now: joined_left of the row in the last step and in this one. Rows that
+ * say the same in any pose (a plane mechanism of hinges) are left with what their errors make, 1e-6 at most. */
+#define JOINT_FOLDS_WITHIN  3
+#define JOINT_SAYS_THE_SAME 1e-6
+
+SADMM_INLINE bool joint_row_folds(double was, double now)
+{
+    return was > 0 && now > 0 && max_of(was, now) > JOINT_SAYS_THE_SAME &&
+           sqrt(now) < JOINT_FOLDS_WITHIN * fabs(sqrt(now) - sqrt(was));
 }
 
 /* A joint as its bodies' poses have it: locks in order. */

@@ -44,6 +44,15 @@ static bool same_graph(const struct solving *s)
     return true;
 }
 
+/* Constraints that only hang bodies on each other, or on what is not solved for, make no loop. */
+static bool has_loop(const struct joined_structure *s)
+{
+    int32_t ground = 0;
+    for (int32_t k = 0; k < 2 * s->places; ++k)
+        if (s->side[k] < 0) ground = 1;
+    return s->places >= s->bodies + ground;
+}
+
 /* Views, and which bodies they have. */
 static bool make_parts(struct sadmm_joined *j, size_t bodies)
 {
@@ -63,9 +72,11 @@ static bool make_parts(struct sadmm_joined *j, size_t bodies)
         return false;
     for (size_t i = 0; i < bodies; ++i) j->part[i] = -1;
     work = joined = places = 0;
+    j->loops = false;
     for (int32_t k = 0; k < j->order.parts; ++k) {
         const struct joined_structure s = sadmm_joined_part(&j->order, k);
-        j->parts[k] = (struct joined_part){.view = joined_view_at(&s, j->work + work), .impulse = j->impulse + 6 * joined,
+        j->loops = j->loops || has_loop(&s);
+        j->parts[k] = (struct joined_part){.view = joined_view_at(&s, j->work + work), .loop = has_loop(&s), .impulse = j->impulse + 6 * joined,
                                     .kept_velocity = j->kept_velocity + 6 * joined,
                                     .kept_state = j->kept_states + JOINED_ROWS * places};
         for (int32_t e = 0; e < s.bodies; ++e) {
@@ -243,7 +254,16 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
     return SADMM_OK;
 }
 
-/* ---- displacements ----------------------------------------------------------------------------------------------- */
+bool sadmm_joined_find_left(const struct sadmm_joined *joined, const struct sadmm_row_constraint *slots, double *left)
+{
+    for (int32_t k = 0; joined->loops && k < joined->order.parts; ++k) {
+        const struct joined_view *v = &joined->parts[k].view;
+        if (joined->parts[k].loop) EACH_JOINED_ROW(slots, v, r, from) left[from] = joined_left(v, r);
+    }
+    return joined->loops;
+}
+
+/* ---- at the end of a step ---------------------------------------------------------------------------------------- */
 
 static void move_by(const struct joined_view *v, struct sadmm_rigid *bodies)
 {
@@ -255,25 +275,34 @@ static void move_by(const struct joined_view *v, struct sadmm_rigid *bodies)
     }
 }
 
-static void close_part(const struct solving *s, struct joined_part *part, struct sadmm_rigid *bodies)
+static void change_speeds(const struct joined_view *v, struct sadmm_rigid *bodies)
+{
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        for (int k = 0; k < 6; ++k) bodies[v->s.body[e]].velocity[k] += v->dv[6 * e + k];
+}
+
+static void close_part(const struct solving *s, struct joined_part *part, bool speeds, struct sadmm_rigid *bodies)
 {
     const struct joined_view *v = &part->view;
     memset(part->impulse, 0, 6 * (size_t)v->s.bodies * sizeof *part->impulse);
     sadmm_joined_part_load(part, s->system, s->settings, s->slots);
     memset(v->velocity, 0, 6 * (size_t)v->s.bodies * sizeof *v->velocity);
+    for (int32_t e = 0; speeds && e < v->s.bodies; ++e)
+        memcpy(v->velocity + 6 * (size_t)e, bodies[v->s.body[e]].velocity, 6 * sizeof *v->velocity);
     leave_to_contacts(v); /* nothing but the errors moves bodies */
     if (!sadmm_joined_part_solve(v, NULL, true)) return;
-    move_by(v, bodies);
+    if (speeds) change_speeds(v, bodies);
+    else move_by(v, bodies);
 }
 
 sadmm_status sadmm_joined_close(struct sadmm_joined *joined, const struct sadmm_system *system,
                                 const struct sadmm_row_constraint *slots, size_t slot_count,
-                                const struct sadmm_settings *settings, const uint8_t *opened,
+                                const struct sadmm_settings *settings, const uint8_t *opened, bool speeds,
                                 struct sadmm_rigid *bodies, struct sadmm_error *error)
 {
     const struct solving s = {joined, system, slots, slot_count, settings};
     if (!find_order(&s)) return sadmm_fail_memory(error, "joined bodies");
     for (int32_t k = 0; k < joined->order.parts; ++k)
-        if (has_any(&joined->parts[k], opened)) close_part(&s, &joined->parts[k], bodies);
+        if (has_any(&joined->parts[k], opened)) close_part(&s, &joined->parts[k], speeds, bodies);
     return SADMM_OK;
 }

@@ -50,12 +50,17 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
                                 const struct sadmm_settings *settings, const uint8_t *stiffened, bool after,
                                 struct sadmm_error *error);
 
+/* joined_left (core/model/joined.h) of rows of parts with loops, as they were solved last; of others `left` stays what it
+ * is. Is there any such part? slots: as above. */
+bool sadmm_joined_find_left(const struct sadmm_joined *joined, const struct sadmm_row_constraint *slots, double *left);
+
 /* Moves `bodies` (what the step has made of the system's), of parts that have one of `opened`, by the least displacements,
- * weighed by A, that take away the errors (biases) of system->rows, which are hard. Parts that cannot be solved stay.
+ * weighed by A, that take away the errors (biases) of system->rows, which are hard. speeds: not places but velocities are
+ * changed, by the least that gives the rows the rates that biases ask for. Parts that cannot be solved stay.
  * slots: as above. Errors: OUT_OF_MEMORY. */
 sadmm_status sadmm_joined_close(struct sadmm_joined *joined, const struct sadmm_system *system,
                                 const struct sadmm_row_constraint *slots, size_t slot_count,
-                                const struct sadmm_settings *settings, const uint8_t *opened,
+                                const struct sadmm_settings *settings, const uint8_t *opened, bool speeds,
                                 struct sadmm_rigid *bodies, struct sadmm_error *error);
 
 #ifdef __cplusplus

@@ -16,6 +16,7 @@ struct joined_part {
     struct joined_view view; /* arrays in `work` of sadmm_joined */
     double *impulse;         /* bodies x 6, in lists of all parts: J^T lambda; */
     double *kept_velocity;   /* that before the iterations */
+    bool loop;               /* its joints are more than hang it together */
     double speed;            /* that its impulses change it by; 0: it is not solved */
     bool left;               /* it is not this call's */
     bool touched;            /* by a contact */
@@ -29,6 +30,7 @@ struct sadmm_joined {
     size_t constraints;
     int32_t body_count;
     struct joined_part *parts;
+    bool loops;             /* a part has one */
     int32_t *part, *entry;  /* bodies: the part, -1: not joined; number in it */
     double *work;           /* of all views */
     double *impulse;        /* joined bodies x 6 */

@@ -52,11 +52,21 @@ static struct joint_closing closing_of(const sadmm_world *world, const struct sa
     return joint_closing_of(&joint->def, e.start, e.end, e.scale, settings);
 }
 
-static void open_bodies(sadmm_world *world, const struct sadmm_world_joint *joint)
+/* Is it of a part that folds? */
+static bool folds(const sadmm_world *world, const struct sadmm_world_joint *joint)
 {
     for (int s = 0; s < 2; ++s) {
         const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
-        if (body >= 0) world->opened[body] = true;
+        if (body >= 0 && world->folding[body]) return true;
+    }
+    return false;
+}
+
+static void mark_bodies(const sadmm_world *world, const struct sadmm_world_joint *joint, uint8_t *bodies)
+{
+    for (int s = 0; s < 2; ++s) {
+        const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
+        if (body >= 0) bodies[body] = true;
     }
 }
 
@@ -83,14 +93,48 @@ static bool find_open(sadmm_world *world, const sadmm_settings *settings, double
         const struct joint_end a = end_of(world, joint, 0), b = end_of(world, joint, 1);
         const struct joint_opening opening = joint_opening_of(&joint->def, &a, &b);
         *off = opening.off > *off ? opening.off : *off;
-        if (opening.little || world->kernels->resident) continue; /* a device would not do it */
-        if (!may_open(world, joint)) continue;
-        if (!(closing_of(world, joint, settings).share > JOINT_CLOSE_FROM)) continue;
+        if (world->kernels->resident) continue; /* a device would not do it */
+        const bool folding = folds(world, joint);
+        if (!folding && (opening.little || !may_open(world, joint))) continue;
+        if (!(closing_of(world, joint, settings).share > (folding ? JOINT_CLOSE_FOLDING : JOINT_CLOSE_FROM))) continue;
         if (!any) memset(world->opened, 0, (size_t)world->dynamic_count);
-        open_bodies(world, joint);
+        mark_bodies(world, joint, world->opened);
         any = true;
     }
     return any;
+}
+
+static void mark_islands(const sadmm_world *world, const uint8_t *bodies)
+{
+    for (int32_t i = 0; i < world->dynamic_count; ++i)
+        if (bodies[i]) world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
+}
+
+/* ---- what folds -------------------------------------------------------------------------------------------------- */
+
+/* Which bodies have joints that fold; what is left of rows is kept for the next step. Are there any? */
+static sadmm_status find_folding(sadmm_world *world, bool *any)
+{
+    const size_t n = (size_t)world->dynamic_count, rows = world->joint_rows;
+    *any = false;
+    if (!sadmm_grow_empty(&world->folding, &world->folding_capacity, n, sizeof *world->folding) ||
+        !sadmm_grow_empty(&world->row_left, &world->row_left_capacity, world->start.rows.row_count, sizeof *world->row_left))
+        return sadmm_fail_memory(&world->error, "joints that fold");
+    memset(world->folding, 0, n);
+    memset(world->row_left, 0, world->start.rows.row_count * sizeof *world->row_left);
+    if (!sadmm_joined_find_left(world->joined, world->joint_constraints, world->row_left)) return SADMM_OK;
+    for (size_t r = 0; r < rows; ++r) {
+        const struct sadmm_joint_source *source = &world->joint_sources[r];
+        struct sadmm_world_joint *joint = &world->joints[source->joint];
+        double *was = &joint->next.left[source->coordinate];
+        if (source->role != SADMM_ROLE_LOCK) continue;
+        if (joint_row_folds(*was, world->row_left[r])) {
+            *any = true;
+            mark_bodies(world, joint, world->folding);
+        }
+        *was = world->row_left[r];
+    }
+    return SADMM_OK;
 }
 
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
@@ -183,6 +227,17 @@ static void pay_costs(sadmm_world *world, const sadmm_settings *settings)
     }
 }
 
+/* Velocities of what folds, along what its joints leave it at the end. What they are off by in a direction that is about to
+ * vanish would be taken for errors as large as that is short, once the next step is past the pose. */
+static sadmm_status turn_speeds(sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings)
+{
+    if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
+    memset(world->closing.bias, 0, world->closing.row_count * sizeof *world->closing.bias);
+    mark_islands(world, world->folding);
+    return sadmm_joined_close(world->joined, system, world->closing_slots, world->joint_constraint_count, settings,
+                              world->folding, true, world->next, &world->error);
+}
+
 sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *settings, double *off)
 {
     struct sadmm_system system = sadmm_world_system(world);
@@ -190,17 +245,17 @@ sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *
     if (!sadmm_grow_empty(&world->opened, &world->opened_capacity, n, sizeof *world->opened) ||
         !sadmm_grow_empty(&world->closing_costs, &world->closing_cost_capacity, n, sizeof *world->closing_costs))
         return sadmm_fail_memory(&world->error, "joints that close");
-    bool any = false;
+    bool any = false, folding = false;
+    if (!world->kernels->resident) TRY(find_folding(world, &folding)); /* a device would not do it */
     system.rows = &world->closing;
     for (int step = 0; find_open(world, settings, off) && step < JOINT_CLOSE_STEPS; ++step) {
         if (!any) begin_costs(world, settings);
         any = true;
         if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
-        for (int32_t i = 0; i < world->dynamic_count; ++i)
-            if (world->opened[i]) world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
+        mark_islands(world, world->opened);
         TRY(sadmm_joined_close(world->joined, &system, world->closing_slots, world->joint_constraint_count, settings,
-                               world->opened, world->next, &world->error));
+                               world->opened, false, world->next, &world->error));
     }
     if (any) pay_costs(world, settings);
-    return SADMM_OK;
+    return folding ? turn_speeds(world, &system, settings) : SADMM_OK;
 }

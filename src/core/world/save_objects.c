@@ -16,7 +16,7 @@ LISTED(struct sadmm_rigid, 320);
 LISTED(struct sadmm_steady, 72);
 LISTED(sadmm_joint_coordinate, 112);
 LISTED(sadmm_joint_def, 840);
-LISTED(struct sadmm_joint_memory, 512);
+LISTED(struct sadmm_joint_memory, 560);
 LISTED(sadmm_gear_def, 48);
 LISTED(sadmm_coupling_def, 224);
 
@@ -404,6 +404,7 @@ static void archive_joint_memory(struct sadmm_archive *archive, struct sadmm_joi
     SADMM_ARCHIVE(archive, m->wrench);
     SADMM_ARCHIVE(archive, m->point);
     SADMM_ARCHIVE(archive, m->local);
+    SADMM_ARCHIVE(archive, m->left);
     sadmm_archive_flag(archive, &m->leads_stay);
     sadmm_archive_flag(archive, &m->broken);
 }
@@ -453,7 +454,8 @@ static bool joint_fits(const sadmm_world *world, const struct sadmm_world_joint 
     for (int role = 0; role < SADMM_ROLE_COUNT; ++role)
         if (!sadmm_all_finite(joint->last.force[role], JOINT_COORDINATES)) return false;
     return sadmm_all_finite(joint->last.angle, JOINT_COORDINATES) && sadmm_all_finite(joint->last.wrench, 6) &&
-           sadmm_all_finite(joint->last.point, 3) && sadmm_all_finite(joint->last.local, 6);
+           sadmm_all_finite(joint->last.point, 3) && sadmm_all_finite(joint->last.local, 6) &&
+           sadmm_all_finite(joint->last.left, JOINT_COORDINATES);
 }
 
 static void archive_joint(struct sadmm_archive *archive, sadmm_world *world, size_t slot)

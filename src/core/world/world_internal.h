@@ -225,9 +225,11 @@ struct sadmm_world {
     struct sadmm_rows closing;                /* locks, where the step has moved bodies to; their places in it; */
     struct sadmm_row_constraint *closing_slots;
     uint8_t *opened;                          /* dynamic bodies: of parts with joints that are to be closed */
+    uint8_t *folding;                         /* dynamic bodies: of joints that fold; */
+    double *row_left;                         /* rows: what is left of them */
     struct joint_closing_cost *closing_costs; /* dynamic bodies: what that costs (joint_close.c) */
     size_t joint_load_capacity, stiffening_capacity, stiffened_capacity, closing_slot_capacity, opened_capacity,
-        closing_cost_capacity;
+        closing_cost_capacity, folding_capacity, row_left_capacity;
     struct sadmm_row_constraint *joint_constraints; /* all that joints may have, in order; most have rows in the step */
     size_t joint_constraint_count, joint_constraint_capacity;
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
