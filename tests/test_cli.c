@@ -124,7 +124,7 @@ static const struct {
     {"backends -h", 0, "usage: subadmm backends"},
     {"help fly", 2, "unknown command 'fly'; valid: scenes"},
     {"--version", 0, "subadmm "},
-    {"fly", 2, "unknown command 'fly'; valid: scenes backends run check solve help --help --version"},
+    {"fly", 2, "unknown command 'fly'; valid: scenes backends settings run check solve help --help --version"},
     {"--fly", 2, "unknown option '--fly'"},
     {"run --help", 0, "--dump-problem STEP:FILE"},
     {"check --help", 0, "Exit status 1 when"},
@@ -163,6 +163,16 @@ static const struct {
     {"solve x --penalty-offset 5 --method fast", 2, "--penalty-offset: takes --method paper"},
     {"solve x --penalty-mass-factor 5", 2, "--penalty-mass-factor: takes --method paper"},
     {"solve x --penalty-period 5", 2, "--penalty-period: takes --method paper"},
+    {"run incline --set slip=1", 2, "--set 'slip=1': must be NAME=VALUE; subadmm settings lists the names"},
+    {"run incline --set slop", 2, "--set 'slop': must be NAME=VALUE"},
+    {"run incline --set hits=1.5", 2, "--set hits '1.5': must be an integer"},
+    {"run incline --set slop=x", 2, "--set slop 'x': must be a number"},
+    {"run incline --set certify=1", 2, "--set certify '1': must be true or false"},
+    {"run incline --set gravity=0,0", 2, "--set gravity '0,0': must be three numbers"},
+    {"run incline --set method=slow", 2, "--set method 'slow': must be paper or fast"},
+    {"run incline --set slop=2", 1, "settings.slop = 2: must be in [0, 1]"},
+    {"settings", 0, "relaxation                      1.8        [1, 2) "},
+    {"settings --json", 0, "\"exclusiveMaximum\": 2"},
     {"run incline --threads 2000", 2, "must be an integer in [0, 1024]"},
     {"run incline --dump-problem x.hdf5", 2, "must be STEP:FILE"},
     {"run incline --dump-problem 0:x.hdf5", 2, "must be an integer in [1,"},
@@ -463,6 +473,10 @@ START_TEST(options_matter)
         hash_of(text, other);
         ck_assert_msg(strcmp(hash, other) != 0, "%s changed nothing", others[k]);
     }
+    hash_of("run pile:20 --backend cpu --precision f64 --steps 100 --set iterations=41 --set dt=0.005 --json -", other);
+    ck_assert_str_eq(hash, other);
+    hash_of("run pile:20 --backend cpu --steps 100 --set baumgarte=0.3 --set gravity=0,1,-5 --json -", other);
+    ck_assert_str_ne(hash, other);
     hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --method paper --penalty-period 10 --json -", hash);
     hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --method paper --penalty-period 0 --json -", other);
     ck_assert_str_ne(hash, other);

@@ -295,12 +295,25 @@ def check_example(project, command, schema):
             fail(f"examples/swing.json: {error.json_path}: {error.message}")
 
 
+def check_settings(command, document):
+    """The schema's settings are the library's; how many iterations and sub-steps there are goes by method in a file."""
+    told = json.loads(run(command, "settings", "--json").stdout)["properties"]
+    for name in ("iterations", "substeps"):
+        del told[name]["default"]
+    for properties in (told, have := document["$defs"]["settings"]["properties"]):
+        for value in properties.values():
+            value.pop("description", None)
+    for name in sorted({*told, *have}):
+        if told.get(name) != have.get(name):
+            fail(f"settings.{name}: the schema has {have.get(name)}, `subadmm settings --json` {told.get(name)}")
+
+
 def main():
     project, command = map(os.path.abspath, sys.argv[1:3])
     schema = None
+    with open(os.path.join(project, "docs", "scene.schema.json"), encoding="utf-8") as file:
+        document = json.load(file)
     if jsonschema:
-        with open(os.path.join(project, "docs", "scene.schema.json"), encoding="utf-8") as file:
-            document = json.load(file)
         jsonschema.Draft202012Validator.check_schema(document)
         schema = jsonschema.Draft202012Validator(document)
     with tempfile.TemporaryDirectory() as folder:
@@ -308,6 +321,7 @@ def main():
         check_good(project, command, schema)
         check_cases(command, schema)
         check_example(project, command, schema)
+        check_settings(command, json.loads(json.dumps(document)))
         if schema:
             check_exports(command, schema)
         os.chdir("/")

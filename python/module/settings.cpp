@@ -1,55 +1,45 @@
 // Settings of steps, and what a step reports.
 #include "common.h"
+#include "core/base/settings_fields.h"
 
-// A member that is a whole number.
-static void bind_whole(nb::class_<sadmm_settings> &c, const char *name, int sadmm_settings::*at, const char *doc)
+using S = sadmm_settings;
+using settings_class = nb::class_<S>;
+
+static void bind_REAL(settings_class &c, const char *name, double S::*at, const char *doc) { c.def_rw(name, at, doc); }
+static void bind_FLAG(settings_class &c, const char *name, bool S::*at, const char *doc) { c.def_rw(name, at, doc); }
+static void bind_WHOLE(settings_class &c, const char *name, int S::*at, const char *doc)
 {
-    c.def_prop_rw(name, [at](const sadmm_settings &s) { return s.*at; },
-                  [at, name](sadmm_settings &s, const whole &x) { s.*at = x.as_int(name); }, doc);
+    c.def_prop_rw(name, [at](const S &s) { return s.*at; },
+                  [at, name](S &s, const whole &x) { s.*at = x.as_int(name); }, doc);
 }
+static void bind_VECTOR(settings_class &c, const char *name, double (S::*at)[3], const char *doc)
+{
+    c.def_prop_rw(name, [at](const S &s) { return array_of<3>(s.*at); },
+                  [at, name](S &s, numbers<3> x) { put(x.as(name), s.*at); }, doc);
+}
+static void bind_METHOD(settings_class &c, const char *name, sadmm_method S::*at, const char *doc)
+{
+    c.def_prop_rw(name, [at](const S &s) { return name_of(s.*at, method_names); },
+                  [at, name](S &s, const std::string &method) { s.*at = named(name, method, method_names); }, doc);
+}
+
+#define RANGE_ANY(lo, hi) ""
+#define RANGE_CLOSED(lo, hi) " In [" #lo ", " #hi "]."
+#define RANGE_BELOW(lo, hi) " In [" #lo ", " #hi ")."
+#define RANGE_FROM(lo, hi) " Finite, >= " #lo "."
+#define RANGE_ABOVE(lo, hi) " Finite, > " #lo "."
+#define BIND(X, kind, role, name, value, lo, hi, ends, text) bind_##kind(c, #name, &S::name, text RANGE_##ends(lo, hi));
 
 void bind_settings(nb::module_ &m)
 {
-    using S = sadmm_settings;
-    nb::class_<S> c(m, "Settings", "Settings of steps. Settings(dt=0.002, iterations=50): the defaults, with changes. A world "
-                                 "checks them when they are given to it.");
+    settings_class c(m, "Settings", "Settings of steps. Settings(dt=0.002, iterations=50): the defaults, with changes. A "
+                                    "world checks them when they are given to it.");
     c.def("__init__", [](nb::pointer_and_handle<S> self, nb::kwargs values) {
-            new (self.p) S(sadmm_settings_default());
-            nb::inst_mark_ready(self.h);
-            set_members(self.h, values);
-        })
-        .def_rw("dt", &S::dt, "Time step, s, in [1e-6, 1].")
-        .def_prop_rw("gravity", [](const S &s) { return array_of<3>(s.gravity); },
-                     [](S &s, numbers<3> g) { put(g.as("gravity"), s.gravity); }, "m/s^2, world frame.")
-        .def_prop_rw("method", [](const S &s) { return name_of(s.method, method_names); },
-                     [](S &s, const std::string &name) { s.method = named("method", name, method_names); },
-                     "'fast' or 'paper'.")
-        .def_rw("relaxation", &S::relaxation, "Over-relaxation of 'fast', in [1, 2).")
-        .def_rw("penalty_mass_factor", &S::penalty_mass_factor, "'paper': M of eq. (13).")
-        .def_rw("penalty_offset", &S::penalty_offset, "'paper': c of eq. (13), kg/s^2.")
-        .def_rw("penalty_ratio_limit", &S::penalty_ratio_limit, "'paper': alpha of eq. (15).")
-        .def_rw("penalty_update_warm", &S::penalty_update_warm, "'paper': also update in steps that start warm.")
-        .def_rw("warm_start", &S::warm_start, "Start from the last step's impulses and velocities.")
-        .def_rw("residual_tolerance", &S::residual_tolerance, "Stop when both residuals are at most this; 0: never.")
-        .def_rw("certificate_tolerance", &S::certificate_tolerance, "Stop when the natural map (m/s) is at most this; 0: never.")
-        .def_rw("certificate_momentum_tolerance", &S::certificate_momentum_tolerance, "... and the momentum error this.")
-        .def_rw("measure_residuals", &S::measure_residuals, "Report the residuals of the last iteration.")
-        .def_rw("certify", &S::certify, "Report the true error of every step.")
-        .def_rw("recover_wrenches", &S::recover_wrenches, "Compute the contact wrench of every body.")
-        .def_rw("baumgarte", &S::baumgarte, "Share of penetration beyond the slop removed a (sub-)step, in [0, 1].")
-        .def_rw("slop", &S::slop, "Penetration left alone, m.")
-        .def_rw("correction_speed", &S::correction_speed, "Cap of the corrective speed, m/s.")
-        .def_rw("restitution_threshold", &S::restitution_threshold, "Approach speed under which restitution is ignored, m/s.");
-    bind_whole(c, "substeps", &S::substeps, "Sub-steps of a step, which share its iterations, in [1, 64].");
-    bind_whole(c, "iterations", &S::iterations, "Iterations a step, in [1, 1000000].");
-    bind_whole(c, "penalty_period", &S::penalty_period, "'paper': iterations between penalty updates, 0: never.");
-    bind_whole(c, "direct_points", &S::direct_points,
-               "Islands with joints and at most so many contact points are solved directly, in [0, 128].");
-    bind_whole(c, "check_period", &S::check_period, "Iterations between convergence checks, in [1, 1000000].");
-    bind_whole(c, "hits", &S::hits,
-               "Hits of a body in flight, with restitution or so fast that two pass by their own size, that are taken at their\n"
-               "moment within a (sub-)step, at most, in [0, 64]; 0: none, the solve has them all. CUDA takes it for 0.");
-    bind_whole(c, "threads", &S::threads, "CPU threads at most, in [0, 1024]; 0: no bound. Results do not depend on it.");
+        new (self.p) S(sadmm_settings_default());
+        nb::inst_mark_ready(self.h);
+        set_members(self.h, values);
+    });
+    SADMM_SETTINGS(BIND, )
 
     using C = sadmm_certificate;
     nb::class_<C>(m, "Certificate", "True error of a step, computed in double from raw data.")

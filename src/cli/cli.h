@@ -35,7 +35,7 @@ struct cli_command {
     int (*run)(int argc, char **argv);
 };
 
-extern const struct cli_command cli_scenes, cli_backends, cli_run, cli_check, cli_solve;
+extern const struct cli_command cli_scenes, cli_backends, cli_settings, cli_run, cli_check, cli_solve;
 
 /* Called for every option, `index` into command->options; value NULL where none was given. CLI_DONE to go on. */
 typedef int (*cli_set_option)(void *target, size_t index, const char *value);
@@ -53,6 +53,9 @@ bool cli_read_real(const char *option, const char *text, double lo, double hi, d
 bool cli_read_backend(const char *option, const char *text, sadmm_backend *out);
 bool cli_read_precision(const char *option, const char *text, sadmm_precision *out);
 bool cli_read_method(const char *option, const char *text, sadmm_method *out);
+
+/* NAME=VALUE of any setting into `settings`, which a world checks (cmd_settings.c). */
+bool cli_read_setting(const char *text, sadmm_settings *settings);
 
 /* The name of an output, "-" where none is given. False when the option was given before: nothing is dropped in
  * silence. */

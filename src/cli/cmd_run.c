@@ -19,7 +19,7 @@
 enum {
     OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_SUBSTEPS, OPTION_METHOD,
     OPTION_ITERATIONS, OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_DIRECT_POINTS, OPTION_PENALTY_PERIOD,
-    OPTION_THREADS, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP, OPTION_QUIET
+    OPTION_THREADS, OPTION_SET, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP, OPTION_QUIET
 };
 
 static const struct cli_option options[] = {
@@ -37,6 +37,7 @@ static const struct cli_option options[] = {
     [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between convergence checks (default 10)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "paper: iterations between penalty updates, 0 = never"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads at most, 0 = as many as pay (default)"},
+    [OPTION_SET] = {"set", "NAME=VALUE", "any setting (subadmm settings lists them), after the options above; repeatable"},
     [OPTION_NO_WARM_START] = {"no-warm-start", NULL, "start every step from zero impulses"},
     [OPTION_CERTIFY] = {"certify", NULL, "measure the true error of every step"},
     [OPTION_EXPLAIN] = {"explain", NULL, "say what the last step ran, what it left out and why"},
@@ -48,7 +49,7 @@ static const struct cli_option options[] = {
     [OPTION_QUIET] = {"quiet", NULL, "no progress, no table"},
 };
 
-enum { MOST_DUMPS = 16 };
+enum { MOST_DUMPS = 16, MOST_SET = 64 };
 
 struct run_dump {
     long step;
@@ -69,6 +70,8 @@ struct run_options {
     const char *json, *trace;
     struct run_dump dumps[MOST_DUMPS];
     size_t dump_count;
+    const char *set[MOST_SET];
+    size_t set_count;
 };
 
 static bool read_dump(struct run_options *o, const char *value)
@@ -89,6 +92,17 @@ static bool read_dump(struct run_options *o, const char *value)
     step[length] = 0;
     dump->path = colon + 1;
     return cli_read_int("--dump-problem STEP", step, 1, LONG_MAX, &dump->step);
+}
+
+static bool keep_setting(struct run_options *o, const char *value)
+{
+    sadmm_settings any; /* is it a setting at all? */
+    if (o->set_count == MOST_SET) {
+        cli_error(CLI_USAGE, "--set '%s': must be one of %d at most", value, MOST_SET);
+        return false;
+    }
+    o->set[o->set_count++] = value;
+    return cli_read_setting(value, &any);
 }
 
 static int set_option(void *target, size_t index, const char *value)
@@ -117,6 +131,7 @@ static int set_option(void *target, size_t index, const char *value)
     case OPTION_CHECK_PERIOD: ok = cli_read_int("--check-period", value, 1, 1000000, &o->check_period); break;
     case OPTION_PENALTY_PERIOD: ok = cli_read_int("--penalty-period", value, 0, 1000000, &o->penalty_period); break;
     case OPTION_THREADS: ok = cli_read_int("--threads", value, 0, 1024, &o->threads); break;
+    case OPTION_SET: ok = keep_setting(o, value); break;
     case OPTION_NO_WARM_START: o->no_warm_start = true; break;
     case OPTION_CERTIFY: o->certify = true; break;
     case OPTION_EXPLAIN: o->explain = true; break;
@@ -147,6 +162,7 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     if (o->threads >= 0) s->threads = (int)o->threads;
     if (o->no_warm_start) s->warm_start = false;
     if (o->certify) s->certify = true;
+    for (size_t k = 0; k < o->set_count; ++k) cli_read_setting(o->set[k], s);
 }
 
 /* ---- progress ---------------------------------------------------------------------------------------------------- */

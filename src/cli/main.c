@@ -5,7 +5,8 @@
 #include "interrupt.h"
 #include "output.h"
 
-static const struct cli_command *const commands[] = {&cli_scenes, &cli_backends, &cli_run, &cli_check, &cli_solve};
+static const struct cli_command *const commands[] = {&cli_scenes, &cli_backends, &cli_settings,
+                                                  &cli_run,    &cli_check,    &cli_solve};
 enum { COMMAND_COUNT = sizeof commands / sizeof *commands };
 
 static void print_overview(FILE *out)

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/base/settings_fields.h"
+
 #define COUNT(list) (sizeof(list) / sizeof *(list))
 
 /* ---- names ------------------------------------------------------------------------------------------------------- */
@@ -89,34 +91,13 @@ static const struct sadmm_field method_list[] = {
 };
 TABLE(sadmm_method_fields, "what goes by method", method_list);
 
-static const struct sadmm_field settings_list[] = {
-    REAL(sadmm_settings, dt),
-    INT32(sadmm_settings, substeps),
-    REALS(sadmm_settings, gravity, 3),
-    NAME(sadmm_settings, method, sadmm_method_names),
-    INT32(sadmm_settings, iterations),
-    REAL(sadmm_settings, relaxation),
-    INT32(sadmm_settings, penalty_period),
-    REAL(sadmm_settings, penalty_mass_factor),
-    REAL(sadmm_settings, penalty_offset),
-    REAL(sadmm_settings, penalty_ratio_limit),
-    BOOL(sadmm_settings, penalty_update_warm),
-    BOOL(sadmm_settings, warm_start),
-    INT32(sadmm_settings, direct_points),
-    REAL(sadmm_settings, residual_tolerance),
-    REAL(sadmm_settings, certificate_tolerance),
-    REAL(sadmm_settings, certificate_momentum_tolerance),
-    INT32(sadmm_settings, check_period),
-    BOOL(sadmm_settings, measure_residuals),
-    BOOL(sadmm_settings, certify),
-    BOOL(sadmm_settings, recover_wrenches),
-    REAL(sadmm_settings, baumgarte),
-    REAL(sadmm_settings, slop),
-    REAL(sadmm_settings, correction_speed),
-    REAL(sadmm_settings, restitution_threshold),
-    INT32(sadmm_settings, hits),
-    INT32(sadmm_settings, threads),
-};
+#define SETTING(X, kind, role, name, ...) SETTING_##kind(name),
+#define SETTING_REAL(name) REAL(sadmm_settings, name)
+#define SETTING_VECTOR(name) REALS(sadmm_settings, name, 3)
+#define SETTING_WHOLE(name) INT32(sadmm_settings, name)
+#define SETTING_FLAG(name) BOOL(sadmm_settings, name)
+#define SETTING_METHOD(name) NAME(sadmm_settings, name, sadmm_method_names)
+static const struct sadmm_field settings_list[] = {SADMM_SETTINGS(SETTING, )};
 TABLE(sadmm_settings_fields, "settings", settings_list);
 
 static const struct sadmm_field body_list[] = {

@@ -1,113 +1,85 @@
 #include "settings.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
+
+#define ROW_DEFAULT(X, kind, role, name, value, ...) .name = value,
+#define ROW_MEMBER(X, kind, role, name, ...) ROW_ZERO_##kind
+#define ROW_ZERO_REAL 0,
+#define ROW_ZERO_WHOLE 0,
+#define ROW_ZERO_FLAG 0,
+#define ROW_ZERO_METHOD 0,
+#define ROW_ZERO_VECTOR {0, 0, 0},
+
+/* A struct with too few initialisers is an error here: no member can be left out of the list. */
+#pragma GCC diagnostic push
+#pragma GCC diagnostic error "-Wmissing-field-initializers"
+_Static_assert(sizeof((sadmm_settings){SADMM_SETTINGS(ROW_MEMBER, )}) == sizeof(sadmm_settings), "every member is listed");
+#pragma GCC diagnostic pop
+
+static const struct sadmm_setting list[SADMM_SETTING_COUNT] = {SADMM_SETTINGS(SADMM_SETTING_ROW, )};
+
+const struct sadmm_setting *sadmm_settings_list(void) { return list; }
 
 sadmm_settings sadmm_settings_default(void)
 {
-    sadmm_settings s = {
-        .dt = 0.005,
-        .substeps = 1,
-        .gravity = {0, 0, -9.81},
-        .method = SADMM_METHOD_FAST,
-        .iterations = 20,
-        .relaxation = 1.8,
-        .penalty_period = 30,
-        .penalty_mass_factor = 16,
-        .penalty_offset = 1e5,
-        .penalty_ratio_limit = 4,
-        .warm_start = true,
-        .residual_tolerance = 0,
-        .certificate_tolerance = 0,
-        .certificate_momentum_tolerance = 1e-6,
-        .check_period = 10,
-        .measure_residuals = false,
-        .certify = false,
-        .recover_wrenches = true,
-        .baumgarte = 0.2,
-        .slop = 1e-5,
-        .correction_speed = 1,
-        .restitution_threshold = 0.1,
-        .hits = 16,
-        .threads = 0,
-    };
+    const sadmm_settings s = {SADMM_SETTINGS(ROW_DEFAULT, )};
     return s;
 }
 
+/* ---- ranges ------------------------------------------------------------------------------------------------------ */
+
+static sadmm_status refuse(struct sadmm_error *error, const struct sadmm_setting *of, double x, const char *range)
+{
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %.10g: must be %s", of->name, x,
+                      range);
+}
+
 /* Comparisons are written so that NaN fails them. */
-static bool in_range(double x, double lo, double hi) { return x >= lo && x <= hi; }
+static sadmm_status check(const struct sadmm_setting *of, double x, struct sadmm_error *error)
+{
+    char range[64];
+    switch (of->ends) {
+    case SADMM_SETTING_CLOSED:
+        snprintf(range, sizeof range, "in [%.10g, %.10g]", of->lo, of->hi);
+        return x >= of->lo && x <= of->hi ? SADMM_OK : refuse(error, of, x, range);
+    case SADMM_SETTING_BELOW:
+        snprintf(range, sizeof range, "in [%.10g, %.10g)", of->lo, of->hi);
+        return x >= of->lo && x < of->hi ? SADMM_OK : refuse(error, of, x, range);
+    case SADMM_SETTING_FROM:
+        snprintf(range, sizeof range, "finite and >= %.10g", of->lo);
+        return x >= of->lo && x < INFINITY ? SADMM_OK : refuse(error, of, x, range);
+    case SADMM_SETTING_ABOVE:
+        snprintf(range, sizeof range, "finite and > %.10g", of->lo);
+        return x > of->lo && x < INFINITY ? SADMM_OK : refuse(error, of, x, range);
+    case SADMM_SETTING_ANY: break;
+    }
+    return SADMM_OK;
+}
+
+_Static_assert((int)SADMM_MOST_SUBSTEPS == 64 && (int)SADMM_MOST_DIRECT_POINTS == 128 && (int)SADMM_MOST_HITS == 64,
+               "ranges are as in the list");
 
 sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadmm_error *error)
 {
     if (!s)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "settings = NULL: must be given (sadmm_settings_default())");
-
-    const struct {
-        const char *name;
-        double value, lo, hi;
-    } reals[] = {
-        {"dt", s->dt, 1e-6, 1},
-        {"penalty_mass_factor", s->penalty_mass_factor, 0, 1e12},
-        {"penalty_offset", s->penalty_offset, 0, 1e15},
-        {"penalty_ratio_limit", s->penalty_ratio_limit, 1, 1e6},
-        {"baumgarte", s->baumgarte, 0, 1},
-        {"slop", s->slop, 0, 1},
-        {"correction_speed", s->correction_speed, 0, 1e3},
-    };
-    const struct {
-        const char *name;
-        int value, lo, hi;
-    } integers[] = {
-        {"substeps", s->substeps, 1, SADMM_MOST_SUBSTEPS},
-        {"iterations", s->iterations, 1, 1000000},
-        {"direct_points", s->direct_points, 0, SADMM_MOST_DIRECT_POINTS},
-        {"check_period", s->check_period, 1, 1000000},
-        {"hits", s->hits, 0, SADMM_MOST_HITS},
-        {"threads", s->threads, 0, 1024},
-    };
-    const struct {
-        const char *name;
-        double value;
-    } nonnegative[] = {
-        {"residual_tolerance", s->residual_tolerance},
-        {"certificate_tolerance", s->certificate_tolerance},
-        {"restitution_threshold", s->restitution_threshold},
-    };
-
-    for (size_t i = 0; i < sizeof reals / sizeof *reals; ++i)
-        if (!in_range(reals[i].value, reals[i].lo, reals[i].hi))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %g: must be in [%g, %g]",
-                              reals[i].name, reals[i].value, reals[i].lo, reals[i].hi);
-    for (size_t i = 0; i < sizeof integers / sizeof *integers; ++i)
-        if (integers[i].value < integers[i].lo || integers[i].value > integers[i].hi)
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %d: must be in [%d, %d]",
-                              integers[i].name, integers[i].value, integers[i].lo, integers[i].hi);
-    for (size_t i = 0; i < sizeof nonnegative / sizeof *nonnegative; ++i)
-        if (!(nonnegative[i].value >= 0) || isinf(nonnegative[i].value))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %g: must be finite and >= 0",
-                              nonnegative[i].name, nonnegative[i].value);
-
+    for (int i = 0; i < SADMM_SETTING_COUNT; ++i) {
+        const char *at = (const char *)s + list[i].offset;
+        if (list[i].kind == SADMM_SETTING_REAL) TRY(check(&list[i], *(const double *)(const void *)at, error));
+        if (list[i].kind == SADMM_SETTING_WHOLE) TRY(check(&list[i], *(const int *)(const void *)at, error));
+    }
     if (s->dt < 1e-6 * s->substeps)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "settings.dt / settings.substeps = %g / %d: must be >= 1e-06", s->dt, s->substeps);
     if ((int)s->method < 0 || s->method >= SADMM_METHOD_COUNT)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.method = %d: must be in [0, %d]",
                           (int)s->method, SADMM_METHOD_COUNT - 1);
-    if (!(s->relaxation >= 1 && s->relaxation < 2))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.relaxation = %g: must be in [1, 2)",
-                          s->relaxation);
-    if (s->penalty_period < 0)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.penalty_period = %d: must be >= 0 (0: never)",
-                          s->penalty_period);
     if (!(s->penalty_mass_factor > 0) && !(s->penalty_offset > 0))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "settings.penalty_mass_factor = 0 and settings.penalty_offset = 0: one must be > 0");
-    if (!(s->certificate_momentum_tolerance > 0) || isinf(s->certificate_momentum_tolerance))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "settings.certificate_momentum_tolerance = %g: must be finite and > 0",
-                          s->certificate_momentum_tolerance);
-
     const double *g = s->gravity;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(g[i]))
@@ -131,28 +103,10 @@ sadmm_settings sadmm_settings_of_substep(const sadmm_settings *whole)
 
 /* ---- equality ------------------------------------------------------------------------------------------------- */
 
-/* Every member, and which of them are arrays of three. */
-#define MEMBERS(ONE, THREE)                                                                                      \
-    ONE(dt) ONE(substeps) THREE(gravity)                                                                         \
-    ONE(method) ONE(iterations) ONE(relaxation) ONE(penalty_period) ONE(penalty_mass_factor) ONE(penalty_offset) \
-    ONE(penalty_ratio_limit) ONE(penalty_update_warm) ONE(warm_start) ONE(direct_points)                         \
-    ONE(residual_tolerance) ONE(certificate_tolerance) ONE(certificate_momentum_tolerance) ONE(check_period)     \
-    ONE(measure_residuals) ONE(certify) ONE(recover_wrenches)                                                    \
-    ONE(baumgarte) ONE(slop) ONE(correction_speed) ONE(restitution_threshold)                                    \
-    ONE(hits) ONE(threads)
-
-/* A struct with too few initialisers is an error here: no new member can be left out of the list. */
-#pragma GCC diagnostic push
-#pragma GCC diagnostic error "-Wmissing-field-initializers"
-#define ZERO(member) 0,
-#define ZEROS(member) {0, 0, 0},
-_Static_assert(sizeof((sadmm_settings){MEMBERS(ZERO, ZEROS)}) == sizeof(sadmm_settings), "every member is listed");
-#pragma GCC diagnostic pop
-
 bool sadmm_settings_equal(const struct sadmm_settings *a, const struct sadmm_settings *b)
 {
-#define SAME(member) && memcmp(&a->member, &b->member, sizeof a->member) == 0
-    return true MEMBERS(SAME, SAME);
+#define SAME(X, kind, role, name, ...) &&memcmp(&a->name, &b->name, sizeof a->name) == 0
+    return true SADMM_SETTINGS(SAME, );
 #undef SAME
 }
 

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 
 #include "core/base/error.h"
+#include "core/base/settings_fields.h"
 #include "subadmm/settings.h"
 
 #ifdef __cplusplus
@@ -20,18 +21,13 @@ sadmm_settings sadmm_settings_of_substep(const struct sadmm_settings *whole);
 
 /* Are all members the same, bit for bit? Padding between them does not count. */
 bool sadmm_settings_equal(const struct sadmm_settings *a, const struct sadmm_settings *b);
-/* Settings are of two kinds. Numbers are what formulas read: they may change from step to step, and a backend keeps
- * them as data. The rest says what a step consists of: how many iterations in which order, what is checked, measured,
- * kept. */
-#define SADMM_EACH_SETTING_NUMBER(X)                                                                                  \
-    X(dt) X(gravity[0]) X(gravity[1]) X(gravity[2]) X(relaxation) X(penalty_mass_factor) X(penalty_offset)            \
-    X(penalty_ratio_limit) X(certificate_tolerance) X(certificate_momentum_tolerance) X(baumgarte) X(slop)            \
-    X(correction_speed) X(restitution_threshold)
 
-#define SADMM_COUNT_SETTING(name) +1
-enum { SADMM_SETTING_NUMBERS = 0 SADMM_EACH_SETTING_NUMBER(SADMM_COUNT_SETTING) };
-#undef SADMM_COUNT_SETTING
+/* The list of all settings, in the struct's order; SADMM_SETTING_COUNT of them. Static storage. */
+const struct sadmm_setting *sadmm_settings_list(void);
 
+/* Settings are of two kinds (core/base/settings_fields.h). Numbers are what formulas read: they may change from step to
+ * step, and a backend keeps them as data. The rest says what a step consists of: how many iterations in which order, what
+ * is checked, measured, kept. */
 void sadmm_settings_numbers(const struct sadmm_settings *settings, double numbers[SADMM_SETTING_NUMBERS]);
 /* Do steps of both consist of the same? (A tolerance, or a limit of the penalty's update, counts by whether there is
  * one.) */

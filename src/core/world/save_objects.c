@@ -59,32 +59,13 @@ static void archive_pair_table(struct sadmm_archive *archive, struct sadmm_pair_
 
 void sadmm_archive_settings(struct sadmm_archive *archive, sadmm_settings *s)
 {
-    SADMM_ARCHIVE(archive, s->dt);
-    SADMM_ARCHIVE(archive, s->substeps);
-    SADMM_ARCHIVE(archive, s->gravity);
-    SADMM_ARCHIVE(archive, s->method);
-    SADMM_ARCHIVE(archive, s->iterations);
-    SADMM_ARCHIVE(archive, s->relaxation);
-    SADMM_ARCHIVE(archive, s->penalty_period);
-    SADMM_ARCHIVE(archive, s->penalty_mass_factor);
-    SADMM_ARCHIVE(archive, s->penalty_offset);
-    SADMM_ARCHIVE(archive, s->penalty_ratio_limit);
-    sadmm_archive_flag(archive, &s->penalty_update_warm);
-    sadmm_archive_flag(archive, &s->warm_start);
-    SADMM_ARCHIVE(archive, s->direct_points);
-    SADMM_ARCHIVE(archive, s->residual_tolerance);
-    SADMM_ARCHIVE(archive, s->certificate_tolerance);
-    SADMM_ARCHIVE(archive, s->certificate_momentum_tolerance);
-    SADMM_ARCHIVE(archive, s->check_period);
-    sadmm_archive_flag(archive, &s->measure_residuals);
-    sadmm_archive_flag(archive, &s->certify);
-    sadmm_archive_flag(archive, &s->recover_wrenches);
-    SADMM_ARCHIVE(archive, s->baumgarte);
-    SADMM_ARCHIVE(archive, s->slop);
-    SADMM_ARCHIVE(archive, s->correction_speed);
-    SADMM_ARCHIVE(archive, s->restitution_threshold);
-    SADMM_ARCHIVE(archive, s->hits);
-    SADMM_ARCHIVE(archive, s->threads);
+#define ARCHIVE(X, kind, role, name, ...) ARCHIVE_##kind(name)
+#define ARCHIVE_REAL(name) SADMM_ARCHIVE(archive, s->name);
+#define ARCHIVE_VECTOR(name) SADMM_ARCHIVE(archive, s->name);
+#define ARCHIVE_WHOLE(name) SADMM_ARCHIVE(archive, s->name);
+#define ARCHIVE_METHOD(name) SADMM_ARCHIVE(archive, s->name);
+#define ARCHIVE_FLAG(name) sadmm_archive_flag(archive, &s->name);
+    SADMM_SETTINGS(ARCHIVE, )
     if (archive->reading && archive->status == SADMM_OK)
         sadmm_archive_expect(archive, sadmm_settings_validate(s, archive->error) == SADMM_OK, "settings");
 }

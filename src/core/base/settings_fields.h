@@ -1,0 +1,99 @@
+/* The fields of sadmm_settings, once: defaults, ranges and their messages, what is compared, saved and restored, read from
+ * and written to scene files, listed and set by the command, and Python's properties are made of this list. What a field
+ * means in full is said in subadmm/settings.h; the text here is one line of it.
+ *
+ * F(X, kind, role, name, value, lo, hi, ends, text), X passed through:
+ *   kind   REAL (double), VECTOR (double[3]), WHOLE (int), FLAG (bool), METHOD (sadmm_method)
+ *   role   NUMBER: data of formulas, may change from step to step without another plan; PLAN: what a step consists of
+ *   ends   CLOSED: in [lo, hi]; BELOW: in [lo, hi); FROM: finite, >= lo; ABOVE: finite, > lo; ANY: any value, or a rule of
+ *          its own in sadmm_settings_validate
+ */
+#ifndef SADMM_CORE_BASE_SETTINGS_FIELDS_H
+#define SADMM_CORE_BASE_SETTINGS_FIELDS_H
+
+#include <stddef.h>
+
+#include "subadmm/settings.h"
+
+#define SADMM_THREE(x, y, z) {x, y, z}
+
+#define SADMM_SETTINGS(F, X)                                                                                            \
+    F(X, REAL, NUMBER, dt, 0.005, 1e-6, 1, CLOSED, "Time step, s.")                                                     \
+    F(X, WHOLE, PLAN, substeps, 1, 1, 64, CLOSED, "Sub-steps of a step, which share its iterations.")                   \
+    F(X, VECTOR, NUMBER, gravity, SADMM_THREE(0, 0, -9.81), -1e6, 1e6, ANY, "m/s^2, world frame.")                      \
+    F(X, METHOD, PLAN, method, SADMM_METHOD_FAST, 0, 1, ANY, "'fast' or 'paper'.")                                      \
+    F(X, WHOLE, PLAN, iterations, 20, 1, 1000000, CLOSED, "Iterations a step.")                                         \
+    F(X, REAL, NUMBER, relaxation, 1.8, 1, 2, BELOW, "Over-relaxation of 'fast'.")                                      \
+    F(X, WHOLE, PLAN, penalty_period, 30, 0, 2147483647, CLOSED,                                                        \
+      "'paper': iterations between penalty updates, 0: never.")                                                         \
+    F(X, REAL, NUMBER, penalty_mass_factor, 16, 0, 1e12, CLOSED, "'paper': M of eq. (13).")                             \
+    F(X, REAL, NUMBER, penalty_offset, 1e5, 0, 1e15, CLOSED, "'paper': c of eq. (13), kg/s^2.")                         \
+    F(X, REAL, NUMBER, penalty_ratio_limit, 4, 1, 1e6, CLOSED, "'paper': alpha of eq. (15).")                           \
+    F(X, FLAG, PLAN, penalty_update_warm, false, 0, 1, ANY, "'paper': also update in steps that start warm.")           \
+    F(X, FLAG, PLAN, warm_start, true, 0, 1, ANY, "Start from the last step's impulses and velocities.")                \
+    F(X, WHOLE, PLAN, direct_points, 0, 0, 128, CLOSED,                                                                 \
+      "Islands with joints and at most so many contact points are solved directly; 0: none.")                          \
+    F(X, REAL, PLAN, residual_tolerance, 0, 0, 0, FROM, "Stop when both residuals are at most this; 0: never.")         \
+    F(X, REAL, NUMBER, certificate_tolerance, 0, 0, 0, FROM,                                                            \
+      "Stop when the natural map, m/s, is at most this; 0: never.")                                                     \
+    F(X, REAL, NUMBER, certificate_momentum_tolerance, 1e-6, 0, 0, ABOVE, "... and the relative momentum error this.")  \
+    F(X, WHOLE, PLAN, check_period, 10, 1, 1000000, CLOSED, "Iterations between convergence checks.")                   \
+    F(X, FLAG, PLAN, measure_residuals, false, 0, 1, ANY, "Report the residuals of the last iteration.")                \
+    F(X, FLAG, PLAN, certify, false, 0, 1, ANY, "Report the true error of every step.")                                 \
+    F(X, FLAG, PLAN, recover_wrenches, true, 0, 1, ANY, "Compute the contact wrench of every body.")                    \
+    F(X, REAL, NUMBER, baumgarte, 0.2, 0, 1, CLOSED, "Share of penetration beyond the slop removed a (sub-)step.")      \
+    F(X, REAL, NUMBER, slop, 1e-5, 0, 1, CLOSED, "Penetration left alone, m.")                                          \
+    F(X, REAL, NUMBER, correction_speed, 1, 0, 1e3, CLOSED, "Cap of the corrective speed, m/s.")                        \
+    F(X, REAL, NUMBER, restitution_threshold, 0.1, 0, 0, FROM,                                                          \
+      "Approach speed under which restitution is ignored, m/s.")                                                        \
+    F(X, WHOLE, PLAN, hits, 16, 0, 64, CLOSED,                                                                          \
+      "Hits a body in flight may have at their moments within a (sub-)step; 0: none, the solve has them all.")         \
+    F(X, WHOLE, PLAN, threads, 0, 0, 1024, CLOSED, "CPU threads at most; 0: no bound. Results do not depend on it.")
+
+/* ---- as a table -------------------------------------------------------------------------------------------------- */
+
+enum sadmm_setting_kind {
+    SADMM_SETTING_REAL,
+    SADMM_SETTING_VECTOR,
+    SADMM_SETTING_WHOLE,
+    SADMM_SETTING_FLAG,
+    SADMM_SETTING_METHOD
+};
+enum sadmm_setting_ends {
+    SADMM_SETTING_ANY,
+    SADMM_SETTING_CLOSED,
+    SADMM_SETTING_BELOW,
+    SADMM_SETTING_FROM,
+    SADMM_SETTING_ABOVE
+};
+
+struct sadmm_setting {
+    const char *name;
+    enum sadmm_setting_kind kind;
+    size_t offset; /* in sadmm_settings */
+    double lo, hi;
+    enum sadmm_setting_ends ends;
+    const char *text;
+};
+
+#define SADMM_SETTING_ROW(X, kind, role, name, value, lo, hi, ends, text) \
+    {#name, SADMM_SETTING_##kind, offsetof(sadmm_settings, name), lo, hi, SADMM_SETTING_##ends, text},
+#define SADMM_COUNT_SETTING(X, ...) +1
+enum { SADMM_SETTING_COUNT = 0 SADMM_SETTINGS(SADMM_COUNT_SETTING, ) };
+
+/* ---- numbers ----------------------------------------------------------------------------------------------------- */
+
+/* X(name) of every double that is data of formulas. */
+#define SADMM_EACH_SETTING_NUMBER(X) SADMM_SETTINGS(SADMM_SETTING_IF_NUMBER, X)
+#define SADMM_SETTING_IF_NUMBER(X, kind, role, name, ...) SADMM_SETTING_##role##_##kind(X, name)
+#define SADMM_SETTING_NUMBER_REAL(X, name) X(name)
+#define SADMM_SETTING_NUMBER_VECTOR(X, name) X(name[0]) X(name[1]) X(name[2])
+#define SADMM_SETTING_PLAN_REAL(X, name)
+#define SADMM_SETTING_PLAN_WHOLE(X, name)
+#define SADMM_SETTING_PLAN_FLAG(X, name)
+#define SADMM_SETTING_PLAN_METHOD(X, name)
+
+#define SADMM_COUNT_NUMBER(name) +1
+enum { SADMM_SETTING_NUMBERS = 0 SADMM_EACH_SETTING_NUMBER(SADMM_COUNT_NUMBER) };
+
+#endif
