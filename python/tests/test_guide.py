@@ -28,7 +28,7 @@ def missing(need):
     return next((name for name in need.split(", ") if importlib.util.find_spec(name) is None), None)
 
 
-@pytest.mark.parametrize("code", blocks())
+@pytest.mark.parametrize("code", list(blocks()))
 def test_block(code, tmp_path, monkeypatch):
     needs = NEEDS.match(code)
     if needs and missing(needs[1]):
