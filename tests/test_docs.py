@@ -85,7 +85,7 @@ def wrong_examples(project, text):
 
 def wrong_words(text, sources):
     """In back quotes of the guide: members, functions and scenes that there are not, by their underscores."""
-    spans = re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S))
+    spans = re.findall(r"`([^`/\n]+)`", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S))  # paths: wrong_names
     for word in sorted({word for span in spans for word in re.findall(r"[A-Za-z]\w*_\w+", span)}):
         if not re.search(rf"\b{word}\b", sources):
             yield f"`{word}`: no such name in the sources"
