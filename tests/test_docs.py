@@ -83,11 +83,11 @@ def wrong_examples(project, text):
             yield f"the block of {name} is not in that file"
 
 
-def wrong_words(text, sources):
+def wrong_words(text, words):
     """In back quotes of the guide: members, functions and scenes that there are not, by their underscores."""
     spans = re.findall(r"`([^`/\n]+)`", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S))  # paths: wrong_names
     for word in sorted({word for span in spans for word in re.findall(r"[A-Za-z]\w*_\w+", span)}):
-        if not re.search(rf"\b{word}\b", sources):
+        if word not in words:
             yield f"`{word}`: no such name in the sources"
 
 
@@ -111,6 +111,7 @@ def main():
     paths = tree(project)
     sources = "\n".join(read(os.path.join(project, path)) for path in paths
                         if path.endswith(CODE) and not path.startswith("docs/"))
+    words = set(re.findall(r"\w+", sources))
     failed = False
     documents = ["README.md", "CONTRIBUTING.md"] + \
         sorted(path for path in paths if re.fullmatch(r"docs/(guide/)?\w+\.md", path))
@@ -124,7 +125,7 @@ def main():
                 if path.startswith("src/") and path.endswith("/") and os.path.basename(folder) + "/" not in text:
                     errors.append(f"src folder {path} is not named")
         if document.startswith("docs/guide/"):
-            errors += list(wrong_words(text, sources)) + list(wrong_blocks(text))
+            errors += list(wrong_words(text, words)) + list(wrong_blocks(text))
         if document == "docs/guide/index.md":
             pages = {os.path.basename(path) for path in documents if path.startswith("docs/guide/")}
             errors += [f"leads to no {page}" for page in sorted(pages - {"index.md"}) if f"]({page}" not in text]
