@@ -3,9 +3,11 @@
 
     test_docs.py PROJECT
 
-In README.md, CONTRIBUTING.md and docs/*.md: links lead to files, and to headings where they name one; in back quotes,
-files and folders exist, and so do functions, structs, macros and options; a block of C that names a program of examples
-in its first line is part of that program, which is compiled and run. docs/architecture.md names every folder of src.
+In README.md, CONTRIBUTING.md, docs/*.md and docs/guide/*.md: links lead to files, and to headings where they name one;
+in back quotes, files and folders exist, and so do functions, structs, macros and options; a block of C or Python that
+names a program of examples in its first line is part of that program, which is compiled and run.
+docs/architecture.md names every folder of src. The user's guide, docs/guide, has no other block of C; its other blocks of
+Python compile (python/tests/test_guide.py runs them); its index leads to every page.
 """
 import os
 import re
@@ -73,10 +75,35 @@ def wrong_commands(text, sources):
 
 
 def wrong_examples(project, text):
-    for name, code in re.findall(r"^```c\n/\* (examples/\w+\.c) \*/\n(.*?)^```", text, re.M | re.S):
+    blocks = re.findall(r"^```c\n/\* (examples/\w+\.c) \*/\n(.*?)^```", text, re.M | re.S) + \
+        re.findall(r"^```python\n# (examples/\w+\.py)\n(.*?)^```", text, re.M | re.S)
+    for name, code in blocks:
         path = os.path.join(project, name)
         if not os.path.exists(path) or code not in read(path):
             yield f"the block of {name} is not in that file"
+
+
+def wrong_words(text, words):
+    """In back quotes of the guide: members, functions and scenes that there are not, by their underscores."""
+    spans = re.findall(r"`([^`/\n]+)`", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S))  # paths: wrong_names
+    for word in sorted({word for span in spans for word in re.findall(r"[A-Za-z]\w*_\w+", span)}):
+        if word not in words:
+            yield f"`{word}`: no such name in the sources"
+
+
+def wrong_blocks(text):
+    """Blocks of the guide that nothing compiles."""
+    for language, code in re.findall(r"^```(\w*)\n(.*?)^```", text, re.M | re.S):
+        begin = code.split("\n")[0]
+        if language == "c" and not re.fullmatch(r"/\* examples/\w+\.c \*/", begin):
+            yield f"block of C that begins with {begin!r}: does not name its program"
+        if language == "python":
+            try:
+                compile(code, "block", "exec")
+            except SyntaxError as error:
+                # Part of a program may begin within a function.
+                if not begin.startswith("# examples/"):
+                    yield f"block of Python that begins with {begin!r}: {error}"
 
 
 def main():
@@ -84,8 +111,10 @@ def main():
     paths = tree(project)
     sources = "\n".join(read(os.path.join(project, path)) for path in paths
                         if path.endswith(CODE) and not path.startswith("docs/"))
+    words = set(re.findall(r"\w+", sources))
     failed = False
-    documents = ["README.md", "CONTRIBUTING.md"] + sorted(path for path in paths if re.fullmatch(r"docs/\w+\.md", path))
+    documents = ["README.md", "CONTRIBUTING.md"] + \
+        sorted(path for path in paths if re.fullmatch(r"docs/(guide/)?\w+\.md", path))
     for document in documents:
         text = read(os.path.join(project, document))
         errors = list(wrong_links(project, document, text)) + list(wrong_names(text, paths, sources)) + \
@@ -95,6 +124,11 @@ def main():
                 folder = path[:-1]
                 if path.startswith("src/") and path.endswith("/") and os.path.basename(folder) + "/" not in text:
                     errors.append(f"src folder {path} is not named")
+        if document.startswith("docs/guide/"):
+            errors += list(wrong_words(text, words)) + list(wrong_blocks(text))
+        if document == "docs/guide/index.md":
+            pages = {os.path.basename(path) for path in documents if path.startswith("docs/guide/")}
+            errors += [f"leads to no {page}" for page in sorted(pages - {"index.md"}) if f"]({page}" not in text]
         for error in errors:
             print(f"{document}: {error}")
         failed = failed or bool(errors)

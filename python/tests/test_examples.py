@@ -23,6 +23,22 @@ def test_falling_box(capsys):
     assert "4 contacts" in capsys.readouterr().out
 
 
+def test_hinge_motor():
+    hinge = example("hinge_motor").main()
+    assert hinge.position[5] == pytest.approx(1.5, abs=1e-6)
+    # At the limit the motor gives all of its 15 N m; dry friction takes up to 0.2 of them, the limit the rest.
+    assert hinge.drive_force[5] == pytest.approx(15, abs=1e-6)
+    assert -15.2 < hinge.limit_force[5] < -14.8 + 1e-6
+
+
+def test_contact_force():
+    box, normal, begun = example("contact_force").main()
+    assert box.contact_wrench[:3] == pytest.approx([-8, 0, box.mass * 9.81], abs=1e-6)
+    # The push and friction, 0.1 m apart, are a torque of 0.8 N m. Pairs of points 0.2 m apart differ by 4 N.
+    assert sorted(normal) == pytest.approx([2.905, 2.905, 6.905, 6.905], abs=1e-3)
+    assert len(begun) == 1
+
+
 def test_thousand_grippers(capsys):
     grippers = example("thousand_grippers")
     held, slip = grippers.main(["--count", "15", "--backend", "cpu"])
