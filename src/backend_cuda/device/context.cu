@@ -80,6 +80,8 @@ static const char *const buffer_names[] = {
     "rows of joints",
     "islands of joints",
     "momentum of joints",
+    "joints at bodies",
+    "stiffness of joints",
     "joined bodies",
     "contacts of joined bodies",
     "pushes of islands",

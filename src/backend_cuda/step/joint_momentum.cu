@@ -5,6 +5,7 @@
 
 #include "backend_cuda/device/double.h"
 
+#include "backend_cuda/assemble/stiffened.h"
 #include "core/model/joined.h"
 #include "core/model/joint_momentum.h"
 #include "move.h"
@@ -93,6 +94,11 @@ static __device__ __forceinline__ void add_part_rows(const cuda_view &v, const s
 static __device__ __noinline__ void store_body(const cuda_view &v, const struct joint_island &island, int32_t i)
 {
     const struct sadmm_rigid *body = &v.step.before[i];
+    struct sadmm_rigid stiffened;
+    if (rolling_is_stiff(body)) { /* of others it does not count here */
+        stiffened = stiffened_rigid(v, i);
+        body = &stiffened;
+    }
     const double *origin = v.step.before[island.label].position;
     const struct sadmm_settings settings = *v.model.settings;
     struct joint_momentum sums = {};
