@@ -18,7 +18,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     if (i >= v.model.bodies || v.model.live->abort_code) return; /* may run before the step's contacts are known */
     if (i == 0) clear_counts(v.islands);
     if (v.islands.touch) v.islands.touch[i] = 0;
-    if (JOINTS) v.joints.touch[i] = 0;
+    if (JOINTS) v.joints.touch[i] = v.joints.closed[i].closed = 0;
     if (v.push.bits) {
         if (i == 0) v.push.due[0] = v.push.due[1] = v.push.due[2] = 0; /* enum push_number */
         v.push.bits[i] = 0;

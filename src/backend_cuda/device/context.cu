@@ -82,6 +82,7 @@ static const char *const buffer_names[] = {
     "momentum of joints",
     "joints at bodies",
     "stiffness of joints",
+    "bodies of closed joints",
     "joined bodies",
     "contacts of joined bodies",
     "pushes of islands",

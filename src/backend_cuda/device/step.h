@@ -69,6 +69,7 @@ struct cuda_joint_counts {
     int32_t together; /* not 0: bodies that they join have to iterate with the others: a contact touches them, they
                          could not be solved directly, or a joint has no rows at the time */
     int32_t sides;    /* of pairs, at such bodies, that are listed */
+    unsigned long long drift; /* bits of the largest error of a locked translation that is left, m */
 };
 
 /* Written by commit, read by the host. */

@@ -18,17 +18,6 @@ struct joined_shared {
 
 size_t CUDA(joined_shared_size)(void) { return sizeof(struct joined_shared); }
 
-/* The block's part. SMALL: in the block's own memory; else its structure and its work are where they are. */
-template <bool SMALL> static __device__ __forceinline__ joined_view view_of_block(const cuda_view &v, double *memory)
-{
-    const struct cuda_joined_part part = v.joints.parts[blockIdx.x];
-    const int32_t *numbers = v.joints.structures + part.first_number;
-    if (SMALL) copy(part.numbers, (int32_t *)memory, [&](int32_t k) { return numbers[k]; });
-    __syncthreads(); /* flags, too */
-    const struct joined_structure s = joined_structure_at(SMALL ? (const int32_t *)memory : numbers);
-    return joined_view_at(&s, SMALL ? memory + joined_numbers_size(part.numbers) : v.joints.work + part.first_work);
-}
-
 /* ---- what there is ----------------------------------------------------------------------------------------------- */
 
 /* Rows as their constraints have them. */
@@ -57,14 +46,6 @@ static __device__ __forceinline__ void load_multipliers(const cuda_view &v, cons
     });
 }
 
-/* Entry (k, q) of A of a rigid body. */
-static __device__ __forceinline__ double rigid_entry(const struct cuda_joined_body &body, int k, int q)
-{
-    const int i = k - 3, j = q - 3;
-    if (k < 3 || q < 3) return k == q ? body.mass : 0;
-    return body.inertia[i == j ? i : i + j + 2]; /* xx, yy, zz, xy, xz, yz */
-}
-
 /* again: as they have been found just now. */
 static __device__ __forceinline__ double velocity_of(const cuda_view &v, int32_t body, int k, bool after, bool again)
 {
@@ -75,15 +56,6 @@ static __device__ __forceinline__ double velocity_of(const cuda_view &v, int32_t
 #pragma unroll
     for (int i = 0; i < 6; ++i) out = i == k ? all[i] : out; /* not by an index: they stay in registers */
     return out;
-}
-
-static __device__ __forceinline__ void load_inertia(const cuda_view &v, const joined_view &p)
-{
-    each_component(p, [&](int32_t e, int k) {
-        const int32_t body = p.s.body[e];
-        if (k >= 6) return;
-        for (int q = 0; q < 6; ++q) p.factor[36 * e + 6 * k + q] = rigid_entry(v.joints.bodies[body], k, q);
-    });
 }
 
 /* Velocities, and the contacts' impulses on bodies, into `dv`, which is not in use yet. */
@@ -296,7 +268,7 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
 #pragma unroll 1
     for (int turn = 0;; ++turn) { /* before the iterations once more, with the stiffness of the forces found */
         load_part<SMALL>(v, p, after, turn > 0, shared);
-        const bool solved = solve_part(p, kept ? v.joints.kept_state : nullptr, &shared->flag);
+        const bool solved = solve_part<false>(p, kept ? v.joints.kept_state : nullptr, &shared->flag, nullptr);
         store_part(v, p, after, solved);
         if (after || turn > 0 || !v.model.warm_start || !stiffen_part(v, p, &shared->flag)) return;
         load_again(v, p);

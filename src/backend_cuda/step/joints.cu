@@ -342,6 +342,7 @@ sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_e
     TRY(CUDA(launch_of)(c, joint_solution_kernel, "joints", blocks + (pairs + ROWS_THREADS - 1) / ROWS_THREADS,
                         ROWS_THREADS, &args, error));
     TRY(CUDA(launch_gear_solution)(c, error));
+    TRY(CUDA(launch_joint_close)(c, error));
     return CUDA(launch_joint_momentum)(c, error);
 }
 
@@ -396,6 +397,8 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->couplings_after = couplings_of(c, step_state(into, substep, substeps));
     joints->first_at = buffer<int32_t>(c, BUFFER_JOINTS_AT);
     joints->joints_at = joints->first_at + s->bodies + 1;
+    joints->closing = joints->joints_at + 2 * (size_t)s->joints;
+    joints->closed = buffer<struct cuda_closed_body>(c, BUFFER_CLOSED);
     joints->stiffening = buffer<struct cuda_stiffening>(c, BUFFER_STIFFENING);
     joints->touch = buffer<int32_t>(c, BUFFER_JOINT_TOUCH);
     joints->momentum = buffer<struct joint_momentum>(c, BUFFER_JOINT_MOMENTUM);
@@ -435,8 +438,8 @@ static sadmm_status put_joints_at(struct sadmm_context *c, const struct sadmm_re
                                   struct sadmm_error *error)
 {
     const size_t n = (size_t)world->body_count, joints = (size_t)world->joint_count,
-                 count = n + 1 + 2 * joints;
-    int32_t *first = (int32_t *)sadmm_alloc(count, sizeof *first), *at = first + n + 1;
+                 constraints = (size_t)c->step->joint_constraints, count = n + 1 + 2 * joints + constraints;
+    int32_t *first = (int32_t *)sadmm_alloc(count, sizeof *first), *at = first + n + 1, *closing = at + 2 * joints;
     if (!first) return sadmm_fail_memory(error, "the cuda backend's joints");
     for (size_t j = 0; j < joints; ++j)
         for (int s = 0; s < 2; ++s)
@@ -448,6 +451,9 @@ static sadmm_status put_joints_at(struct sadmm_context *c, const struct sadmm_re
             if (is_at_body(&world->joints[j], s)) at[--first[world->joints[j].body[s] + 1]] = (int32_t)(2 * j) + s;
     memmove(first, first + 1, n * sizeof *first);
     first[n] = all;
+    for (size_t k = 0; k < constraints; ++k) closing[k] = -1;
+    for (size_t j = 0, k = 0; j < joints; k += (size_t)world->joints[j++].constraints)
+        if (world->joints[j].def.locks && world->joints[j].constraints > 0) closing[k] = (int32_t)j;
     const sadmm_status status =
         CUDA(put)(c, buffer<void>(c, BUFFER_JOINTS_AT), first, count * sizeof *first, error);
     sadmm_free(first);
@@ -477,8 +483,9 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
         {BUFFER_JOINT_MEMORY, 3 * n * sizeof(struct sadmm_joint_memory)},
         {BUFFER_COUPLING_MEMORY, 3 * (size_t)s->couplings * sizeof(struct sadmm_coupling_memory)},
         {BUFFER_JOINT_ROWS, 2 * row_set_bytes(s)},
-        {BUFFER_JOINTS_AT, ((size_t)s->bodies + 1 + 2 * n) * sizeof(int32_t)},
+        {BUFFER_JOINTS_AT, ((size_t)s->bodies + 1 + 2 * n + (size_t)s->joint_constraints) * sizeof(int32_t)},
         {BUFFER_STIFFENING, (size_t)s->bodies * sizeof(struct cuda_stiffening)},
+        {BUFFER_CLOSED, (size_t)s->bodies * sizeof(struct cuda_closed_body)},
         {BUFFER_JOINT_TOUCH, (size_t)s->bodies * sizeof(int32_t)},
         {BUFFER_JOINT_MOMENTUM, (size_t)s->bodies * sizeof(struct joint_momentum)},
     };

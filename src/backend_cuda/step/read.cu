@@ -1,5 +1,7 @@
 /* Whole steps on the device: the world and the report come back (step/world.h). */
 
+#include <string.h>
+
 #include "backend_cuda/device/double.h"
 
 #include "collision/collision.h"
@@ -41,7 +43,7 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
     out->plan.row_constraints = last->joints.constraints;
     out->plan.rows_apart = last->apart;
     out->penetration_max = last->depth;
-    out->joint_drift = s->joints > 0 ? -1 : 0;
+    memcpy(&out->joint_drift, &last->joints.drift, sizeof out->joint_drift);
     out->residual.primal = last->primal;
     out->residual.dual = last->dual;
     out->ms.collide = milliseconds(last, STAMP_START, STAMP_FOUND);
