@@ -94,15 +94,29 @@ static sadmm_world *chains(int precision, sadmm_method method, int substeps, dou
     return world;
 }
 
+/* A rope of four links whose end is swung round. */
+static void add_swung_rope(sadmm_world *world)
+{
+    static const double from[3] = {16.3, 0, 3};
+    sadmm_body_def def = sadmm_body_def_default();
+    sadmm_body_id hand;
+    def.type = SADMM_BODY_KINEMATIC;
+    def.position[0] = 16, def.position[2] = 3;
+    def.angular_velocity[2] = 25;
+    MUST(world, sadmm_world_add_body(world, &def, &hand));
+    add_links(world, 4, false, from, hand);
+}
+
 /* ---- by the host, and by the device ------------------------------------------------------------------------------ */
 
 static const struct {
     sadmm_method method;
     int substeps, tier;
     double dt;
-} ways[] = {{SADMM_METHOD_FAST, 1, SADMM_CUDA_TIER_AUTO, 0.01},
-            {SADMM_METHOD_PAPER, 2, SADMM_CUDA_TIER_GRID, 1. / 60},
-            {SADMM_METHOD_FAST, 2, SADMM_CUDA_TIER_STREAM, 1. / 60}};
+    bool swung;
+} ways[] = {{SADMM_METHOD_FAST, 1, SADMM_CUDA_TIER_AUTO, 0.01, false},
+            {SADMM_METHOD_PAPER, 2, SADMM_CUDA_TIER_GRID, 1. / 60, false},
+            {SADMM_METHOD_FAST, 2, SADMM_CUDA_TIER_STREAM, 1. / 60, true}};
 enum { WAYS = sizeof ways / sizeof *ways };
 
 static bool is_stiffened(const sadmm_world *world, int32_t i)
@@ -129,12 +143,13 @@ static void count(sadmm_world *world, struct counts *counts)
 
 START_TEST(resident_chains_equal_those_by_host)
 {
-    const int precision = _i / WAYS, way = _i % WAYS, steps = fewer(56);
+    const int precision = _i / WAYS, way = _i % WAYS, steps = fewer(40);
     sadmm_world *worlds[2];
     struct counts counts = {{0, 0}, {0, 0}};
     char what[80];
     for (int k = 0; k < 2; ++k) {
         worlds[k] = chains(precision, ways[way].method, ways[way].substeps, ways[way].dt);
+        if (ways[way].swung) add_swung_rope(worlds[k]);
         use_device(worlds[k], precision, 0);
         if (ways[way].tier != SADMM_CUDA_TIER_AUTO)
             force_tier(tables[precision], worlds[k]->context, (enum sadmm_cuda_tier)ways[way].tier);
@@ -153,7 +168,7 @@ START_TEST(resident_chains_equal_those_by_host)
         }
         count(worlds[0], &counts);
     }
-    ck_assert_msg(counts.stiffened[0] > counts.stiffened[1] && counts.stiffened[1] > 50 && counts.closed[0] > 30 &&
+    ck_assert_msg(counts.stiffened[0] > counts.stiffened[1] && counts.stiffened[1] > 30 && counts.closed[0] > 10 &&
                       counts.closed[1] > 0,
                   "%d, %d stiffened, %d, %d closed", counts.stiffened[0], counts.stiffened[1], counts.closed[0],
                   counts.closed[1]);

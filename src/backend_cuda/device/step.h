@@ -6,7 +6,7 @@
  *                 (where there are driven bodies A and b wait for the layout: step/driven.cu)
  *     admit       do they fit? Then they are this step's (cuda_live)
  *     statistics  of the constraint graph; islands (graph/layout.cu)
- *     layout      slots, sides, parts; beside it contacts in the solver's form
+ *     layout      slots, sides, parts; beside it contacts in the solver's form (fast: behind joined bodies)
  *     penalties   C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
  *     iterate     (15), new weights where asked for (the kernel table's own kernels); fast: convergence checks
  *     limit       fast: islands that have more energy than they may
