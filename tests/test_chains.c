@@ -119,15 +119,15 @@ static double energy_of(sadmm_world *world, const struct rope *rope)
     return energy;
 }
 
-/* Straight and level, or nearly: the first link is held. */
-static struct rope add_rope(sadmm_world *world, int links, double weight)
+/* Straight and level, or nearly: the first link is held, so far from the origin. */
+static struct rope add_rope(sadmm_world *world, int links, double weight, double far)
 {
     struct rope rope = {.links = links, .mass = 0.1, .length = 0.25, .weight = weight};
     sadmm_body_id last = WORLD;
     rope.across = rope.mass * rope.length * rope.length / 12;
     rope.along = rope.across / 30;
     for (int i = 0; i < links; ++i) {
-        const double from[3] = {rope.length * i, 0, 0}, at[3] = {rope.length * (i + 0.5), 0, 0};
+        const double from[3] = {far + rope.length * i, 0, 0}, at[3] = {far + rope.length * (i + 0.5), 0, 0};
         rope.link[i] = add_body(world, i + 1 < links ? rope.mass : weight, rope.across, rope.along, at, acos(-1.) / 2);
         join(world, last, rope.link[i], from);
         last = rope.link[i];
@@ -145,7 +145,7 @@ START_TEST(ropes_stay_whole)
     const double dt = steps[_i % 4];
     const int n = links[_i % 4];
     sadmm_world *world = new_world(_i / 4, dt);
-    const struct rope rope = add_rope(world, n, _i / 4 % 2 ? 0.1 : 1);
+    const struct rope rope = add_rope(world, n, _i / 4 % 2 ? 0.1 : 1, 0);
     const double start = energy_of(world, &rope), fall = rope.mass * GRAVITY * n * n * rope.length / 2,
                  time = 1.3 * sqrt(2 * n * rope.length / GRAVITY); /* until it whips, and some more */
     for (int step = 0; step < (int)(time / dt); ++step) {
@@ -159,13 +159,34 @@ START_TEST(ropes_stay_whole)
 }
 END_TEST
 
+/* How far it may be open is a matter of its links, not of where in the world it is held: a link that goes round by a radian
+ * a step. */
+START_TEST(far_links_stay_where_they_are_held)
+{
+    const double dt = 1. / 60, spin = 1 / dt;
+    sadmm_world *world = new_world(_i, dt);
+    const struct rope rope = add_rope(world, 1, 0.1, 1000);
+    sadmm_body_state state = body_state(world, rope.link[0]);
+    double drift = 0;
+    state.angular_velocity[2] = spin;
+    state.linear_velocity[1] = spin * rope.length / 2;
+    MUST(world, sadmm_world_set_body_state(world, rope.link[0], &state));
+    for (int step = 0; step < fewer(40); ++step) {
+        step_world(world, 1);
+        drift = fmax(drift, world_report(world).joint_drift);
+    }
+    ck_assert_double_lt(drift, 1e-3 * rope.length);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 /* ---- where it moves ---------------------------------------------------------------------------------------------- */
 
 /* Where three links under 20 kg, which vibrate at up to some 500 rad/s, are after 0.3 s: x and z of each. */
 static void swing(double dt, double out[6])
 {
     sadmm_world *world = new_world(0, dt);
-    const struct rope rope = add_rope(world, 4, 20);
+    const struct rope rope = add_rope(world, 4, 20, 0);
     for (int step = 0; step < (int)(0.3 / dt + 0.5); ++step) step_world(world, 1);
     for (int i = 0; i < 3; ++i) {
         const sadmm_body_state s = body_state(world, rope.link[i]);
@@ -250,6 +271,7 @@ int main(void)
     tcase_set_timeout(tests, 120);
     tcase_add_loop_test(tests, links_under_any_load_vibrate, 0, 3 * SOLVERS);
     tcase_add_loop_test(tests, ropes_stay_whole, 0, 4 * SOLVERS);
+    tcase_add_loop_test(tests, far_links_stay_where_they_are_held, 0, SOLVERS);
     tcase_add_test(tests, stiffened_chains_are_of_second_order);
     tcase_add_loop_test(tests, ropes_in_the_air_keep_their_momentum, 0, SOLVERS);
     suite_add_tcase(suite, tests);

@@ -331,7 +331,7 @@ typedef struct sadmm_step_report {
                                       time */
     double penetration_max;        /* deepest overlap at the start of the step, m, >= 0: of sadmm_contact.gap */
     double joint_drift;            /* largest error of a locked translation of a joint after the step, m, >= 0; 0: there
-                                      are none; -1: not measured, where a device keeps the world (CUDA) */
+                                      are none */
     sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
     double certify_ms;             /* wall time of the certificate on the host, ms; 0: there is none */
     sadmm_residual residual;       /* valid if measured (settings or penalty update or tolerance); else -1. Not measured

@@ -70,8 +70,7 @@ void bind_settings(nb::module_ &m)
         .def_ro("repeated", &R::repeated, "Steps that a backend running ahead repeated, since creation.")
         .def_ro("penetration_max", &R::penetration_max, "Deepest overlap at the start of the step, m.")
         .def_ro("joint_drift", &R::joint_drift,
-                "Largest error of a locked translation of a joint after the step, m; 0: there are none; -1: not measured, "
-                "where a device keeps the world (CUDA).")
+                "Largest error of a locked translation of a joint after the step, m; 0: there are none.")
         .def_prop_ro("ms", [](const R &r) {
             nb::dict d;
             d["total"] = r.ms.total, d["collide"] = r.ms.collide, d["assemble"] = r.ms.assemble, d["solve"] = r.ms.solve,

@@ -203,7 +203,7 @@ void run_record_print(const struct run_record *record, const char *spec, const s
         printf("repeated       %" PRId64 " steps, which outgrew the capacities or the plan they were begun with\n",
                last->repeated);
     if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);
-    if (last->joints > 0 && record->joint_drift >= 0)
+    if (last->joints > 0)
         printf("joints         off by %.3g m at most\n", record->joint_drift);
     printf("final state    fastest %.3g m/s, moved %.3g m at most, %s, hash %016" PRIx64 "\n", record->speed_max,
            record->displacement_max, record->finite ? "finite" : "NOT FINITE", record->hash);

@@ -61,7 +61,7 @@ bool run_record_step(struct run_record *record, sadmm_world *world)
     record->met += r->converged;
     if (r->contacts > record->contacts_max) record->contacts_max = r->contacts;
     record->penetration_max = fmax(record->penetration_max, r->penetration_max);
-    record->joint_drift = r->joint_drift < 0 ? -1 : fmax(record->joint_drift, r->joint_drift);
+    record->joint_drift = fmax(record->joint_drift, r->joint_drift);
     if (r->certificate.ncp_max != -1) {
         record->ncp_max = larger(record->ncp_max, r->certificate.ncp_max);
         record->momentum_max = larger(record->momentum_max, r->certificate.momentum_max);

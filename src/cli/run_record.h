@@ -22,7 +22,7 @@ struct run_record {
     double contacts_sum;
     int32_t contacts_max;
     double penetration_max;  /* m, over the run */
-    double joint_drift;      /* likewise; -1: not measured */
+    double joint_drift;      /* likewise */
     double ncp_max, momentum_max; /* over the run; -1: not certified */
     double iterations_sum;   /* over the steps, of their means over islands */
     size_t met;              /* steps that met the stop rule */

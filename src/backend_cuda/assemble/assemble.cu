@@ -3,32 +3,13 @@
 #include "backend_cuda/device/wide.h"
 
 #include "assemble.h"
+#include "body.h"
 #include "side_sums.h"
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
 
-/* A^-1, packed. */
-static __device__ void invert(bool rigid, const double A[36], double out[PACKED])
-{
-    double packed[PACKED];
-    for (int r = 0; r < 6; ++r)
-        for (int k = 0; k <= r; ++k) packed[r * (r + 1) / 2 + k] = A[6 * r + k];
-    if (rigid) packed_invert_rigid(packed, out);
-    else packed_invert(A, out);
-}
-
-/* x . M x */
-static __device__ double form(const double M[PACKED], const solver_real x[6])
-{
-    double wide[6];
-    for (int k = 0; k < 6; ++k) wide[k] = (double)x[k];
-    return packed_form(M, wide);
-}
-
-static_assert((int)ROW == 8 && (int)LINE_RIGID_A == 8, "each in a whole row");
-
-/* ENERGIES: A^-1 and the energy of A^-1 b too. */
-template <bool ENERGIES>
+/* ENERGIES: as of put_body. JOINTS: of a step of a world with joints, whose rows are made. */
+template <bool ENERGIES, bool JOINTS>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -37,7 +18,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     if (i >= v.model.bodies || v.model.live->abort_code) return; /* may run before the step's contacts are known */
     if (i == 0) clear_counts(v.islands);
     if (v.islands.touch) v.islands.touch[i] = 0;
-    if (v.joints.count > 0) v.joints.touch[i] = 0;
+    if (JOINTS) v.joints.touch[i] = v.joints.closed[i].closed = 0;
     if (v.push.bits) {
         if (i == 0) v.push.due[0] = v.push.due[1] = v.push.due[2] = 0; /* enum push_number */
         v.push.bits[i] = 0;
@@ -47,7 +28,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         v.islands.info[i].held = v.islands.info[i].rows = 0;
         v.islands.info[i].slow_down = 1;
     }
-    double A[36], b[6], x[6], factor[36];
+    const bool stiffened = JOINTS && stiffen_body(v, i, false);
+    double A[36], b[6];
     const struct sadmm_settings settings = *v.model.settings;
     if (v.raw.system.rigid) {
         const struct sadmm_rigid *state = wide_at(v.raw.system.rigid, (size_t)i);
@@ -60,49 +42,21 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     } else {
         sadmm_system_body(&v.raw.system, &settings, i, A, b);
     }
-    if (v.joints.count > 0 && v.joints.is_direct[i]) {
-        const struct cuda_joined_body body = {A[0],  {A[21], A[28], A[35], A[22], A[23], A[29]},
-                                              {b[0], b[1], b[2], b[3], b[4], b[5]}};
-        v.joints.bodies[i] = body;
-    }
-    if (v.model.warm_start || !dense6_cholesky(A, factor)) {
-        for (int k = 0; k < 6; ++k) x[k] = v.raw.system.velocity[6 * (size_t)i + (size_t)k];
-    } else {
-        dense6_solve(factor, b, x);
-    }
-    solver_real *line = v.bodies.lines + (size_t)i * (size_t)v.bodies.line;
-    eight_numbers<solver_real> state = {}, row = {};
-    for (int k = 0; k < 6; ++k) {
-        state.of[k] = (solver_real)x[k];
-        row.of[k] = (solver_real)b[k];
-    }
-    store_row(state, v.bodies.state, (size_t)i);
-    store_row(row, v.bodies.b, (size_t)i);
-    if (v.bodies.rigid) {
-        eight_numbers<solver_real> own = {{(solver_real)A[0]}};
-        for (int r = 0; r < 3; ++r)
-            for (int k = 0; k <= r; ++k) own.of[1 + packed_place(r, k)] = (solver_real)A[6 * (r + 3) + k + 3];
-        store_row(own, line, 0);
-    } else {
-        for (int r = 0; r < 6; ++r)
-            for (int k = 0; k <= r; ++k) line[packed_place(r, k)] = (solver_real)A[6 * r + k];
-        for (int k = PACKED; k < LINE_GENERAL_A; ++k) line[k] = 0;
-    }
-    if (ENERGIES) {
-        double inverse[PACKED];
-        invert(v.bodies.rigid, A, inverse);
-        for (int k = 0; k < PACKED; ++k) v.bodies.A_inverse[PACKED * (size_t)i + (size_t)k] = inverse[k];
-        v.bodies.free_energy[i] = form(inverse, row.of) / 2;
-    }
+    if (stiffened) take_joined_body(stiffened_body(v, i), A, b);
+    if (JOINTS && v.joints.is_direct[i]) v.joints.bodies[i] = joined_body_of(A, b);
+    put_body<ENERGIES>(v, i, A, b);
 }
 
 static sadmm_status launch_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
+    const bool energies = c->fast || c->plan.momentum;
+    const cuda_kernel kernel = c->view.joints.count > 0
+                                   ? (energies ? assemble_bodies_kernel<true, true> : assemble_bodies_kernel<false, true>)
+                                   : (energies ? assemble_bodies_kernel<true, false>
+                                               : assemble_bodies_kernel<false, false>);
     cuda_args args = {};
     args.paper = !c->fast;
-    return CUDA(launch_of)(c,
-                           c->fast || c->plan.momentum ? assemble_bodies_kernel<true> : assemble_bodies_kernel<false>,
-                           "assemble_bodies",
+    return CUDA(launch_of)(c, kernel, "assemble_bodies",
                            ((int64_t)c->view.model.bodies + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args,
                            error);
 }

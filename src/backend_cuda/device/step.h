@@ -6,7 +6,7 @@
  *                 (where there are driven bodies A and b wait for the layout: step/driven.cu)
  *     admit       do they fit? Then they are this step's (cuda_live)
  *     statistics  of the constraint graph; islands (graph/layout.cu)
- *     layout      slots, sides, parts; beside it contacts in the solver's form
+ *     layout      slots, sides, parts; beside it contacts in the solver's form (fast: behind joined bodies)
  *     penalties   C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
  *     iterate     (15), new weights where asked for (the kernel table's own kernels); fast: convergence checks
  *     limit       fast: islands that have more energy than they may
@@ -69,6 +69,7 @@ struct cuda_joint_counts {
     int32_t together; /* not 0: bodies that they join have to iterate with the others: a contact touches them, they
                          could not be solved directly, or a joint has no rows at the time */
     int32_t sides;    /* of pairs, at such bodies, that are listed */
+    unsigned long long drift; /* bits of the largest error of a locked translation that is left, m */
 };
 
 /* Written by commit, read by the host. */

@@ -244,6 +244,20 @@ struct cuda_joined_body {
     double mass, inertia[6], b[6]; /* xx, yy, zz, xy, xz, yz */
 };
 
+/* What joints add to the inertia of a body (core/model/stiffening.h), along world axes; is there any? */
+struct cuda_stiffening {
+    double more[6];
+    int32_t any, unused;
+};
+
+/* Where joints that have been closed let a body go: position, orientation and velocity; twice the energies that this has
+ * given it and that it moves with (core/model/joint_close.h); at labels of islands what is left of their velocities.
+ * closed: by its own part. */
+struct cuda_closed_body {
+    double place[13], gained, moving, keep;
+    int32_t closed, unused;
+};
+
 /* A part of bodies that joints join: where the numbers of its structure begin, how many these are, and its work. */
 struct cuda_joined_part {
     int64_t first_number, first_work;
@@ -291,6 +305,10 @@ struct joint_view {
     int32_t *pair_parts;            /* sides of pairs: as is_direct of the body. By it small parts find their contacts: */
     struct cuda_joined_range *ranges; /* parts, into */
     struct cuda_joined_side *sides;   /* part by part, ascending in a part; parts as they come */
+    const int32_t *first_at, *joints_at; /* bodies + 1: joints at a body, ascending: 2 joint + its side */
+    struct cuda_stiffening *stiffening; /* bodies: in the (sub-)step at hand */
+    const int32_t *closing;         /* constraints: the joint whose locks are closed by its rows; -1: none */
+    struct cuda_closed_body *closed; /* bodies: of islands that have been closed in this (sub-)step */
     int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_lead.h) */
     struct joint_momentum *momentum; /* bodies; at labels then of islands, and what restores it (joint_momentum.h) */
 };

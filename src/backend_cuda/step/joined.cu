@@ -4,6 +4,7 @@
 #include "backend_cuda/device/double.h"
 #include "backend_cuda/device/plan_check.h"
 
+#include "backend_cuda/assemble/body.h"
 #include "joined_contacts.h"
 #include "world.h"
 
@@ -16,17 +17,6 @@ struct joined_shared {
 };
 
 size_t CUDA(joined_shared_size)(void) { return sizeof(struct joined_shared); }
-
-/* The block's part. SMALL: in the block's own memory; else its structure and its work are where they are. */
-template <bool SMALL> static __device__ __forceinline__ joined_view view_of_block(const cuda_view &v, double *memory)
-{
-    const struct cuda_joined_part part = v.joints.parts[blockIdx.x];
-    const int32_t *numbers = v.joints.structures + part.first_number;
-    if (SMALL) copy(part.numbers, (int32_t *)memory, [&](int32_t k) { return numbers[k]; });
-    __syncthreads(); /* flags, too */
-    const struct joined_structure s = joined_structure_at(SMALL ? (const int32_t *)memory : numbers);
-    return joined_view_at(&s, SMALL ? memory + joined_numbers_size(part.numbers) : v.joints.work + part.first_work);
-}
 
 /* ---- what there is ----------------------------------------------------------------------------------------------- */
 
@@ -56,17 +46,11 @@ static __device__ __forceinline__ void load_multipliers(const cuda_view &v, cons
     });
 }
 
-/* Entry (k, q) of A of a rigid body. */
-static __device__ __forceinline__ double rigid_entry(const struct cuda_joined_body &body, int k, int q)
-{
-    const int i = k - 3, j = q - 3;
-    if (k < 3 || q < 3) return k == q ? body.mass : 0;
-    return body.inertia[i == j ? i : i + j + 2]; /* xx, yy, zz, xy, xz, yz */
-}
-
-static __device__ __forceinline__ double velocity_of(const cuda_view &v, int32_t body, int k, bool after)
+/* again: as they have been found just now. */
+static __device__ __forceinline__ double velocity_of(const cuda_view &v, int32_t body, int k, bool after, bool again)
 {
     double all[6], out = 0;
+    if (again) return v.joints.velocity[6 * (size_t)body + (size_t)k];
     if (!after) return v.step.start_velocity[6 * (size_t)body + (size_t)k];
     load_end_velocity(v, body, all);
 #pragma unroll
@@ -74,25 +58,16 @@ static __device__ __forceinline__ double velocity_of(const cuda_view &v, int32_t
     return out;
 }
 
-static __device__ __forceinline__ void load_inertia(const cuda_view &v, const joined_view &p)
-{
-    each_component(p, [&](int32_t e, int k) {
-        const int32_t body = p.s.body[e];
-        if (k >= 6) return;
-        for (int q = 0; q < 6; ++q) p.factor[36 * e + 6 * k + q] = rigid_entry(v.joints.bodies[body], k, q);
-    });
-}
-
 /* Velocities, and the contacts' impulses on bodies, into `dv`, which is not in use yet. */
 template <bool SMALL>
-static __device__ __forceinline__ void load_bodies(const cuda_view &v, const joined_view &p, bool after,
+static __device__ __forceinline__ void load_bodies(const cuda_view &v, const joined_view &p, bool after, bool again,
                                                    struct joined_shared *shared)
 {
     each_component(p, [&](int32_t e, int k) {
         const int32_t body = p.s.body[e];
         double sum = 0;
         if (k >= 6) return;
-        p.velocity[6 * e + k] = velocity_of(v, body, k, after);
+        p.velocity[6 * e + k] = velocity_of(v, body, k, after, again);
         each_contact<SMALL>(v, p, e, after, &shared->sides, [&](const joined_side &s, int32_t) {
             shared->touched = 1;
 #pragma unroll 4
@@ -164,11 +139,11 @@ static __device__ __forceinline__ void add_weights(const cuda_view &v, const joi
 }
 
 template <bool SMALL>
-static __device__ __forceinline__ void load_part(const cuda_view &v, const joined_view &p, bool after,
+static __device__ __forceinline__ void load_part(const cuda_view &v, const joined_view &p, bool after, bool again,
                                                  struct joined_shared *shared)
 {
     if (after) load_multipliers(v, p);
-    load_bodies<SMALL>(v, p, after, shared);
+    load_bodies<SMALL>(v, p, after, again, shared);
     __syncthreads();
     const bool touched = shared->touched != 0;
     find_missing(v, p, touched && v.model.settings->method == SADMM_METHOD_PAPER);
@@ -179,7 +154,7 @@ static __device__ __forceinline__ void load_part(const cuda_view &v, const joine
     add_weights<SMALL>(v, p, after, shared);
 }
 
-/* ---- all of it --------------------------------------------------------------------------------------------------- */
+/* ---- what is found ----------------------------------------------------------------------------------------------- */
 
 /* Before the iterations: what these start from. After them, or where there are none: what the end of the step reads. */
 static __device__ __forceinline__ void store_part(const cuda_view &v, const joined_view &p, bool after, bool solved)
@@ -203,6 +178,50 @@ static __device__ __forceinline__ void store_part(const cuda_view &v, const join
     if (!after) v.joints.kept[blockIdx.x] = solved;
     if (!solved) v.step.control->joints.together = 1;
 }
+
+/* ---- geometric stiffness ----------------------------------------------------------------------------------------- */
+
+/* A body whose inertia is another one by the forces that have been found. */
+static __device__ __noinline__ void assemble_again(const cuda_view &v, int32_t i)
+{
+    const struct cuda_joined_body body = stiffened_body(v, i);
+    double A[36], b[6];
+    v.joints.bodies[i] = body;
+    if (v.joints.apart) return; /* it does not iterate */
+    take_joined_body(body, A, b);
+    if (v.model.fast || v.step.limits) put_body<true>(v, i, A, b);
+    else put_body<false>(v, i, A, b);
+}
+
+/* Does any body of the part have another inertia by the forces that have been found? */
+static __device__ __forceinline__ bool stiffen_part(const cuda_view &v, const joined_view &p, int32_t *shared_flag)
+{
+    if (threadIdx.x == 0) *shared_flag = 0;
+    __syncthreads(); /* multipliers, too */
+    each(p.s.bodies, [&](int32_t e) {
+        if (!stiffen_body(v, p.s.body[e], true)) return;
+        assemble_again(v, p.s.body[e]);
+        *shared_flag = 1;
+    });
+    __syncthreads();
+    const bool any = *shared_flag != 0;
+    __syncthreads();
+    return any;
+}
+
+/* The part as it has been found. */
+static __device__ __forceinline__ void load_again(const cuda_view &v, const joined_view &p)
+{
+    each(p.s.places * JOINED_ROWS, [&](int32_t r) {
+        if (p.state[r] == JOINED_ABSENT) return;
+        p.rows[r].lambda = v.joints.solution[row_in_world(p, r)];
+        joined_put_row(&p, r, true);
+    });
+    load_inertia(v, p);
+    __syncthreads();
+}
+
+/* ---- all of it --------------------------------------------------------------------------------------------------- */
 
 /* Of a small part. again: it has looked before the iterations. */
 static __device__ __forceinline__ void look_for_sides(const cuda_view &v, bool again, struct joined_shared *shared)
@@ -246,9 +265,14 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     if (SMALL) look_for_sides(v, again, shared);
     const bool kept = again && v.joints.kept[blockIdx.x]; /* it was solved before the iterations; it is so still: */
     if (kept && !is_touched<SMALL>(v, p, &shared->sides, &shared->touched)) return;
-    load_part<SMALL>(v, p, after, shared);
-    const bool solved = solve_part(p, kept ? v.joints.kept_state : nullptr, &shared->flag);
-    store_part(v, p, after, solved);
+#pragma unroll 1
+    for (int turn = 0;; ++turn) { /* before the iterations once more, with the stiffness of the forces found */
+        load_part<SMALL>(v, p, after, turn > 0, shared);
+        const bool solved = solve_part<false>(p, kept ? v.joints.kept_state : nullptr, &shared->flag, nullptr);
+        store_part(v, p, after, solved);
+        if (after || turn > 0 || !v.model.warm_start || !stiffen_part(v, p, &shared->flag)) return;
+        load_again(v, p);
+    }
 }
 
 /* Which part the bodies of a pair are of: a thread a side. Small parts find their contacts by it. */

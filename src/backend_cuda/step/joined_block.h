@@ -43,6 +43,34 @@ static __device__ __forceinline__ int32_t row_in_world(const joined_view &p, int
     return p.s.constraint[r / JOINED_ROWS] * SADMM_MAX_ROWS + r % JOINED_ROWS;
 }
 
+/* The block's part. SMALL: in the block's own memory; else its structure and its work are where they are. */
+template <bool SMALL> static __device__ __forceinline__ joined_view view_of_block(const cuda_view &v, double *memory)
+{
+    const struct cuda_joined_part part = v.joints.parts[blockIdx.x];
+    const int32_t *numbers = v.joints.structures + part.first_number;
+    if (SMALL) copy(part.numbers, (int32_t *)memory, [&](int32_t k) { return numbers[k]; });
+    __syncthreads(); /* flags, too */
+    const struct joined_structure s = joined_structure_at(SMALL ? (const int32_t *)memory : numbers);
+    return joined_view_at(&s, SMALL ? memory + joined_numbers_size(part.numbers) : v.joints.work + part.first_work);
+}
+
+/* Entry (k, q) of A of a rigid body. */
+static __device__ __forceinline__ double rigid_entry(const struct cuda_joined_body &body, int k, int q)
+{
+    const int i = k - 3, j = q - 3;
+    if (k < 3 || q < 3) return k == q ? body.mass : 0;
+    return body.inertia[i == j ? i : i + j + 2]; /* xx, yy, zz, xy, xz, yz */
+}
+
+static __device__ __forceinline__ void load_inertia(const cuda_view &v, const joined_view &p)
+{
+    each_component(p, [&](int32_t e, int k) {
+        const int32_t body = p.s.body[e];
+        if (k >= 6) return;
+        for (int q = 0; q < 6; ++q) p.factor[36 * e + 6 * k + q] = rigid_entry(v.joints.bodies[body], k, q);
+    });
+}
+
 /* ---- a pass ------------------------------------------------------------------------------------------------------ */
 
 /* earlier: states of the part's rows after a solve of this step, by number in the world; NULL: there was none. */
@@ -189,10 +217,40 @@ static __device__ __forceinline__ bool any_row(const joined_view &p, int32_t *sh
     return any;
 }
 
-/* Until no row changes its state. Are all numbers finite then? */
-static __device__ __forceinline__ bool solve_part(const joined_view &p, const uint8_t *earlier,
-                                                  int32_t *shared_flag)
+/* The most that a row inside its bounds misses. */
+static __device__ __forceinline__ double most_missing(const joined_view &p, unsigned long long *shared_most)
 {
+    double own = 0;
+    if (threadIdx.x == 0) *shared_most = 0;
+    __syncthreads();
+    each(p.s.places * JOINED_ROWS, [&](int32_t r) { own = fmax(own, joined_misses(&p, r)); });
+    /* numbers that are not negative are in the order of their bits */
+    if (own > 0) atomicMax(shared_most, (unsigned long long)__double_as_longlong(own));
+    __syncthreads();
+    const double most = __longlong_as_double((long long)*shared_most);
+    __syncthreads();
+    return most;
+}
+
+/* Are rows to be solved once more by the same factor? last: what they missed before that was done the last time. */
+template <bool EXACT>
+static __device__ __forceinline__ bool goes_on(const joined_view &p, int32_t *shared_flag,
+                                               unsigned long long *shared_most, double *last)
+{
+    if (!EXACT) return any_row(p, shared_flag, [&](int32_t r) { return joined_gives_much(&p, r); });
+    const double missing = most_missing(p, shared_most);
+    const bool on = missing > JOINED_EXACT && missing < *last / 2;
+    *last = missing;
+    return on;
+}
+
+/* Until no row changes its state. Are all numbers finite then? EXACT: what rows give by is taken back as far as it can
+ * be (core/solve/joined_part.h), not only where it is much. */
+template <bool EXACT>
+static __device__ __forceinline__ bool solve_part(const joined_view &p, const uint8_t *earlier, int32_t *shared_flag,
+                                                  unsigned long long *shared_most)
+{
+    enum { TIMES = EXACT ? 1 + (int)JOINED_BACKS : 2 };
     bool changed = true;
     begin_part(p, earlier);
 #pragma unroll 1
@@ -200,13 +258,16 @@ static __device__ __forceinline__ bool solve_part(const joined_view &p, const ui
         enter_blocks(p);
 #pragma unroll 1
         for (int32_t level = 0; level < p.s.levels; ++level) factor_level(p, level);
+        double last = INFINITY;
 #pragma unroll 1
-        for (int again = 0; again < 2; ++again) {
-            if (again && !any_row(p, shared_flag, [&](int32_t r) { return joined_gives_much(&p, r); })) break;
+        for (int again = 0; again < TIMES; ++again) {
+            if (again && !goes_on<EXACT>(p, shared_flag, shared_most, &last)) break;
             solve_rows(p, again != 0);
+            if (EXACT && again) continue; /* where they have got to, at the end */
             changed = any_row(p, shared_flag, [&](int32_t r) { return joined_change_row(&p, r); });
             if (changed) break;
         }
+        if (EXACT && !changed) changed = any_row(p, shared_flag, [&](int32_t r) { return joined_change_row(&p, r); });
     }
     return !changed && !any_row(p, shared_flag, [&](int32_t r) { /* a place has no more bodies than rows */
         const int32_t k = r % JOINED_ROWS, a = p.s.side[2 * (r / JOINED_ROWS)], b = p.s.side[2 * (r / JOINED_ROWS) + 1];

@@ -4,6 +4,7 @@
 
 #include "backend_cuda/device/view.h"
 #include "core/model/coupling_law.h"
+#include "core/model/driven.h"
 #include "core/model/joint_law.h"
 
 static __device__ __forceinline__ struct joint_body body_of(const cuda_view &v, int32_t body)
@@ -23,6 +24,26 @@ static __device__ __forceinline__ struct joint_body body_a_of(const cuda_view &v
     if (joint->coupling < 0) return body_of(v, joint->body[0]);
     const struct joint_body out = {-1, &v.joints.couplings_before[joint->coupling].target, true, true};
     return out;
+}
+
+/* Is joint j to be held together at the end of the step? */
+static __device__ __forceinline__ bool joint_closes(const joint_view &joints, int32_t j)
+{
+    const sadmm_joint_def *def = &joints.joints[j].def;
+    return def->locks && def->enabled && !joints.begin[j].broken;
+}
+
+/* The frame of joint j on its body at side s at the end of the step. place: of a dynamic body. Couplings have no locks. */
+static __device__ __forceinline__ struct joint_end joint_end_after(const cuda_view &v, int32_t j, int s,
+                                                                   const double *place)
+{
+    const struct sadmm_resident_joint *joint = &v.joints.joints[j];
+    const int32_t body = joint->body[s];
+    if (body >= 0) return joint_end_of(&joint->frame[s], v3_load(place), q_load(place + 3));
+    if (!sadmm_body_is_driven(body)) return joint_end_on(&joint->frame[s], nullptr);
+    struct sadmm_rigid next;
+    driven_move(&v.driven.moving[sadmm_driven(body)], v.model.settings->dt, &next);
+    return joint_end_on(&joint->frame[s], &next);
 }
 
 #endif

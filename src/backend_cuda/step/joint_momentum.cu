@@ -1,13 +1,17 @@
 /* Momentum and energy of islands with joints (core/model/joint_momentum.h) on the device. A thread block an island, once
- * it is known where its joints let it go: what each body adds, then sums over the bodies, in the order of the host
- * (core/world/joint_momentum.c). Bodies get what restores it where they are moved (move_joined.h). */
+ * it is known where its joints let it go: what closing has cost, which it pays; then what each body adds, then sums over
+ * the bodies, in the order of the host (core/world/joint_momentum.c). Bodies get what restores it where they are moved
+ * (move_joined.h). Beside them a thread a joint: how far that is off. */
 #include <algorithm>
 
 #include "backend_cuda/device/double.h"
 
+#include "backend_cuda/assemble/stiffened.h"
 #include "core/model/joined.h"
+#include "core/model/joint_close.h"
 #include "core/model/joint_momentum.h"
-#include "move.h"
+#include "joint_bodies.h"
+#include "joint_place.h"
 #include "world.h"
 
 enum { ISLAND_THREADS = 128, ISLAND_BLOCKS = 1024, FETCHED = 8 /* at once, of a sum */ };
@@ -93,18 +97,56 @@ static __device__ __forceinline__ void add_part_rows(const cuda_view &v, const s
 static __device__ __noinline__ void store_body(const cuda_view &v, const struct joint_island &island, int32_t i)
 {
     const struct sadmm_rigid *body = &v.step.before[i];
+    struct sadmm_rigid stiffened;
+    if (rolling_is_stiff(body)) { /* of others it does not count here */
+        stiffened = stiffened_rigid(v, i);
+        body = &stiffened;
+    }
     const double *origin = v.step.before[island.label].position;
     const struct sadmm_settings settings = *v.model.settings;
     struct joint_momentum sums = {};
-    double velocity[6], place[PLACE];
+    double place[PLACE];
     if (island.part) add_part_rows(v, island.part, i, body, origin, settings.dt, &sums);
     else add_sides(v, i, body, origin, settings.dt, &sums);
-    if (v.joints.is_direct[i])
-        for (int k = 0; k < 6; ++k) velocity[k] = v.joints.velocity[6 * (size_t)i + (size_t)k];
-    else load_end_velocity(v, i, velocity);
-    joint_move(body, halfway_of(v, i), velocity, island.bits & ISLAND_LEADS_STAY, settings.dt, place, place + 3, place + 7);
+    if (island.bits & ISLAND_CLOSED)
+        for (int k = 0; k < PLACE; ++k) place[k] = v.joints.closed[i].place[k];
+    else joint_place(v, i, island.bits, place);
     joint_add_momentum(&sums, body, halfway_of(v, i), place, place + 3, place + 7, origin, &settings);
     v.joints.momentum[i] = sums;
+}
+
+/* A body of an island that has been closed: its place, if no part of it has been, and what it moves with. */
+static __device__ __noinline__ void count_cost(const cuda_view &v, const struct joint_island &island, int32_t i)
+{
+    struct cuda_closed_body *own = &v.joints.closed[i];
+    if (!own->closed) {
+        joint_place(v, i, island.bits, own->place);
+        own->gained = 0;
+    }
+    own->moving = joint_motion_energy2(&v.step.before[i], own->place + 3, own->place + 7);
+}
+
+/* What closing has lifted, its velocities pay. Every thread of the block comes here. */
+static __device__ __forceinline__ void pay_island(const cuda_view &v, const struct joint_island &island)
+{
+    const int32_t t = (int32_t)threadIdx.x;
+    struct cuda_closed_body *closed = v.joints.closed;
+    for (int32_t k = t; k < island.count; k += ISLAND_THREADS) count_cost(v, island, island.body[k]);
+    __syncthreads();
+    if (t == 0) { /* in the order of the host */
+        double gained = 0, moving = 0;
+        for (int32_t k = 0; k < island.count; ++k) {
+            const struct cuda_closed_body *one = &closed[island.body[k]];
+            gained = k == 0 ? one->gained : gained + one->gained;
+            moving = k == 0 ? one->moving : moving + one->moving;
+        }
+        closed[island.label].keep = joint_closing_keep(gained, moving);
+    }
+    __syncthreads();
+    const double keep = closed[island.label].keep;
+    for (int32_t k = t; k < island.count; k += ISLAND_THREADS)
+        for (int j = 7; j < PLACE; ++j) closed[island.body[k]].place[j] *= keep;
+    __syncthreads();
 }
 
 /* Every thread of the block comes here. */
@@ -141,14 +183,39 @@ static __device__ __forceinline__ void restore_island(const cuda_view &v, const 
     v.joints.touch[island.label] |= ISLAND_RESTORED;
 }
 
-/* args.count: parts, where joints are apart. */
+/* How far joint j is off, once it has been closed where it had to be. Its island may be paying for that: velocities do not
+ * count here. */
+static __device__ __noinline__ double drift_of(const cuda_view &v, int32_t j)
+{
+    const struct sadmm_resident_joint *joint = &v.joints.joints[j];
+    struct joint_end end[2];
+    for (int s = 0; s < 2; ++s) {
+        const int32_t body = joint->body[s];
+        double place[PLACE];
+        if (body >= 0 && v.joints.closed[body].closed)
+            for (int k = 0; k < 7; ++k) place[k] = v.joints.closed[body].place[k];
+        else if (body >= 0) joint_place(v, body, v.joints.touch[joined_label(v, body)], place);
+        end[s] = joint_end_after(v, j, s, place);
+    }
+    return joint_opening(&joint->def, end);
+}
+
+static __device__ __forceinline__ void find_drift(const cuda_view &v, int32_t j)
+{
+    const bool closes = j < v.joints.count && joint_closes(v.joints, j);
+    reduce_max(closes ? drift_of(v, j) : 0, &v.step.control->joints.drift);
+}
+
+/* Blocks of islands, args.most_bodies of them, then blocks of joints. args.count: parts, where joints are apart. */
 static __global__ void __launch_bounds__(ISLAND_THREADS)
     joint_momentum_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     follow_if(all_early(v.model.bodies));
     if (v.model.live->abort_code) return;
-    const int32_t count = v.joints.apart ? args.count : v.model.bodies;
-    for (int32_t k = (int32_t)blockIdx.x; k < count; k += (int32_t)gridDim.x) {
+    const int32_t count = v.joints.apart ? args.count : v.model.bodies, blocks = args.most_bodies;
+    if ((int32_t)blockIdx.x >= blocks)
+        return find_drift(v, ((int32_t)blockIdx.x - blocks) * ISLAND_THREADS + (int32_t)threadIdx.x);
+    for (int32_t k = (int32_t)blockIdx.x; k < count; k += blocks) {
         struct joint_island island = {k, 0, nullptr, nullptr, 0};
         struct joined_structure structure = {};
         if (v.joints.apart) {
@@ -163,6 +230,7 @@ static __global__ void __launch_bounds__(ISLAND_THREADS)
             island.body = v.graph.body_of + v.graph.slot_of[k];
         }
         island.bits = v.joints.touch[island.label];
+        if (island.count > 0 && island.bits & ISLAND_CLOSED) pay_island(v, island);
         if (island.count > 0 && joint_island_is_loose(island.bits)) restore_island(v, island);
     }
 }
@@ -172,6 +240,8 @@ sadmm_status CUDA(launch_joint_momentum)(struct sadmm_context *c, struct sadmm_e
     cuda_args args = {};
     args.count = c->step->joined_parts;
     const int64_t islands = c->view.joints.apart ? args.count : c->view.model.bodies;
+    args.most_bodies = (int32_t)std::min<int64_t>(islands, ISLAND_BLOCKS);
     return CUDA(launch_of)(c, joint_momentum_kernel, "momentum of joints",
-                           std::min<int64_t>(islands, ISLAND_BLOCKS), ISLAND_THREADS, &args, error);
+                           args.most_bodies + (c->view.joints.count + ISLAND_THREADS - 1) / ISLAND_THREADS,
+                           ISLAND_THREADS, &args, error);
 }

@@ -254,6 +254,8 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
     joint_end_wrench(&memory, &joint->def, middle->frame);
     v.joints.after[j] = memory;
     if (joint->coupling >= 0) keep_coupling(v, joint->coupling, &memory, middle, settings.dt);
+    for (int s = 0; s < 2; ++s)
+        if (joint->body[s] >= 0 && v.joints.stiffening[joint->body[s]].any) bits |= ISLAND_STRAYS;
     atomicOr(island_of(v, joint->body[0], joint->body[1]), bits);
     const int32_t named = joint->body[1] >= 0 ? joint->body[1] : joint->body[0];
     if (!(finite == 0)) atomicMin(&v.step.control->offending_body, 2 * v.model.bodies + named);
@@ -341,6 +343,7 @@ sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_e
     TRY(CUDA(launch_of)(c, joint_solution_kernel, "joints", blocks + (pairs + ROWS_THREADS - 1) / ROWS_THREADS,
                         ROWS_THREADS, &args, error));
     TRY(CUDA(launch_gear_solution)(c, error));
+    TRY(CUDA(launch_joint_close)(c, error));
     return CUDA(launch_joint_momentum)(c, error);
 }
 
@@ -393,6 +396,11 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->after = memory_of(c, step_state(into, substep, substeps));
     joints->couplings_before = couplings_of(c, step_state(into, substep - 1, substeps));
     joints->couplings_after = couplings_of(c, step_state(into, substep, substeps));
+    joints->first_at = buffer<int32_t>(c, BUFFER_JOINTS_AT);
+    joints->joints_at = joints->first_at + s->bodies + 1;
+    joints->closing = joints->joints_at + 2 * (size_t)s->joints;
+    joints->closed = buffer<struct cuda_closed_body>(c, BUFFER_CLOSED);
+    joints->stiffening = buffer<struct cuda_stiffening>(c, BUFFER_STIFFENING);
     joints->touch = buffer<int32_t>(c, BUFFER_JOINT_TOUCH);
     joints->momentum = buffer<struct joint_momentum>(c, BUFFER_JOINT_MOMENTUM);
     c->view.rows.count = s->joint_constraints;
@@ -421,6 +429,38 @@ static sadmm_status put_first(struct sadmm_context *c, const struct sadmm_reside
     return status;
 }
 
+/* Is side s of a joint of a dynamic body? */
+static bool is_at_body(const struct sadmm_resident_joint *joint, int s)
+{
+    return joint->body[s] >= 0 && (s == 1 || joint->coupling < 0);
+}
+
+static sadmm_status put_joints_at(struct sadmm_context *c, const struct sadmm_resident_world *world,
+                                  struct sadmm_error *error)
+{
+    const size_t n = (size_t)world->body_count, joints = (size_t)world->joint_count,
+                 constraints = (size_t)c->step->joint_constraints, count = n + 1 + 2 * joints + constraints;
+    int32_t *first = (int32_t *)sadmm_alloc(count, sizeof *first), *at = first + n + 1, *closing = at + 2 * joints;
+    if (!first) return sadmm_fail_memory(error, "the cuda backend's joints");
+    for (size_t j = 0; j < joints; ++j)
+        for (int s = 0; s < 2; ++s)
+            if (is_at_body(&world->joints[j], s)) ++first[world->joints[j].body[s] + 1];
+    for (size_t i = 0; i < n; ++i) first[i + 1] += first[i];
+    const int32_t all = first[n];
+    for (size_t j = joints; j-- > 0;) /* from behind: ends of lists, one place on, become their beginnings */
+        for (int s = 1; s >= 0; --s)
+            if (is_at_body(&world->joints[j], s)) at[--first[world->joints[j].body[s] + 1]] = (int32_t)(2 * j) + s;
+    memmove(first, first + 1, n * sizeof *first);
+    first[n] = all;
+    for (size_t k = 0; k < constraints; ++k) closing[k] = -1;
+    for (size_t j = 0, k = 0; j < joints; k += (size_t)world->joints[j++].constraints)
+        if (world->joints[j].def.locks && world->joints[j].constraints > 0) closing[k] = (int32_t)j;
+    const sadmm_status status =
+        CUDA(put)(c, buffer<void>(c, BUFFER_JOINTS_AT), first, count * sizeof *first, error);
+    sadmm_free(first);
+    return status;
+}
+
 sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resident_world *world,
                                struct sadmm_error *error)
 {
@@ -444,6 +484,9 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
         {BUFFER_JOINT_MEMORY, 3 * n * sizeof(struct sadmm_joint_memory)},
         {BUFFER_COUPLING_MEMORY, 3 * (size_t)s->couplings * sizeof(struct sadmm_coupling_memory)},
         {BUFFER_JOINT_ROWS, 2 * row_set_bytes(s)},
+        {BUFFER_JOINTS_AT, ((size_t)s->bodies + 1 + 2 * n + (size_t)s->joint_constraints) * sizeof(int32_t)},
+        {BUFFER_STIFFENING, (size_t)s->bodies * sizeof(struct cuda_stiffening)},
+        {BUFFER_CLOSED, (size_t)s->bodies * sizeof(struct cuda_closed_body)},
         {BUFFER_JOINT_TOUCH, (size_t)s->bodies * sizeof(int32_t)},
         {BUFFER_JOINT_MOMENTUM, (size_t)s->bodies * sizeof(struct joint_momentum)},
     };
@@ -463,6 +506,7 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
         TRY(CUDA(put)(c, c->buffers[BUFFER_TABLES].data, world->tables, world->table_numbers * sizeof *world->tables,
                 error));
     TRY(CUDA(load_gears)(c, world, error));
+    TRY(put_joints_at(c, world, error));
     return put_first(c, world, error);
 }
 

@@ -16,6 +16,7 @@ static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i)
     double place[PLACE];
     joint_move(&before.body, halfway_of(v, i), v.joints.velocity + 6 * (size_t)i, leads_stay, dt, place, place + 3,
                place + 7);
+    for (int k = 0; k < PLACE && bits & ISLAND_CLOSED; ++k) place[k] = v.joints.closed[i].place[k];
     if (bits & ISLAND_RESTORED)
         joint_restore(&v.joints.momentum[label], place, v.step.before[label].position, place + 7);
     store_moved(v, i, before, place, !leads_stay, dt);

@@ -1,7 +1,13 @@
 /* Whole steps on the device: the world and the report come back (step/world.h). */
 
+#include <string.h>
+
+#include "backend_cuda/device/double.h"
+
 #include "collision/collision.h"
+#include "core/base/memory.h"
 #include "core/model/driven.h"
+#include "core/model/stiffening.h"
 #include "world.h"
 
 /* ---- the report ------------------------------------------------------------------------------------------------ */
@@ -37,7 +43,7 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
     out->plan.row_constraints = last->joints.constraints;
     out->plan.rows_apart = last->apart;
     out->penetration_max = last->depth;
-    out->joint_drift = s->joints > 0 ? -1 : 0;
+    memcpy(&out->joint_drift, &last->joints.drift, sizeof out->joint_drift);
     out->residual.primal = last->primal;
     out->residual.dual = last->dual;
     out->ms.collide = milliseconds(last, STAMP_START, STAMP_FOUND);
@@ -102,6 +108,24 @@ extern "C" sadmm_status CUDA(read_touching)(struct sadmm_context *c, struct sadm
     return COLLISION(touching)(c->step->collision, c->stream, touching, error);
 }
 
+/* What joints stiffened bodies by, which is beside them on the device. */
+static sadmm_status stiffen_start(struct sadmm_context *c, struct sadmm_rigid *rigid, struct sadmm_error *error)
+{
+    const size_t n = (size_t)c->step->bodies;
+    const double dt = sadmm_settings_of_substep(&c->step->last_settings).dt;
+    if (c->step->joints == 0) return SADMM_OK;
+    struct cuda_stiffening *stiffening = (struct cuda_stiffening *)sadmm_alloc(n + 1, sizeof *stiffening);
+    if (!stiffening) return sadmm_fail_memory(error, "the step's starting bodies");
+    const sadmm_status status =
+        CUDA(get)(c, stiffening, buffer<void>(c, BUFFER_STIFFENING), n * sizeof *stiffening, error);
+    for (size_t i = 0; status == SADMM_OK && i < n; ++i) {
+        const struct sadmm_rigid before = rigid[i];
+        if (stiffening[i].any) stiffening_set(&rigid[i], before.stiffness, dt, stiffening[i].more);
+    }
+    sadmm_free(stiffening);
+    return status;
+}
+
 extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_rigid *rigid, double *velocity,
                                          double *impulse, struct sadmm_error *error)
 {
@@ -112,6 +136,7 @@ extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_r
               from = step_state(1 - s->into, substeps - 2, substeps);
     TRY(CUDA(get)(c, rigid, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)from * n, n * sizeof *rigid,
                   error));
+    TRY(stiffen_start(c, rigid, error));
     TRY(CUDA(get)(c, velocity, buffer<double>(c, BUFFER_WORLD_VELOCITY), 6 * n * sizeof *velocity, error));
     return CUDA(get)(c, impulse, buffer<double>(c, BUFFER_WORLD_IMPULSE), 3 * points * sizeof *impulse, error);
 }

@@ -69,12 +69,21 @@ static sadmm_status wait_for_joints(struct sadmm_context *c, struct sadmm_error 
     return SADMM_OK;
 }
 
-/* Rows of joints, and those in the solver's form. Where joined bodies are apart, all that is to be done about them. */
-static sadmm_status record_joints(struct sadmm_context *c, struct sadmm_error *error)
+/* Rows of joints. */
+static sadmm_status record_joint_rows(struct sadmm_context *c, struct sadmm_error *error)
 {
     side_branch side(c, c->joint_side);
     CUDA_CALL(c, side.code, "a branch of the step");
     TRY(CUDA(launch_joint_rows)(c, error));
+    CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
+    return SADMM_OK;
+}
+
+/* Those in the solver's form. Where joined bodies are apart, all that is to be done about them. */
+static sadmm_status record_joints(struct sadmm_context *c, struct sadmm_error *error)
+{
+    side_branch side(c, c->joint_side);
+    CUDA_CALL(c, side.code, "a branch of the step");
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent"); /* A and b */
     if (c->view.joints.apart) {
         TRY(CUDA(launch_joined)(c, false, error));
@@ -82,35 +91,39 @@ static sadmm_status record_joints(struct sadmm_context *c, struct sadmm_error *e
         TRY(CUDA(launch_joint_move)(c, error));
     } else {
         TRY(CUDA(assemble_rows)(c, error));
-        if (c->fast) TRY(CUDA(enqueue_row_responses)(c, error));
     }
     CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
     return SADMM_OK;
 }
 
-/* Joined bodies before the iterations, beside what the main stream does then. */
+/* Joined bodies before the iterations, beside what the main stream does then; what they leave of their inertia
+ * (core/model/stiffening.h) is that which rows respond by. */
 static sadmm_status record_joined(struct sadmm_context *c, struct sadmm_error *error)
 {
     side_branch side(c, c->joint_side);
     CUDA_CALL(c, side.code, "a branch of the step");
     if (joined_is_small(c)) TRY(CUDA(launch_pair_parts)(c, error));
     if (c->settings.warm_start) TRY(CUDA(launch_joined)(c, false, error));
+    if (c->fast) TRY(CUDA(enqueue_row_responses)(c, error));
     CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
     return SADMM_OK;
 }
 
-/* A and b of the bodies, and joints: beside contact finding, of which they need nothing. Where there are driven bodies,
- * bodies wait for what they ride on. */
+/* A and b of the bodies, and joints, whose forces stiffen them: beside contact finding, of which they need nothing.
+ * Where there are driven bodies, bodies wait for what they ride on. */
 static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
+    const bool joints = c->view.joints.count > 0;
     if (c->view.driven.count > 0) return CUDA(launch_joint_rows)(c, error);
+    if (joints) TRY(record_joint_rows(c, error));
     {
         side_branch side(c, c->side);
         CUDA_CALL(c, side.code, "a branch of the step");
+        if (joints) TRY(wait_for_joints(c, error));
         TRY(CUDA(enqueue_bodies)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
-    return c->view.joints.count > 0 ? record_joints(c, error) : SADMM_OK;
+    return joints ? record_joints(c, error) : SADMM_OK;
 }
 
 /* record_plan where there are driven bodies: one after the other. */
@@ -120,12 +133,24 @@ static sadmm_status record_driven_plan(struct sadmm_context *c, struct sadmm_err
     TRY(CUDA(launch_carry)(c, error));
     TRY(CUDA(enqueue_bodies)(c, error));
     if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error));
+    if (c->view.joints.count > 0) {
+        TRY(CUDA(assemble_rows)(c, error));
+        TRY(record_joined(c, error));
+        TRY(wait_for_joints(c, error));
+    }
+    return CUDA(assemble_contacts)(c, error);
+}
+
+/* Contacts in the solver's form, beside what the main stream does; after joined bodies, where these say what they respond
+ * by. */
+static sadmm_status record_contacts(struct sadmm_context *c, bool late, struct sadmm_error *error)
+{
+    side_branch side(c, c->side);
+    CUDA_CALL(c, side.code, "a branch of the step");
+    if (late) TRY(wait_for_joints(c, error));
     TRY(CUDA(assemble_contacts)(c, error));
-    if (c->view.joints.count == 0) return SADMM_OK;
-    TRY(CUDA(assemble_rows)(c, error));
-    if (c->fast) TRY(CUDA(enqueue_row_responses)(c, error));
-    TRY(record_joined(c, error));
-    return wait_for_joints(c, error);
+    CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+    return SADMM_OK;
 }
 
 /* Graph statistics and layout; beside them contacts in the solver's form, what weights take from pairs, and joined
@@ -133,23 +158,18 @@ static sadmm_status record_driven_plan(struct sadmm_context *c, struct sadmm_err
 static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
     if (c->view.driven.count > 0) return record_driven_plan(c, error);
-    const bool together = c->view.joints.count > 0 && !c->view.joints.apart, beside = together && joined_is_small(c);
+    const bool together = c->view.joints.count > 0 && !c->view.joints.apart, beside = together && joined_is_small(c),
+               late = together && c->fast && c->settings.warm_start, /* joined bodies' inertia is not known before */
+               side = !c->view.push.planned && (!late || beside);
     if (together) TRY(wait_for_joints(c, error)); /* the graph is of their rows, too */
     if (beside) TRY(record_joined(c, error));
-    if (!c->view.push.planned) {
-        side_branch side(c, c->side);
-        CUDA_CALL(c, side.code, "a branch of the step");
-        TRY(CUDA(assemble_contacts)(c, error));
-        CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
-    }
+    if (side) TRY(record_contacts(c, late, error));
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
-    if (c->view.push.planned) { /* which islands are pushed says what their contacts are */
-        TRY(CUDA(launch_push_choice)(c, error));
-        TRY(CUDA(assemble_contacts)(c, error));
-    }
+    if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error)); /* it says what contacts are */
     if (together && !beside) TRY(record_joined(c, error));
-    return together ? wait_for_joints(c, error) : SADMM_OK;
+    if (together) TRY(wait_for_joints(c, error));
+    return side ? SADMM_OK : CUDA(assemble_contacts)(c, error);
 }
 
 /* Which motions of loose islands may be restored, beside the iterations; where those find out themselves what is held,

@@ -199,6 +199,9 @@ sadmm_status CUDA(reserve_joined)(struct sadmm_context *, struct sadmm_error *er
 sadmm_status CUDA(launch_joined)(struct sadmm_context *, bool after, struct sadmm_error *error);
 sadmm_status CUDA(launch_pair_parts)(struct sadmm_context *, struct sadmm_error *error);
 cudaError_t CUDA(joined_allow)(int shared_limit); /* once a device */
+/* joint_close.cu: parts whose joints are off by more than they may be are closed, once their islands are known. */
+sadmm_status CUDA(launch_joint_close)(struct sadmm_context *, struct sadmm_error *error);
+cudaError_t CUDA(joint_close_allow)(int shared_limit);
 size_t CUDA(joined_shared_size)(void); /* of a block, beside the part's own */
 static inline bool joined_is_small(const struct sadmm_context *c) { return c->step->joined_bytes > 0; }
 

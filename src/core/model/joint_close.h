@@ -13,13 +13,6 @@
 /* By so many Newton steps at most. */
 enum { JOINT_CLOSE_STEPS = 8 };
 
-/* How far the locks of a joint are off. Translations alone, m; and do their arms say that all of it is little? The bodies'
- * scale is more than their arms' is. */
-struct joint_opening {
-    double off;
-    bool little;
-};
-
 SADMM_INLINE bool joint_turns_little(const struct joint_end *a, const struct joint_end *b, uint32_t locks)
 {
     const double most = JOINT_CLOSE_FROM / 4; /* of half an angle, and with room */
@@ -34,22 +27,26 @@ SADMM_INLINE bool joint_turns_little(const struct joint_end *a, const struct joi
     return v3_norm2(part) < most * most;
 }
 
-SADMM_INLINE struct joint_opening joint_opening_of(const sadmm_joint_def *def, const struct joint_end *a,
-                                                   const struct joint_end *b)
+/* How far the locks of a joint's translations are off, m. */
+SADMM_INLINE double joint_opening(const sadmm_joint_def *def, const struct joint_end end[2])
 {
-    const vec3 way = v3_sub(b->point, a->point);
-    struct joint_opening out = {0, false};
-    if (joint_is_radial(def->kind)) {
-        if (def->locks & 1) out.off = fabs(v3_norm(way) - def->length);
-    } else if (def->locks & 7) {
-        const mat3 frame = q_matrix(a->orientation);
-        int k;
-        for (k = 0; k < 3; ++k)
-            if (def->locks >> k & 1) out.off = max_of(out.off, fabs(v3_dot(m3_column(frame, k), way)));
-    }
-    out.little = out.off * out.off <= JOINT_CLOSE_FROM * JOINT_CLOSE_FROM * (v3_norm2(a->arm) + v3_norm2(b->arm)) &&
-                 joint_turns_little(a, b, def->locks);
-    return out;
+    const vec3 way = v3_sub(end[1].point, end[0].point);
+    double off = 0;
+    int k;
+    if (joint_is_radial(def->kind)) return def->locks & 1 ? fabs(v3_norm(way) - def->length) : 0;
+    if (!(def->locks & 7)) return 0;
+    const mat3 frame = q_matrix(end[0].orientation);
+    for (k = 0; k < 3; ++k)
+        if (def->locks >> k & 1) off = max_of(off, fabs(v3_dot(m3_column(frame, k), way)));
+    return off;
+}
+
+/* Do the arms of its bodies that move, whose scale is more than that, say that all of it is little? off: as above. */
+SADMM_INLINE bool joint_opens_little(const sadmm_joint_def *def, const struct joint_end end[2], const bool moves[2],
+                                     double off)
+{
+    const double arms2 = (moves[0] ? v3_norm2(end[0].arm) : 0) + (moves[1] ? v3_norm2(end[1].arm) : 0);
+    return off * off <= JOINT_CLOSE_FROM * JOINT_CLOSE_FROM * arms2 && joint_turns_little(&end[0], &end[1], def->locks);
 }
 
 /* Is a pose in which a loop may fold within so many steps? There a row says what others say, and near it the root of what
@@ -120,6 +117,41 @@ SADMM_INLINE void joint_closing_row(const struct joint_closing *c, int i, int s,
     joint_row(&c->geometry, c->coordinate[i], s ? c->geometry.arm_b : c->geometry.arm_a, &linear, &angular);
     v3_store(v3_scale(linear, sign), row);
     v3_store(v3_scale(angular, sign), row + 3);
+}
+
+/* A body's pose, moved by a displacement. */
+SADMM_INLINE void joint_close_move(const double by[6], double position[3], double orientation[4])
+{
+    v3_store(rigid_move(v3_load(position), v3_load(by), 1), position);
+    q_store(rigid_turn(q_load(orientation), v3_load(by + 3), 1), orientation);
+}
+
+/* ---- what it costs ----------------------------------------------------------------------------------------------- */
+
+/* Twice the energy of a body's motion, J; */
+SADMM_INLINE double joint_motion_energy2(const struct sadmm_rigid *body, const double orientation[4],
+                                         const double velocity[6])
+{
+    const vec3 spin = v3_load(velocity + 3);
+    return body->mass * dot3(velocity, velocity) +
+           v3_dot(spin, rigid_angular_momentum(q_load(orientation), v3_load(body->inertia), spin));
+}
+
+/* and of that with its energy in the field of gravity. */
+SADMM_INLINE double joint_energy2(const struct sadmm_rigid *body, const double position[3], const double orientation[4],
+                                  const double velocity[6], const struct sadmm_settings *settings)
+{
+    double energy = joint_motion_energy2(body, orientation, velocity);
+    int k;
+    for (k = 0; k < 3; ++k) energy -= 2 * body->mass * forces_gravity(body, settings->gravity, k) * position[k];
+    return energy;
+}
+
+/* What closing has lifted, motion pays: what is left of the velocities of an island to which it gave twice the energy
+ * `gained`, and whose motion has twice the energy `moving`. */
+SADMM_INLINE double joint_closing_keep(double gained, double moving)
+{
+    return !(gained > 0) ? 1 : gained < moving ? sqrt(1 - gained / moving) : 0;
 }
 
 #endif

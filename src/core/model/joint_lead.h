@@ -13,7 +13,7 @@
 /* Of islands. TOUCHED: by a contact; HELD: by one, or by a joint, that leaves it no motion (math/momentum.h); RESTORED: on
  * a device, its momentum is (joint_momentum.h); TURNS: rows of it turn by more than a step resolves; POWERED: springs,
  * drives or armatures act; MOORED: rows hold it to what does not move by itself; STRAYS: joints stiffen its bodies, or
- * have been closed. */
+ * have been closed; CLOSED: on a device, they have been. */
 enum {
     ISLAND_JOINED = 1,
     ISLAND_LEADS_STAY = 2,
@@ -23,8 +23,14 @@ enum {
     ISLAND_TURNS = 32,
     ISLAND_POWERED = 64,
     ISLAND_MOORED = 128,
-    ISLAND_STRAYS = 256
+    ISLAND_STRAYS = 256,
+    ISLAND_CLOSED = 512
 };
+
+/* Joints of such islands may be opened by more than the order of the step: it is loaded beyond what explicit forces bear
+ * (stiffening.h), or a row turns by more than a step resolves. Others are not closed (joint_close.h), since a body that is
+ * moved to close a joint has another orientation for its spin. */
+SADMM_INLINE bool joint_island_may_open(int bits) { return (bits & (ISLAND_STRAYS | ISLAND_TURNS)) != 0; }
 
 /* A body as the step ends. */
 struct joint_lead {

@@ -26,6 +26,12 @@
 /* Once forces are known better, a body is stiffened again if that changes its inertia by more than this share. */
 #define STIFFENING_CHANGE 0.05
 
+/* A joint's force on a body with that of one more of its rows, of this coordinate. */
+SADMM_INLINE vec3 stiffening_add_row(vec3 force, int coordinate, const double jacobian[6], double lambda, double dt)
+{
+    return coordinate < 3 ? v3_madd(force, lambda / dt, v3_load(jacobian)) : force;
+}
+
 /* K along a body's principal axes: xx, yy, zz, xy, xz, yz. force: along them, too; place: the arm. */
 SADMM_INLINE void stiffening_add(double K[6], vec3 place, vec3 force)
 {
@@ -110,6 +116,18 @@ SADMM_INLINE bool stiffening_differs(const double inertia[3], const double befor
         size += inertia[k] + before[k];
     }
     return change > STIFFENING_CHANGE * size;
+}
+
+/* `more`, what is added to the inertia of a body, by K; is it another one than before? stiffened: there was some. */
+SADMM_INLINE bool stiffening_renew(const double inertia[3], mat3 R, double dt, const double K[6], bool stiffened,
+                                   double more[6])
+{
+    double now[6];
+    int k;
+    const bool any = stiffening_of(inertia, R, dt, K, now);
+    if (!(any || stiffened) || !stiffening_differs(inertia, more, now)) return false;
+    for (k = 0; k < 6; ++k) more[k] = now[k];
+    return true;
 }
 
 /* More of it in the inertia of a body than `own` stiffness, which is of account if it rocks (rolling.h): the step takes

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "core/model/joint_close.h"
 #include "core/model/system_math.h"
 #include "joined_part.h"
 
@@ -269,9 +270,7 @@ static void move_by(const struct joined_view *v, struct sadmm_rigid *bodies)
 {
     for (int32_t e = 0; e < v->s.bodies; ++e) {
         struct sadmm_rigid *body = &bodies[v->s.body[e]];
-        const double *by = v->dv + 6 * (size_t)e;
-        v3_store(rigid_move(v3_load(body->position), v3_load(by), 1), body->position);
-        q_store(rigid_turn(q_load(body->orientation), v3_load(by + 3), 1), body->orientation);
+        joint_close_move(v->dv + 6 * (size_t)e, body->position, body->orientation);
     }
 }
 

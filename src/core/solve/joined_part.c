@@ -5,10 +5,6 @@
 
 #include "core/model/system_math.h"
 
-/* Exact rows: what is enough, m/s or rad/s; how often what they give by is taken back. */
-static const double EXACT = 1e-11;
-enum { MOST_BACK = 8 };
-
 /* ---- what there is ----------------------------------------------------------------------------------------------- */
 
 static void load_row(const struct sadmm_rows *rows, size_t from, struct joined_row *to)
@@ -142,7 +138,7 @@ static double most_missing(const struct joined_view *v)
 {
     double most = 0;
     for (int32_t r = 0; r < JOINED_ROWS * v->s.places; ++r)
-        if (v->state[r] == JOINED_INSIDE) most = fmax(most, fabs(joined_residual(v, r, true, true)));
+        most = fmax(most, joined_misses(v, r));
     return most;
 }
 
@@ -152,7 +148,7 @@ static double most_missing(const struct joined_view *v)
 static bool take_back_give(const struct joined_view *v)
 {
     double missing = most_missing(v), last = HUGE_VAL;
-    for (int pass = 0; pass < MOST_BACK && missing > EXACT && missing < last / 2; ++pass) {
+    for (int pass = 0; pass < JOINED_BACKS && missing > JOINED_EXACT && missing < last / 2; ++pass) {
         last = missing;
         sadmm_joined_part_solve_rows(v, true);
         missing = most_missing(v);

@@ -83,7 +83,7 @@ struct sadmm_resident_report {
     int32_t limited;           /* islands with too much energy */
     int32_t joints, couplings; /* that took part, in the last sub-step */
     double penetration_max;    /* m */
-    double joint_drift;        /* m; -1: not measured */
+    double joint_drift;        /* m */
     struct sadmm_residual residual; /* -1: not measured */
     struct {
         double total, collide, assemble, solve, finish;

@@ -70,16 +70,22 @@ static void mark_bodies(const sadmm_world *world, const struct sadmm_world_joint
     }
 }
 
-/* May its joints be opened by more than the order of the step: is its island loaded beyond what explicit forces bear
- * (joint_stiffen.c), or does a row turn by more than a step resolves? Others are left as they are, since a body that is
- * moved to close a joint has another orientation for its spin. */
 static bool may_open(const sadmm_world *world, const struct sadmm_world_joint *joint)
 {
     for (int s = 0; s < 2; ++s) {
         const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
-        if (body >= 0 && world->joint_touch[world->joint_labels[body]] & (ISLAND_STRAYS | ISLAND_TURNS)) return true;
+        if (body >= 0 && joint_island_may_open(world->joint_touch[world->joint_labels[body]])) return true;
     }
     return false;
+}
+
+/* Is it off by more than a little? off: of its translations. */
+static bool opens(const sadmm_world *world, const struct sadmm_world_joint *joint, const struct joint_end end[2],
+                  double off)
+{
+    const bool moves[2] = {sadmm_world_joint_body(world, joint->body[0]).system_body >= 0,
+                           sadmm_world_joint_body(world, joint->body[1]).system_body >= 0};
+    return !joint_opens_little(&joint->def, end, moves, off);
 }
 
 /* Which bodies have joints that are to be closed; the largest error, m. Are there any? */
@@ -90,12 +96,11 @@ static bool find_open(sadmm_world *world, const sadmm_settings *settings, double
     for (size_t slot = 0; slot < world->joint_slots; ++slot) {
         const struct sadmm_world_joint *joint = &world->joints[slot];
         if (!closes(joint)) continue;
-        const struct joint_end a = end_of(world, joint, 0), b = end_of(world, joint, 1);
-        const struct joint_opening opening = joint_opening_of(&joint->def, &a, &b);
-        *off = opening.off > *off ? opening.off : *off;
-        if (world->kernels->resident) continue; /* a device would not do it */
+        const struct joint_end end[2] = {end_of(world, joint, 0), end_of(world, joint, 1)};
+        const double own = joint_opening(&joint->def, end);
         const bool folding = folds(world, joint);
-        if (!folding && (opening.little || !may_open(world, joint))) continue;
+        *off = own > *off ? own : *off;
+        if (!folding && (!opens(world, joint, end, own) || !may_open(world, joint))) continue;
         if (!(closing_of(world, joint, settings).share > (folding ? JOINT_CLOSE_FOLDING : JOINT_CLOSE_FROM))) continue;
         if (!any) memset(world->opened, 0, (size_t)world->dynamic_count);
         mark_bodies(world, joint, world->opened);
@@ -122,6 +127,7 @@ static sadmm_status find_folding(sadmm_world *world, bool *any)
         return sadmm_fail_memory(&world->error, "joints that fold");
     memset(world->folding, 0, n);
     memset(world->row_left, 0, world->start.rows.row_count * sizeof *world->row_left);
+    if (world->kernels->resident) return SADMM_OK; /* a device would not do it */
     if (!sadmm_joined_find_left(world->joined, world->joint_constraints, world->row_left)) return SADMM_OK;
     for (size_t r = 0; r < rows; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
@@ -180,20 +186,9 @@ static bool make_rows(sadmm_world *world, const sadmm_settings *settings)
 
 /* ---- what it costs ----------------------------------------------------------------------------------------------- */
 
-/* Twice the energy of a body's motion, J. */
-static double motion_energy2(const struct sadmm_rigid *body)
-{
-    const vec3 spin = v3_load(body->velocity + 3);
-    return body->mass * dot3(body->velocity, body->velocity) +
-           v3_dot(spin, rigid_angular_momentum(q_load(body->orientation), v3_load(body->inertia), spin));
-}
-/* That and its energy in the field of gravity. */
 static double energy2(const struct sadmm_rigid *body, const sadmm_settings *settings)
 {
-    double energy = motion_energy2(body);
-    for (int k = 0; k < 3; ++k)
-        energy -= 2 * body->mass * forces_gravity(body, settings->gravity, k) * body->position[k];
-    return energy;
+    return joint_energy2(body, body->position, body->orientation, body->velocity, settings);
 }
 
 /* Of a body; then by island, at its first body. */
@@ -207,22 +202,21 @@ static void begin_costs(sadmm_world *world, const sadmm_settings *settings)
         world->closing_costs[i].gained = -energy2(&world->next[i], settings);
 }
 
-/* What closing has lifted, motion pays. */
 static void pay_costs(sadmm_world *world, const sadmm_settings *settings)
 {
     struct joint_closing_cost *costs = world->closing_costs;
     for (int32_t i = 0; i < world->dynamic_count; ++i) { /* an island's first body comes first */
         struct joint_closing_cost *sum = &costs[world->joint_labels[i]];
         costs[i].gained += energy2(&world->next[i], settings);
-        costs[i].moving = motion_energy2(&world->next[i]);
+        costs[i].moving = joint_motion_energy2(&world->next[i], world->next[i].orientation, world->next[i].velocity);
         if (sum == &costs[i]) continue;
         sum->gained += costs[i].gained;
         sum->moving += costs[i].moving;
     }
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         const struct joint_closing_cost *sum = &costs[world->joint_labels[i]];
-        if (!(sum->gained > 0) || !(world->joint_touch[world->joint_labels[i]] & ISLAND_STRAYS)) continue;
-        const double keep = sum->gained < sum->moving ? sqrt(1 - sum->gained / sum->moving) : 0;
+        if (!(world->joint_touch[world->joint_labels[i]] & ISLAND_STRAYS)) continue;
+        const double keep = joint_closing_keep(sum->gained, sum->moving);
         for (int k = 0; k < 6; ++k) world->next[i].velocity[k] *= keep;
     }
 }
@@ -246,7 +240,7 @@ sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *
         !sadmm_grow_empty(&world->closing_costs, &world->closing_cost_capacity, n, sizeof *world->closing_costs))
         return sadmm_fail_memory(&world->error, "joints that close");
     bool any = false, folding = false;
-    if (!world->kernels->resident) TRY(find_folding(world, &folding)); /* a device would not do it */
+    TRY(find_folding(world, &folding));
     system.rows = &world->closing;
     for (int step = 0; find_open(world, settings, off) && step < JOINT_CLOSE_STEPS; ++step) {
         if (!any) begin_costs(world, settings);

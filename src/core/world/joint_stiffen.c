@@ -13,7 +13,7 @@ static vec3 force_of(const double *jacobian, const double *lambda, const struct 
 {
     vec3 force = v3(0, 0, 0);
     for (size_t r = 0; r < count; ++r)
-        if (source[r].coordinate < 3) force = v3_madd(force, lambda[r] / dt, v3_load(jacobian + 6 * r));
+        force = stiffening_add_row(force, source[r].coordinate, jacobian + 6 * r, lambda[r], dt);
     return force;
 }
 
@@ -71,11 +71,8 @@ static bool stiffen_body(sadmm_world *world, int32_t i, double dt)
 {
     struct sadmm_rigid *body = &world->start.rigid[i];
     struct joint_stiffening *s = &world->stiffening[i];
-    double more[6];
-    const bool any = stiffening_of(body->inertia, s->frame, dt, s->K, more);
-    if (!(any || is_stiffened(body)) || !stiffening_differs(body->inertia, s->more, more)) return false;
-    memcpy(s->more, more, sizeof s->more);
-    stiffening_set(body, s->own, dt, more);
+    if (!stiffening_renew(body->inertia, s->frame, dt, s->K, is_stiffened(body), s->more)) return false;
+    stiffening_set(body, s->own, dt, s->more);
     return true;
 }
 
@@ -84,8 +81,7 @@ sadmm_status sadmm_world_stiffen(sadmm_world *world, const sadmm_settings *setti
     const size_t n = (size_t)world->dynamic_count;
     bool may = false;
     *any = false;
-    /* a device that keeps worlds does not do it */
-    if (world->joint_rows == 0 || world->kernels->resident) return SADMM_OK;
+    if (world->joint_rows == 0) return SADMM_OK;
     if (!sadmm_grow_empty(&world->joint_load, &world->joint_load_capacity, 3 * n, sizeof *world->joint_load) ||
         !sadmm_grow_empty(&world->stiffening, &world->stiffening_capacity, n, sizeof *world->stiffening) ||
         !sadmm_grow_empty(&world->stiffened, &world->stiffened_capacity, n, sizeof *world->stiffened))

@@ -1,0 +1,147 @@
+/* What is locked, closed at the end of a (sub-)step (core/model/joint_close.h) by the rule of the host
+ * (core/world/joint_close.c): a thread block a part, which leaves at once where its island may not be opened by more
+ * than the order of the step. Bodies get their place where they are moved (move_joined.h), once their island has paid
+ * for it (joint_momentum.cu). */
+#include "backend_cuda/device/double.h"
+
+#include "core/model/joint_close.h"
+#include "joined_block.h"
+#include "joint_bodies.h"
+#include "joint_place.h"
+#include "world.h"
+
+/* What a part's threads tell each other. */
+struct close_shared {
+    unsigned long long most;
+    int32_t bits, flag; /* of its island, but what this kernel says of it; */
+};
+
+/* Joint j as its bodies' places have it; is it to be closed? */
+static __device__ __noinline__ bool closing_of(const cuda_view &v, int32_t j, struct joint_closing *out)
+{
+    const struct sadmm_resident_joint *joint = &v.joints.joints[j];
+    const struct sadmm_settings settings = *v.model.settings;
+    struct joint_end start[2], end[2];
+    bool moves[2];
+    double scale = 0;
+    for (int s = 0; s < 2; ++s) {
+        const struct joint_body body = body_of(v, joint->body[s]);
+        moves[s] = body.system_body >= 0;
+        start[s] = joint_end_on(&joint->frame[s], body.rigid);
+        end[s] = joint_end_after(v, j, s, moves[s] ? v.joints.closed[body.system_body].place : nullptr);
+        scale += joint_closing_scale(&end[s], moves[s] ? body.rigid : nullptr);
+    }
+    *out = joint_closing_of(&joint->def, start, end, scale, &settings);
+    return !joint_opens_little(&joint->def, end, moves, joint_opening(&joint->def, end)) &&
+           out->share > JOINT_CLOSE_FROM;
+}
+
+/* Rows of a place: of the joint that has its first constraint there; is that to be closed? */
+static __device__ __forceinline__ bool load_place(const cuda_view &v, const joined_view &p, int32_t place)
+{
+    const int32_t j = v.joints.closing[p.s.constraint[place]];
+    const bool closes = j >= 0 && joint_closes(v.joints, j);
+    struct joint_closing c;
+    bool open = false;
+    c.count = 0;
+    if (closes) open = closing_of(v, j, &c);
+    for (int i = 0; i < JOINED_ROWS; ++i) {
+        const int32_t r = JOINED_ROWS * place + i;
+        struct joined_row row = {};
+        for (int s = 0; i < c.count && s < 2; ++s)
+            if (v.joints.joints[j].body[s] >= 0) joint_closing_row(&c, i, s, row.jacobian[s]);
+        if (i < c.count) { /* hard */
+            row.gain = 1, row.bias = c.error[i];
+            row.lo = -INFINITY, row.hi = INFINITY;
+        }
+        p.rows[r] = row;
+        joined_put_row(&p, r, i < c.count);
+    }
+    return open;
+}
+
+/* Rows of the part's joints for displacements of its bodies; is any of them to be closed? */
+static __device__ __forceinline__ bool load_closing(const cuda_view &v, const joined_view &p, int32_t *shared_flag)
+{
+    if (threadIdx.x == 0) *shared_flag = 0;
+    __syncthreads();
+    each(p.s.places, [&](int32_t place) {
+        if (load_place(v, p, place)) *shared_flag = 1;
+    });
+    each(6 * p.s.bodies, [&](int32_t k) { p.velocity[k] = p.missing[k] = 0; });
+    load_inertia(v, p);
+    __syncthreads();
+    const bool any = *shared_flag != 0;
+    __syncthreads();
+    return any;
+}
+
+/* Energy that the body of an entry has by its place: as its share of what closing costs begins, and ends. */
+static __device__ __noinline__ void add_energy(const cuda_view &v, int32_t i, bool ends)
+{
+    const struct sadmm_settings settings = *v.model.settings;
+    struct cuda_closed_body *own = &v.joints.closed[i];
+    const double energy =
+        joint_energy2(&v.step.before[i], own->place, own->place + 3, own->place + 7, &settings);
+    own->gained = ends ? own->gained + energy : -energy;
+    if (ends) own->closed = 1;
+}
+
+static __device__ __forceinline__ bool close_part(const cuda_view &v, const joined_view &p, struct close_shared *shared)
+{
+    bool any = false;
+    each(p.s.bodies, [&](int32_t e) {
+        joint_place(v, p.s.body[e], shared->bits, v.joints.closed[p.s.body[e]].place);
+        add_energy(v, p.s.body[e], false);
+    });
+    __syncthreads();
+#pragma unroll 1
+    for (int step = 0; step < JOINT_CLOSE_STEPS && load_closing(v, p, &shared->flag); ++step) {
+        any = true;
+        if (!solve_part<true>(p, nullptr, &shared->flag, &shared->most)) break;
+        each(p.s.bodies, [&](int32_t e) {
+            double *place = v.joints.closed[p.s.body[e]].place;
+            joint_close_move(p.dv + 6 * e, place, place + 3);
+        });
+        __syncthreads();
+    }
+    return any;
+}
+
+template <bool SMALL>
+static __global__ void __launch_bounds__(JOINED_THREADS)
+    joint_close_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    CUDA_DYNAMIC_SHARED(memory);
+    struct close_shared *shared = (struct close_shared *)memory;
+    wait_for_stream();
+    let_next_begin();
+    const int32_t label = joined_label(v, v.joints.parts[blockIdx.x].label - 1);
+    if (threadIdx.x == 0) shared->bits = v.model.live->abort_code ? 0 : v.joints.touch[label];
+    __syncthreads();
+    /* Another part of the island may have said already that it is closed: of one that may be opened alone. */
+    if (!joint_island_may_open(shared->bits)) return;
+    const joined_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
+    if (!close_part(v, p, shared)) return;
+    each(p.s.bodies, [&](int32_t e) { add_energy(v, p.s.body[e], true); });
+    if (threadIdx.x == 0) atomicOr(&v.joints.touch[label], ISLAND_STRAYS | ISLAND_CLOSED);
+}
+
+sadmm_status CUDA(launch_joint_close)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const cuda_args args = {};
+    struct cuda_partition blocks = {};
+    if (c->view.joints.count == 0 || c->step->joined_parts == 0) return SADMM_OK;
+    blocks.parts = c->step->joined_parts;
+    blocks.cluster = 1;
+    blocks.threads = JOINED_THREADS;
+    blocks.shared = sizeof(struct close_shared) + c->step->joined_bytes; /* less than that of joined bodies */
+    return CUDA(launch_partition)(c, joined_is_small(c) ? joint_close_kernel<true> : joint_close_kernel<false>,
+                                  "joints that close", &blocks, &args, error);
+}
+
+cudaError_t CUDA(joint_close_allow)(int shared_limit)
+{
+    return cudaFuncSetAttribute((const void *)joint_close_kernel<true>, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                shared_limit);
+}
