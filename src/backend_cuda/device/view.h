@@ -263,6 +263,7 @@ struct cuda_joined_part {
     int64_t first_number, first_work;
     int32_t numbers, label; /* label: as in joint_view.is_direct */
     int32_t first_body, body_count; /* in joint_view.members */
+    int32_t loop, unused;           /* joined_has_loop */
 };
 
 /* A side of a pair: code 2 pair + side, the number of its body in its part, points of the pair; and those of a part. */
@@ -298,7 +299,8 @@ struct joint_view {
     const struct cuda_joined_part *parts;
     const int32_t *structures;      /* (core/model/joined.h) */
     double *work;
-    int32_t *kept;                  /* parts: solved before the iterations; */
+    int32_t *folds;                 /* parts: a loop may fold (core/model/joint_close.h); */
+    int32_t *kept;                  /* solved before the iterations; */
     uint8_t *kept_state;            /* rows: their state then */
     const int32_t *entry;           /* bodies: number in their part */
     const int32_t *members;         /* bodies of parts, ascending */

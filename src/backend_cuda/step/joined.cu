@@ -5,6 +5,7 @@
 #include "backend_cuda/device/plan_check.h"
 
 #include "backend_cuda/assemble/body.h"
+#include "core/model/joint_close.h"
 #include "joined_contacts.h"
 #include "world.h"
 
@@ -156,6 +157,23 @@ static __device__ __forceinline__ void load_part(const cuda_view &v, const joine
 
 /* ---- what is found ----------------------------------------------------------------------------------------------- */
 
+/* Is any row of its joints about to say what others say? What is left of each is kept for the next step. */
+static __device__ __noinline__ void find_folding(const cuda_view &v, const joined_view &p)
+{
+    int32_t *folds = &v.joints.folds[blockIdx.x];
+    if (threadIdx.x == 0) *folds = 0;
+    __syncthreads();
+    each(p.s.places * JOINED_ROWS, [&](int32_t r) {
+        const int32_t at = row_in_world(p, r);
+        if (p.state[r] == JOINED_ABSENT || p.s.constraint[r / JOINED_ROWS] >= v.joints.first_gear) return;
+        const struct sadmm_joint_source source = v.joints.sources[at];
+        if (source.role != SADMM_ROLE_LOCK) return;
+        const double left = joined_left(&p, r);
+        v.joints.after[source.joint].left[source.coordinate] = left;
+        if (joint_row_folds(v.joints.before[source.joint].left[source.coordinate], left)) *folds = 1;
+    });
+}
+
 /* Before the iterations: what these start from. After them, or where there are none: what the end of the step reads. */
 static __device__ __forceinline__ void store_part(const cuda_view &v, const joined_view &p, bool after, bool solved)
 {
@@ -174,6 +192,7 @@ static __device__ __forceinline__ void store_part(const cuda_view &v, const join
         v.joints.solution[at] = lambda;
         if (!after && !v.joints.apart) v.rows.data[at].lambda = (solver_real)lambda;
     });
+    if (v.joints.parts[blockIdx.x].loop) find_folding(v, p);
     if (threadIdx.x > 0) return;
     if (!after) v.joints.kept[blockIdx.x] = solved;
     if (!solved) v.step.control->joints.together = 1;

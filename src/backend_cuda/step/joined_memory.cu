@@ -16,7 +16,7 @@
 struct joined_memory {
     struct cuda_joined_part *parts;
     struct cuda_joined_range *ranges;
-    int32_t *is_direct, *entry, *members, *kept, *structures;
+    int32_t *is_direct, *entry, *members, *folds, *kept, *structures;
     uint8_t *kept_state; /* rows */
     size_t given;        /* bytes until here */
     struct cuda_joined_body *bodies;
@@ -33,7 +33,8 @@ static struct joined_memory memory_at(char *at, const struct cuda_step *s)
     m.is_direct = (int32_t *)(m.ranges + s->joined_parts);
     m.entry = m.is_direct + s->bodies + s->joint_constraints;
     m.members = m.entry + s->bodies;
-    m.kept = m.members + s->bodies;
+    m.folds = m.members + s->bodies;
+    m.kept = m.folds + s->joined_parts;
     m.structures = m.kept + s->joined_parts;
     m.kept_state = (uint8_t *)(m.structures + s->joined_numbers);
     m.given = ((size_t)((char *)(m.kept_state + rows) - at) + sizeof(double) - 1) / sizeof(double) * sizeof(double);
@@ -89,7 +90,7 @@ static void fill(const struct cuda_step *s, const struct sadmm_joined_order *ord
         const int32_t label = 1 + *std::min_element(part.body, part.body + part.bodies);
         const struct cuda_joined_part at = {(int64_t)order->first[k], (int64_t)work,
                                             (int32_t)(order->first[k + 1] - order->first[k]), label, members,
-                                            part.bodies};
+                                            part.bodies, joined_has_loop(&part), 0};
         m->parts[k] = at;
         memcpy(m->members + members, part.body, (size_t)part.bodies * sizeof *part.body);
         std::sort(m->members + members, m->members + members + part.bodies);
@@ -149,6 +150,7 @@ void CUDA(view_joined)(struct sadmm_context *c)
     joints->work = m.work;
     joints->parts = m.parts;
     joints->is_direct = m.is_direct;
+    joints->folds = m.folds;
     joints->kept = m.kept;
     joints->structures = m.structures;
     joints->kept_state = m.kept_state;

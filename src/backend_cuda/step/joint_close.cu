@@ -16,8 +16,8 @@ struct close_shared {
     int32_t bits, flag; /* of its island, but what this kernel says of it; */
 };
 
-/* Joint j as its bodies' places have it; is it to be closed? */
-static __device__ __noinline__ bool closing_of(const cuda_view &v, int32_t j, struct joint_closing *out)
+/* Joint j as its bodies' places have it; is it to be closed? folds: it is of a part that does. */
+static __device__ __noinline__ bool closing_of(const cuda_view &v, int32_t j, bool folds, struct joint_closing *out)
 {
     const struct sadmm_resident_joint *joint = &v.joints.joints[j];
     const struct sadmm_settings settings = *v.model.settings;
@@ -32,19 +32,20 @@ static __device__ __noinline__ bool closing_of(const cuda_view &v, int32_t j, st
         scale += joint_closing_scale(&end[s], moves[s] ? body.rigid : nullptr);
     }
     *out = joint_closing_of(&joint->def, start, end, scale, &settings);
+    if (folds) return out->share > JOINT_CLOSE_FOLDING;
     return !joint_opens_little(&joint->def, end, moves, joint_opening(&joint->def, end)) &&
            out->share > JOINT_CLOSE_FROM;
 }
 
 /* Rows of a place: of the joint that has its first constraint there; is that to be closed? */
-static __device__ __forceinline__ bool load_place(const cuda_view &v, const joined_view &p, int32_t place)
+static __device__ __forceinline__ bool load_place(const cuda_view &v, const joined_view &p, int32_t place, bool folds)
 {
     const int32_t j = v.joints.closing[p.s.constraint[place]];
     const bool closes = j >= 0 && joint_closes(v.joints, j);
     struct joint_closing c;
     bool open = false;
     c.count = 0;
-    if (closes) open = closing_of(v, j, &c);
+    if (closes) open = closing_of(v, j, folds, &c);
     for (int i = 0; i < JOINED_ROWS; ++i) {
         const int32_t r = JOINED_ROWS * place + i;
         struct joined_row row = {};
@@ -61,12 +62,13 @@ static __device__ __forceinline__ bool load_place(const cuda_view &v, const join
 }
 
 /* Rows of the part's joints for displacements of its bodies; is any of them to be closed? */
-static __device__ __forceinline__ bool load_closing(const cuda_view &v, const joined_view &p, int32_t *shared_flag)
+static __device__ __forceinline__ bool load_closing(const cuda_view &v, const joined_view &p, bool folds,
+                                                    int32_t *shared_flag)
 {
     if (threadIdx.x == 0) *shared_flag = 0;
     __syncthreads();
     each(p.s.places, [&](int32_t place) {
-        if (load_place(v, p, place)) *shared_flag = 1;
+        if (load_place(v, p, place, folds)) *shared_flag = 1;
     });
     each(6 * p.s.bodies, [&](int32_t k) { p.velocity[k] = p.missing[k] = 0; });
     load_inertia(v, p);
@@ -87,7 +89,19 @@ static __device__ __noinline__ void add_energy(const cuda_view &v, int32_t i, bo
     if (ends) own->closed = 1;
 }
 
-static __device__ __forceinline__ bool close_part(const cuda_view &v, const joined_view &p, struct close_shared *shared)
+/* Velocities of what folds, along what its joints leave it at the end, as on the host. */
+static __device__ __noinline__ void turn_speeds(const cuda_view &v, const joined_view &p, struct close_shared *shared)
+{
+    load_closing(v, p, true, &shared->flag);
+    each(p.s.places * JOINED_ROWS, [&](int32_t r) { p.rows[r].bias = 0; });
+    each(6 * p.s.bodies, [&](int32_t k) { p.velocity[k] = v.joints.closed[p.s.body[k / 6]].place[7 + k % 6]; });
+    __syncthreads();
+    if (!solve_part<true>(p, nullptr, &shared->flag, &shared->most)) return;
+    each(6 * p.s.bodies, [&](int32_t k) { v.joints.closed[p.s.body[k / 6]].place[7 + k % 6] += p.dv[k]; });
+}
+
+static __device__ __forceinline__ bool close_part(const cuda_view &v, const joined_view &p, bool folds,
+                                                  struct close_shared *shared)
 {
     bool any = false;
     each(p.s.bodies, [&](int32_t e) {
@@ -96,7 +110,7 @@ static __device__ __forceinline__ bool close_part(const cuda_view &v, const join
     });
     __syncthreads();
 #pragma unroll 1
-    for (int step = 0; step < JOINT_CLOSE_STEPS && load_closing(v, p, &shared->flag); ++step) {
+    for (int step = 0; step < JOINT_CLOSE_STEPS && load_closing(v, p, folds, &shared->flag); ++step) {
         any = true;
         if (!solve_part<true>(p, nullptr, &shared->flag, &shared->most)) break;
         each(p.s.bodies, [&](int32_t e) {
@@ -120,11 +134,14 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     if (threadIdx.x == 0) shared->bits = v.model.live->abort_code ? 0 : v.joints.touch[label];
     __syncthreads();
     /* Another part of the island may have said already that it is closed: of one that may be opened alone. */
-    if (!joint_island_may_open(shared->bits)) return;
+    const bool folds = !v.model.live->abort_code && v.joints.folds[blockIdx.x];
+    if (!folds && !joint_island_may_open(shared->bits)) return;
     const joined_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
-    if (!close_part(v, p, shared)) return;
+    if (!close_part(v, p, folds, shared) && !folds) return;
     each(p.s.bodies, [&](int32_t e) { add_energy(v, p.s.body[e], true); });
-    if (threadIdx.x == 0) atomicOr(&v.joints.touch[label], ISLAND_STRAYS | ISLAND_CLOSED);
+    __syncthreads();
+    if (folds) turn_speeds(v, p, shared);
+    if (threadIdx.x == 0) atomicOr(&v.joints.touch[label], ISLAND_CLOSED);
 }
 
 sadmm_status CUDA(launch_joint_close)(struct sadmm_context *c, struct sadmm_error *error)

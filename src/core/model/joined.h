@@ -108,6 +108,15 @@ struct joined_row {
     double lambda;                         /* its multiplier as it was */
 };
 
+/* Constraints that only hang bodies on each other, or on what is not solved for, make no loop. */
+SADMM_INLINE bool joined_has_loop(const struct joined_structure *s)
+{
+    int32_t ground = 0, k;
+    for (k = 0; k < 2 * s->places; ++k)
+        if (s->side[k] < 0) ground = 1;
+    return s->places >= s->bodies + ground;
+}
+
 struct joined_view {
     struct joined_structure s;
     /* by row: */

@@ -12,8 +12,8 @@
 
 /* Of islands. TOUCHED: by a contact; HELD: by one, or by a joint, that leaves it no motion (math/momentum.h); RESTORED: on
  * a device, its momentum is (joint_momentum.h); TURNS: rows of it turn by more than a step resolves; POWERED: springs,
- * drives or armatures act; MOORED: rows hold it to what does not move by itself; STRAYS: joints stiffen its bodies, or
- * have been closed; CLOSED: on a device, they have been. */
+ * drives or armatures act; MOORED: rows hold it to what does not move by itself; STRAYS: joints stiffen its bodies;
+ * CLOSED: its joints have been closed. */
 enum {
     ISLAND_JOINED = 1,
     ISLAND_LEADS_STAY = 2,

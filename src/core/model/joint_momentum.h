@@ -20,7 +20,7 @@ SADMM_INLINE bool joint_island_is_loose(int bits)
 {
     if (!(bits & ISLAND_JOINED) || bits & ISLAND_HELD) return false;
     if (bits & ISLAND_MOORED) return bits & (ISLAND_TOUCHED | ISLAND_LEADS_STAY) && !(bits & ISLAND_TURNS);
-    return (bits & (ISLAND_TOUCHED | ISLAND_LEADS_STAY | ISLAND_STRAYS)) != 0;
+    return (bits & (ISLAND_TOUCHED | ISLAND_LEADS_STAY | ISLAND_STRAYS | ISLAND_CLOSED)) != 0;
 }
 
 /* Sums over an island; then what restores it: velocities times `factor`, the rigid motion in sums.now, and what all of it

@@ -45,15 +45,6 @@ static bool same_graph(const struct solving *s)
     return true;
 }
 
-/* Constraints that only hang bodies on each other, or on what is not solved for, make no loop. */
-static bool has_loop(const struct joined_structure *s)
-{
-    int32_t ground = 0;
-    for (int32_t k = 0; k < 2 * s->places; ++k)
-        if (s->side[k] < 0) ground = 1;
-    return s->places >= s->bodies + ground;
-}
-
 /* Views, and which bodies they have. */
 static bool make_parts(struct sadmm_joined *j, size_t bodies)
 {
@@ -76,8 +67,8 @@ static bool make_parts(struct sadmm_joined *j, size_t bodies)
     j->loops = false;
     for (int32_t k = 0; k < j->order.parts; ++k) {
         const struct joined_structure s = sadmm_joined_part(&j->order, k);
-        j->loops = j->loops || has_loop(&s);
-        j->parts[k] = (struct joined_part){.view = joined_view_at(&s, j->work + work), .loop = has_loop(&s), .impulse = j->impulse + 6 * joined,
+        j->loops = j->loops || joined_has_loop(&s);
+        j->parts[k] = (struct joined_part){.view = joined_view_at(&s, j->work + work), .loop = joined_has_loop(&s), .impulse = j->impulse + 6 * joined,
                                     .kept_velocity = j->kept_velocity + 6 * joined,
                                     .kept_state = j->kept_states + JOINED_ROWS * places};
         for (int32_t e = 0; e < s.bodies; ++e) {
@@ -262,6 +253,15 @@ bool sadmm_joined_find_left(const struct sadmm_joined *joined, const struct sadm
         if (joined->parts[k].loop) EACH_JOINED_ROW(slots, v, r, from) left[from] = joined_left(v, r);
     }
     return joined->loops;
+}
+
+void sadmm_joined_mark_parts(const struct sadmm_joined *joined, uint8_t *bodies)
+{
+    for (int32_t k = 0; k < joined->order.parts; ++k) {
+        const struct joined_part *part = &joined->parts[k];
+        if (!has_any(part, bodies)) continue;
+        for (int32_t e = 0; e < part->view.s.bodies; ++e) bodies[part->view.s.body[e]] = true;
+    }
 }
 
 /* ---- at the end of a step ---------------------------------------------------------------------------------------- */

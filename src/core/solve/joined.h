@@ -54,6 +54,9 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
  * is. Is there any such part? slots: as above. */
 bool sadmm_joined_find_left(const struct sadmm_joined *joined, const struct sadmm_row_constraint *slots, double *left);
 
+/* Marks all bodies (of the system) of parts that have a marked one. */
+void sadmm_joined_mark_parts(const struct sadmm_joined *joined, uint8_t *bodies);
+
 /* Moves `bodies` (what the step has made of the system's), of parts that have one of `opened`, by the least displacements,
  * weighed by A, that take away the errors (biases) of system->rows, which are hard. speeds: not places but velocities are
  * changed, by the least that gives the rows the rates that biases ask for. Parts that cannot be solved stay.

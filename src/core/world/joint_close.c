@@ -112,12 +112,12 @@ static bool find_open(sadmm_world *world, const sadmm_settings *settings, double
 static void mark_islands(const sadmm_world *world, const uint8_t *bodies)
 {
     for (int32_t i = 0; i < world->dynamic_count; ++i)
-        if (bodies[i]) world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
+        if (bodies[i]) world->joint_touch[world->joint_labels[i]] |= ISLAND_CLOSED;
 }
 
 /* ---- what folds -------------------------------------------------------------------------------------------------- */
 
-/* Which bodies have joints that fold; what is left of rows is kept for the next step. Are there any? */
+/* Which bodies are of parts that fold; what is left of rows is kept for the next step. Are there any? */
 static sadmm_status find_folding(sadmm_world *world, bool *any)
 {
     const size_t n = (size_t)world->dynamic_count, rows = world->joint_rows;
@@ -127,7 +127,6 @@ static sadmm_status find_folding(sadmm_world *world, bool *any)
         return sadmm_fail_memory(&world->error, "joints that fold");
     memset(world->folding, 0, n);
     memset(world->row_left, 0, world->start.rows.row_count * sizeof *world->row_left);
-    if (world->kernels->resident) return SADMM_OK; /* a device would not do it */
     if (!sadmm_joined_find_left(world->joined, world->joint_constraints, world->row_left)) return SADMM_OK;
     for (size_t r = 0; r < rows; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
@@ -140,6 +139,7 @@ static sadmm_status find_folding(sadmm_world *world, bool *any)
         }
         *was = world->row_left[r];
     }
+    if (*any) sadmm_joined_mark_parts(world->joined, world->folding);
     return SADMM_OK;
 }
 
@@ -202,12 +202,17 @@ static void begin_costs(sadmm_world *world, const sadmm_settings *settings)
         world->closing_costs[i].gained = -energy2(&world->next[i], settings);
 }
 
-static void pay_costs(sadmm_world *world, const sadmm_settings *settings)
+static void end_costs(sadmm_world *world, const sadmm_settings *settings)
+{
+    for (int32_t i = 0; i < world->dynamic_count; ++i)
+        world->closing_costs[i].gained += energy2(&world->next[i], settings);
+}
+
+static void pay_costs(sadmm_world *world)
 {
     struct joint_closing_cost *costs = world->closing_costs;
     for (int32_t i = 0; i < world->dynamic_count; ++i) { /* an island's first body comes first */
         struct joint_closing_cost *sum = &costs[world->joint_labels[i]];
-        costs[i].gained += energy2(&world->next[i], settings);
         costs[i].moving = joint_motion_energy2(&world->next[i], world->next[i].orientation, world->next[i].velocity);
         if (sum == &costs[i]) continue;
         sum->gained += costs[i].gained;
@@ -215,7 +220,7 @@ static void pay_costs(sadmm_world *world, const sadmm_settings *settings)
     }
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         const struct joint_closing_cost *sum = &costs[world->joint_labels[i]];
-        if (!(world->joint_touch[world->joint_labels[i]] & ISLAND_STRAYS)) continue;
+        if (!(world->joint_touch[world->joint_labels[i]] & ISLAND_CLOSED)) continue;
         const double keep = joint_closing_keep(sum->gained, sum->moving);
         for (int k = 0; k < 6; ++k) world->next[i].velocity[k] *= keep;
     }
@@ -242,14 +247,18 @@ sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *
     bool any = false, folding = false;
     TRY(find_folding(world, &folding));
     system.rows = &world->closing;
+    if (folding) begin_costs(world, settings);
     for (int step = 0; find_open(world, settings, off) && step < JOINT_CLOSE_STEPS; ++step) {
-        if (!any) begin_costs(world, settings);
+        if (!any && !folding) begin_costs(world, settings);
         any = true;
         if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
         mark_islands(world, world->opened);
         TRY(sadmm_joined_close(world->joined, &system, world->closing_slots, world->joint_constraint_count, settings,
                                world->opened, false, world->next, &world->error));
     }
-    if (any) pay_costs(world, settings);
-    return folding ? turn_speeds(world, &system, settings) : SADMM_OK;
+    if (!any && !folding) return SADMM_OK;
+    end_costs(world, settings);
+    if (folding) TRY(turn_speeds(world, &system, settings));
+    pay_costs(world);
+    return SADMM_OK;
 }
