@@ -2,7 +2,7 @@
  *
  * By conservative advancement: no point of either comes closer along the normal of the distance than the centres of mass
  * and the rotations allow, so that the pair is moved on by what that takes, and again from there. Near the touch the
- * points that approach are followed to where their separation is 0. Host alone, in double. */
+ * points that approach are followed to where their separation is 0. In double; first_touch_math.h is for devices as well. */
 #ifndef SADMM_COLLISION_FIRST_TOUCH_H
 #define SADMM_COLLISION_FIRST_TOUCH_H
 
