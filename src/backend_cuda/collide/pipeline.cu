@@ -43,6 +43,8 @@ extern "C" sadmm_status COLLISION(create)(int device, struct sadmm_cuda_collisio
     COLLISION(narrow_smooth_kernels)(&c->kernels);
     COLLISION(seam_kernels)(&c->kernels);
     COLLISION(matching_kernels)(&c->kernels);
+    COLLISION(hits_take_kernels)(&c->hits_kernels);
+    COLLISION(hits_contacts_kernels)(&c->hits_kernels);
     *out = c;
     return SADMM_OK;
 }

@@ -38,6 +38,7 @@ static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, s
         TRY(CUDA(clear_abort)(c, error));
         TRY(CUDA(launch_start)(c, error));
         TRY(CUDA(launch_joint_rows)(c, error));
+        TRY(CUDA(enqueue_hits)(c, 0, error));
         TRY(CUDA(enqueue_find)(c, 0, error));
         TRY(CUDA(enqueue_statistics)(c, true, error));
         TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));

@@ -143,6 +143,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(CUDA(reserve)(c, BUFFER_WORLD_VELOCITY, 6 * n * sizeof(double), error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_SLOTS, n * sizeof *world->slot_of, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_PLACES, slots * sizeof(struct sadmm_collision_body), error));
+    if (world->held) TRY(CUDA(reserve)(c, BUFFER_WORLD_HIT, 2 * n * sizeof *world->rigid, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_CONTROL, sizeof(struct cuda_step_control), error));
     TRY(CUDA(reserve)(c, PINNED_REPORTS, STEPS_AHEAD * sizeof(struct cuda_step_report), error));
     CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_WORLD_CONTROL), 0, sizeof(struct cuda_step_control), c->stream),
@@ -184,6 +185,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                           buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),
                           &c->view.model.live->abort_code, &kept->settings.dt, &kept->gravity, error));
+    TRY(COLLISION(load_hits)(s->collision, c->stream, world->held, s->bodies, error));
     CUDA(view_into)(c, s->into, 0);
     return CUDA(wait)(c, error);
 }

@@ -65,6 +65,7 @@ struct cuda_step {
 
     struct substep_plan plans[SADMM_MOST_SUBSTEPS];
     struct learned learned;
+    struct sadmm_cuda_hits hits; /* of the (sub-)step that is being enqueued (takes_hits) */
     int64_t careful;            /* so many steps more look for candidates in every sub-step: shapes left their reach */
 
     /* The queue: steps [seen, enqueued), at most STEPS_AHEAD. */
@@ -95,6 +96,12 @@ static inline struct cuda_step_report *step_reports(const struct sadmm_context *
 /* The next step is planned anew: there are no graphs of it. */
 static inline void forget_graphs(struct cuda_step *s) { s->graphs[false].recorded = s->graphs[true].recorded = false; }
 
+/* Are hits of bodies in flight taken at their moment (collide/hits.h)? */
+static inline bool takes_hits(const struct sadmm_context *c)
+{
+    return c->settings.hits > 0 && COLLISION(takes_hits)(c->step->collision);
+}
+
 /* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
 static inline bool stop_rule_checked(const struct sadmm_context *c)
 {
@@ -120,6 +127,8 @@ struct substep_plan CUDA(plan_of)(const struct sadmm_context *, int32_t pairs, i
 bool CUDA(may_be_apart)(const struct sadmm_context *);
 /* guess.cu: *a becomes what a partition for both needs. */
 void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_graph_statistics *b);
+/* record.cu: where there are hits, what a (sub-)step begins with after them is what it begins with from here on; */
+sadmm_status CUDA(enqueue_hits)(struct sadmm_context *, int substep, struct sadmm_error *error);
 /* record.cu: contacts, up to the gate. */
 sadmm_status CUDA(enqueue_find)(struct sadmm_context *, int substep, struct sadmm_error *error);
 /* record.cu: the graph of a step that writes state and set `into`; edited: its edits come first. */

@@ -246,7 +246,7 @@ SADMM_INLINE double flyers_overlap_of_held(const struct sadmm_flight *a, const s
                    at_b = v3_add(linear[1], v3_cross(spin[1], hit->arm[1][k]));
         parts = fmin(parts, v3_dot(hit->frame.r[0], v3_sub(at_b, at_a)));
     }
-    return falls > 0 && parts < falls * left ? fmax(parts, 0) * time + falls * time * time / 2 : 0;
+    return falls > 0 && parts < falls * left ? fmax(parts, 0.0) * time + falls * time * time / 2 : 0;
 }
 
 /* Both go on from the hit, which is solved. */

@@ -255,18 +255,23 @@ static unsigned char flyer_kind(const struct sadmm_world_body *body, double dt)
     return flyer_is_damped(&body->rigid, dt) ? SADMM_FLYER_NONE : SADMM_FLYER_DYNAMIC;
 }
 
+void sadmm_world_mark_held(const sadmm_world *world, unsigned char *bodies, unsigned char mark)
+{
+    for (size_t k = 0; k < world->joint_slots; ++k) {
+        const struct sadmm_world_joint *joint = &world->joints[k];
+        for (int side = 0; joint->alive && side < 2; ++side)
+            if (joint->body[side] >= 0 && world->bodies[joint->body[side]].type == SADMM_BODY_DYNAMIC)
+                bodies[joint->body[side]] = mark;
+    }
+}
+
 static void mark_bodies(struct taking *t)
 {
     const sadmm_world *world = t->world;
     unsigned char *flyers = t->hits->flyers;
     for (size_t slot = 0; slot < world->body_slots; ++slot)
         flyers[slot] = flyer_kind(&world->bodies[slot], t->settings.dt);
-    for (size_t k = 0; k < world->joint_slots; ++k) {
-        const struct sadmm_world_joint *joint = &world->joints[k];
-        for (int side = 0; joint->alive && side < 2; ++side)
-            if (joint->body[side] >= 0 && flyers[joint->body[side]] == SADMM_FLYER_DYNAMIC)
-                flyers[joint->body[side]] = SADMM_FLYER_NONE;
-    }
+    sadmm_world_mark_held(world, flyers, SADMM_FLYER_NONE);
     sadmm_collision_mark_pressed(world->collision, &world->contacts, flyers);
 }
 
@@ -394,14 +399,27 @@ static sadmm_status take_most(struct taking *t)
     return SADMM_OK;
 }
 
+/* Not where devices do not take them (backend_cuda/collide/hits.h), whoever makes the step. */
+bool sadmm_world_may_hit(const sadmm_world *world)
+{
+    if (world->bouncing_count == 0) return false;
+    if (world->kernels->backend != SADMM_BACKEND_CUDA) return true;
+    for (size_t slot = 0; slot < world->shape_slots; ++slot) {
+        const struct sadmm_shape *shape = &world->shapes[slot];
+        if (!sadmm_shape_collides(shape)) continue;
+        const struct sadmm_geometry *geometry = &world->geometries[shape->geometry];
+        if (geometry->type == SADMM_SHAPE_MESH || geometry_is_smooth(geometry)) return false;
+    }
+    return true;
+}
+
 sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep)
 {
     struct taking t = {.world = world, .settings = sadmm_settings_of_substep(&world->def.settings)};
     forget(world);
     if (substep == 0) world->start.hit_count = 0;
     world->start.hit_first = world->start.hit_count;
-    if (world->bouncing_count == 0 || t.settings.hits == 0 || world->kernels->backend == SADMM_BACKEND_CUDA ||
-        !any_fast(world, t.settings.restitution_threshold))
+    if (t.settings.hits == 0 || !sadmm_world_may_hit(world) || !any_fast(world, t.settings.restitution_threshold))
         return SADMM_OK;
     if (!world->hits) world->hits = (struct sadmm_hits *)sadmm_alloc(1, sizeof *world->hits);
     if (!world->hits || !reserve(world->hits, world->body_slots)) return sadmm_fail_memory(&world->error, "hits");

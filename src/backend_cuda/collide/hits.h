@@ -1,0 +1,92 @@
+/* Hits of bodies in flight, each at its moment (core/world/hits.c says what for), on the device: between the candidates of
+ * a step and its contacts.
+ *
+ *   list      candidates that are fast; bodies that something presses on; the step's start is copied
+ *   foresee   when each of these pairs of flyers first touches                     a thread a pair
+ *   take      hits in the order of time, and what the two come near from then on   one block
+ *   replace   shapes of what was hit, where they are now; the candidates are looked for again
+ *   later     manifolds of what was hit, in what is left of the step               a thread a candidate, after `narrow`
+ *   reopen    their points, and gaps of flyers                                     after `emit`
+ *
+ * Where nothing is fast all of them return at once. Lists have no order, and results do not depend on it: the next hit is
+ * that of the least (time, key), a list's length and what becomes of it are the same in any order. Of worlds without
+ * meshes and smooth bodies; others have none of it. Formulas are the host's: core/world/flyer.h, collision/
+ * first_touch_math.h, core/math/hit.h. */
+#ifndef SADMM_CUDA_COLLIDE_HITS_H
+#define SADMM_CUDA_COLLIDE_HITS_H
+
+#include "collision/first_touch.h"
+#include "view.h"
+
+enum {
+    HIT_THREADS = 128,       /* a block of `list`, `replace`, `reopen` */
+    FORESEE_THREADS = 32,    /* long chains of arithmetic */
+    FORESEE_BLOCKS = 512,
+#ifdef SADMM_CUDA_EMULATED
+    TAKE_THREADS = 32, /* which are fibers of one: results do not depend on it */
+#else
+    TAKE_THREADS = 256,      /* of the one block */
+#endif
+    TAKE_SHAPES = 64,        /* of a body that was hit; with more, steps have no hits */
+    TAKE_TIMES = 4,          /* as MOST_TIMES of the host */
+    HIT_ROOM = 1024,         /* for hits that are foreseen at a time, ... */
+    HIT_ROOM_A_SHAPE = 4,    /* ... and so much more a shape; with more, a (sub-)step has no hits */
+    HIT_RECORDS = 4096,      /* points of a step's hits, ... */
+    HIT_RECORDS_A_BODY = 2   /* ... and so many more a body; likewise */
+};
+
+/* In device memory. */
+struct hits_state {
+    unsigned long long listed, foreseen, lost, near, shapes; /* counters; near, shapes: of a body that was hit */
+    uint64_t epoch;      /* (sub-)steps so far: marks of an earlier one do not count */
+    uint64_t followed;   /* the mark of this (sub-)step's flyers, whose flights are known; 0: there are none */
+    int32_t quiet;       /* not 0: nothing was hit, or the step is aborted */
+    int32_t records[2], first[2]; /* by step: hits; from where on they are the last sub-step's */
+};
+
+/* A hit that is foreseen. */
+struct foreseen_hit {
+    uint64_t key; /* slot of a << 32 | slot of b */
+    int32_t body[2];
+    uint32_t hits[2];
+    struct sadmm_first_touch touch;
+};
+
+/* By body slot. */
+struct hit_marks {
+    uint64_t pressed, followed, lost; /* in which (sub-)step */
+};
+
+struct hits_view {
+    struct collision_view c;
+    struct sadmm_cuda_hits step;
+    struct hits_state *state;
+    struct hit_marks *marks;
+    const uint8_t *held;            /* by body slot: joints hold it */
+    unsigned char *kinds;           /* by body slot: enum sadmm_flyer */
+    struct flyer *flyers;           /* by body slot */
+    double *since;                  /* by body slot: of its last hit, s */
+    double *impulse;                /* by body slot x 6: what its hits gave it, N s, N m s */
+    int32_t *listed;                /* candidates */
+    struct foreseen_hit *foreseen;
+    int64_t foreseen_capacity;
+    struct sadmm_box3 *boxes;       /* of leaves, as `present`: from the last hit on */
+    uint64_t *near;                 /* keys; leaves + planes of them */
+    struct sadmm_world_hit *records; /* two steps of record_capacity */
+    int32_t record_capacity, shape_count;
+    bool few;                       /* candidates are ranked: the list need not be cleared */
+};
+
+struct hits_launch {
+    void (*kernel)(const hits_view);
+    int threads;
+    size_t shared;
+    const char *name;
+};
+struct hits_kernels {
+    struct hits_launch list, foresee, take, replace, later, reopen, give;
+};
+void COLLISION(hits_take_kernels)(struct hits_kernels *kernels);
+void COLLISION(hits_contacts_kernels)(struct hits_kernels *kernels);
+
+#endif

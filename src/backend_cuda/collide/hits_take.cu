@@ -1,0 +1,535 @@
+/* Hits: from candidates to what is left when all have been taken (hits.h). */
+#define SADMM_WITHOUT_SMOOTH
+#include "hits.h"
+
+/* C headers: an enumerator beside an unsigned number is fine there. */
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wextra"
+#include "collision/first_touch_math.h"
+#include "collision/flyers.h"
+#include "core/world/flyer.h"
+#pragma GCC diagnostic pop
+
+/* ---- list -------------------------------------------------------------------------------------------------------- */
+
+static __device__ __forceinline__ bool shape_is_there(const hits_view &v, int32_t slot)
+{
+    return slot >= 0 && slot < v.shape_count && v.c.shapes[slot].alive && !v.c.shapes[slot].sensor;
+}
+
+/* Does the last step's pair press? */
+static __device__ __forceinline__ bool pair_presses(const hits_view &v, const struct sadmm_contact_pair &pair)
+{
+    if (!shape_is_there(v, pair.shape_a) || !shape_is_there(v, pair.shape_b)) return false;
+    if (pair.revision != word_of_pair(v.c.proxies[pair.shape_a].revision, v.c.proxies[pair.shape_b].revision))
+        return false;
+    for (int32_t k = pair.first; k < pair.first + pair.count; ++k)
+        if (sadmm_normal_impulse(&pair, &v.c.before.points[k]) > 0) return true;
+    return false;
+}
+
+/* As sadmm_collision_list_fast on the host. */
+static __device__ __forceinline__ bool is_fast(const hits_view &v, const struct collision_step &step, double threshold,
+                                               const struct candidate &own)
+{
+    const struct sadmm_proxy &a = v.c.proxies[own.a], &b = v.c.proxies[own.b];
+    const bool both = a.system_body >= 0 && b.system_body >= 0; /* they fall alike */
+    if (own.child > 0 || !(a.restitution > 0 || b.restitution > 0)) return false;
+    const double way = relative_speed(a.velocity, b.velocity) * step.dt + a.spin + b.spin + a.fall + b.fall +
+                       (both ? 0 : fall_of(step.gravity, step.dt));
+    return way > threshold * step.dt;
+}
+
+static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_constant__ hits_view v)
+{
+    follow_if(v.c.early);
+    const int64_t thread = collision_thread(HIT_THREADS), stride = (int64_t)gridDim.x * HIT_THREADS;
+    if (aborted(v.c)) return;
+    if (thread == 0) v.state->followed = 0;
+    const struct collision_step step = step_of(v.c);
+    const double threshold = v.step.settings->restitution_threshold;
+    const uint64_t epoch = v.state->epoch + 1;
+    const int64_t candidates = usable_candidates(v.c), pairs = v.c.before.counts->pairs;
+    const int64_t pieces = (int64_t)v.step.body_count * (int64_t)(sizeof(struct sadmm_rigid) / sizeof(wide_piece));
+    for (int64_t i = thread; i < pieces; i += stride) ((wide_piece *)v.step.start)[i] = ((const wide_piece *)v.step.before)[i];
+    for (int64_t i = thread; i < candidates; i += stride)
+        if (is_fast(v, step, threshold, candidate_of(v.c, v.c.candidates[i])))
+            v.listed[atomicAdd(&v.state->listed, 1ull)] = (int32_t)i;
+    for (int64_t p = thread; p < pairs; p += stride) {
+        const struct sadmm_contact_pair &pair = v.c.before.pairs[p];
+        if (!pair_presses(v, pair)) continue;
+        v.marks[v.c.proxies[pair.shape_a].body].pressed = epoch;
+        v.marks[v.c.proxies[pair.shape_b].body].pressed = epoch;
+    }
+}
+
+/* ---- flyers ------------------------------------------------------------------------------------------------------ */
+
+static __device__ __forceinline__ unsigned char kind_of(const hits_view &v, int32_t slot, uint64_t epoch)
+{
+    const int32_t system = v.c.bodies[slot].system_body;
+    if (system < 0) return SADMM_FLYER_FIXED;
+    return v.held[slot] || v.marks[slot].pressed == epoch ||
+                   flyer_is_damped(&v.step.before[system], v.step.settings->dt)
+               ? SADMM_FLYER_NONE
+               : SADMM_FLYER_DYNAMIC;
+}
+
+static __device__ __forceinline__ bool kinds_hit(unsigned char a, unsigned char b)
+{
+    return a != SADMM_FLYER_NONE && b != SADMM_FLYER_NONE && (a == SADMM_FLYER_DYNAMIC || b == SADMM_FLYER_DYNAMIC);
+}
+
+static __device__ __noinline__ void load_flyer(const hits_view &v, int32_t slot, struct flyer *f)
+{
+    const struct sadmm_collision_body &body = v.c.bodies[slot];
+    memset(f, 0, sizeof *f);
+    f->slot = slot;
+    f->dynamic = body.system_body >= 0 ? body.system_body : -1;
+    f->driven = sadmm_body_is_driven(body.system_body) ? sadmm_driven(body.system_body) : -1;
+    if (f->dynamic >= 0) {
+        f->start = v.step.before[f->dynamic];
+    } else {
+        memcpy(f->start.position, body.position, sizeof body.position);
+        memcpy(f->start.orientation, body.orientation, sizeof body.orientation);
+        memcpy(f->start.velocity, body.velocity, sizeof body.velocity);
+    }
+    flyer_begin(f, v.step.settings);
+}
+
+static __device__ __forceinline__ struct sadmm_flying_shape flying(const hits_view &v, uint32_t slot,
+                                                                   const struct sadmm_flight *flight)
+{
+    const struct sadmm_shape *shape = &v.c.shapes[slot];
+    return {shape, &v.c.geometries[shape->geometry], flight};
+}
+
+/* When do two shapes hit each other, from `from` on? Into the list; what does not fit is counted. */
+static __device__ __noinline__ void foresee(const hits_view &v, uint64_t key, const struct flyer *a,
+                                            const struct flyer *b, double from, uint64_t epoch, uint64_t mark)
+{
+    struct foreseen_hit hit;
+    struct sadmm_flying_pair pair = {flying(v, (uint32_t)(key >> 32), &a->flight),
+                                     flying(v, (uint32_t)key, &b->flight),
+                                     v.c.hulls,
+                                     0,
+                                     v.step.settings->restitution_threshold,
+                                     false};
+    v.marks[a->slot].followed = v.marks[b->slot].followed = mark;
+    const bool found = flying_first_touch(&pair, from, v.step.settings->dt, &hit.touch);
+    if (pair.lost) {
+        v.marks[a->slot].lost = v.marks[b->slot].lost = epoch;
+        atomicAdd(&v.state->lost, 1ull);
+    }
+    if (!found) return;
+    hit.key = key;
+    hit.body[0] = a->slot;
+    hit.body[1] = b->slot;
+    hit.hits[0] = a->hits;
+    hit.hits[1] = b->hits;
+    const unsigned long long at = atomicAdd(&v.state->foreseen, 1ull);
+    if ((int64_t)at < v.foreseen_capacity) v.foreseen[at] = hit;
+}
+
+/* Of flyers that were looked at the times + 1st time. */
+static __device__ __forceinline__ uint64_t followed_mark(uint64_t epoch, int times) { return epoch * TAKE_TIMES + times; }
+
+static __global__ void __launch_bounds__(FORESEE_THREADS) foresee_kernel(const __grid_constant__ hits_view v)
+{
+    follow_if(v.c.early);
+    const int64_t thread = collision_thread(FORESEE_THREADS), stride = (int64_t)gridDim.x * FORESEE_THREADS;
+    if (aborted(v.c)) return;
+    const int64_t count = (int64_t)v.state->listed;
+    const uint64_t epoch = v.state->epoch + 1;
+    for (int64_t j = thread; j < count; j += stride) {
+        const struct candidate own = candidate_of(v.c, v.c.candidates[v.listed[j]]);
+        const int32_t a = v.c.proxies[own.a].body, b = v.c.proxies[own.b].body;
+        struct flyer flyers[2];
+        if (!kinds_hit(kind_of(v, a, epoch), kind_of(v, b, epoch))) continue;
+        load_flyer(v, a, &flyers[0]);
+        load_flyer(v, b, &flyers[1]);
+        v.state->followed = followed_mark(epoch, 0);
+        foresee(v, ordered_key(own.a, own.b), &flyers[0], &flyers[1], 0, epoch, followed_mark(epoch, 0));
+    }
+}
+
+/* ---- take -------------------------------------------------------------------------------------------------------- */
+
+struct take_shared {
+    double time[TAKE_THREADS];
+    uint64_t key[TAKE_THREADS];
+    int64_t item[TAKE_THREADS];
+    struct foreseen_hit next;
+    int64_t count;               /* of the list */
+    int32_t shapes[TAKE_SHAPES]; /* leaves of a body that was hit */
+    int32_t shape_count, record_count, hit_count, found, taken;
+    bool fails;
+};
+
+static __device__ __forceinline__ bool holds(const hits_view &v, const struct foreseen_hit &hit)
+{
+    const int32_t a = hit.body[0], b = hit.body[1];
+    return v.flyers[a].hits == hit.hits[0] && v.flyers[b].hits == hit.hits[1] && kinds_hit(v.kinds[a], v.kinds[b]);
+}
+
+/* All flyers, boxes and sums as the (sub-)step begins. Every thread. */
+static __device__ void begin_flights(const hits_view &v, bool first, uint64_t epoch)
+{
+    for (int32_t slot = (int32_t)threadIdx.x; slot < v.c.body_count; slot += TAKE_THREADS) {
+        load_flyer(v, slot, &v.flyers[slot]);
+        if (first) v.kinds[slot] = kind_of(v, slot, epoch);
+        for (int k = 0; k < 6; ++k) v.impulse[6 * (size_t)slot + k] = 0;
+        v.since[slot] = 0;
+    }
+    for (int32_t i = (int32_t)threadIdx.x; i < v.c.leaf_count; i += TAKE_THREADS) v.boxes[i] = v.c.placed[i].box;
+    __syncthreads();
+}
+
+/* Flyers of fast pairs, once some bodies take part no more. Every thread. */
+static __device__ void follow_listed(const hits_view &v, uint64_t mark)
+{
+    for (int64_t j = (int64_t)threadIdx.x; j < (int64_t)v.state->listed; j += TAKE_THREADS) {
+        const struct candidate own = candidate_of(v.c, v.c.candidates[v.listed[j]]);
+        const int32_t a = v.c.proxies[own.a].body, b = v.c.proxies[own.b].body;
+        if (kinds_hit(v.kinds[a], v.kinds[b])) v.marks[a].followed = v.marks[b].followed = mark;
+    }
+    if (threadIdx.x == 0) v.state->followed = mark;
+    __syncthreads();
+}
+
+static __device__ __forceinline__ bool is_before(double time, uint64_t key, double other_time, uint64_t other_key)
+{
+    return time < other_time || (time == other_time && key < other_key);
+}
+
+/* The next hit of the list into shared->item[0], -1: there is none. Every thread. */
+static __device__ void find_next(const hits_view &v, struct take_shared *shared)
+{
+    const int t = (int)threadIdx.x;
+    double time = HUGE_VAL;
+    uint64_t key = ~UINT64_C(0);
+    int64_t best = -1;
+    for (int64_t i = t; i < shared->count; i += TAKE_THREADS) {
+        const struct foreseen_hit &hit = v.foreseen[i];
+        if ((best >= 0 && !is_before(hit.touch.time, hit.key, time, key)) || !holds(v, hit)) continue;
+        time = hit.touch.time;
+        key = hit.key;
+        best = i;
+    }
+    shared->time[t] = time;
+    shared->key[t] = key;
+    shared->item[t] = best;
+    __syncthreads();
+    for (int half = TAKE_THREADS / 2; half > 0; half /= 2) {
+        if (t < half && shared->item[t + half] >= 0 &&
+            (shared->item[t] < 0 ||
+             is_before(shared->time[t + half], shared->key[t + half], shared->time[t], shared->key[t]))) {
+            shared->time[t] = shared->time[t + half];
+            shared->key[t] = shared->key[t + half];
+            shared->item[t] = shared->item[t + half];
+        }
+        __syncthreads();
+    }
+}
+
+static __device__ __forceinline__ struct sadmm_world_hit *record_at(const hits_view &v, int32_t k)
+{
+    return &v.records[(size_t)v.step.into * (size_t)v.record_capacity + (size_t)k];
+}
+
+/* As `record` on the host; and what it gives bodies. False: there is no room. */
+static __device__ bool record(const hits_view &v, const struct foreseen_hit &item, const struct hit *hit,
+                              struct take_shared *shared)
+{
+    for (int k = 0; k < hit->count; ++k) {
+        if (!(hit->impulse[k].x > 0)) continue;
+        if (shared->record_count == v.record_capacity) return false;
+        struct sadmm_world_hit *out = record_at(v, shared->record_count++);
+        memset(out, 0, sizeof *out);
+        out->shape_a = (int32_t)(item.key >> 32);
+        out->shape_b = (int32_t)(uint32_t)item.key;
+        out->feature = item.touch.feature[k];
+        memcpy(out->position, item.touch.point[k], sizeof out->position);
+        memcpy(out->normal, item.touch.normal, sizeof out->normal);
+        v3_store(hit_impulse(hit, k, 1), out->impulse);
+        for (int side = 0; side < 2; ++side) {
+            const struct flyer &f = v.flyers[item.body[side]];
+            double *sum = v.impulse + 6 * (size_t)item.body[side];
+            v3_store(hit->arm[side][k], out->arm[side]);
+            out->dynamic[side] = f.dynamic;
+            out->driven[side] = f.driven;
+            for (int j = 0; j < 3; ++j) sum[j] += (side ? 1 : -1) * out->impulse[j];
+            add_cross(out->arm[side], out->impulse, side ? 1 : -1, sum + 3);
+        }
+        out->speed = -(double)hit_velocity(hit, k).x;
+        out->friction = hit->friction;
+    }
+    return true;
+}
+
+/* One thread: the hit happens, or would be one too many. */
+static __device__ __noinline__ void take_hit(const hits_view &v, struct take_shared *shared)
+{
+    const struct foreseen_hit &item = shared->next;
+    struct flyer *const f[2] = {&v.flyers[item.body[0]], &v.flyers[item.body[1]]};
+    const struct flyer *const of[2] = {f[0], f[1]};
+    struct sadmm_flight_pose pose[2];
+    struct hit hit;
+    bool may = true;
+    shared->taken = 0;
+    for (int side = 0; side < 2; ++side) {
+        if (f[side]->hits < (uint32_t)v.step.most) continue;
+        f[side]->too_many = true;
+        may = false;
+    }
+    if (!may) {
+        v.foreseen[shared->item[0]].hits[0] = UINT32_MAX; /* it does not hold; nor the next time, without one of them */
+        return;
+    }
+    const struct sadmm_proxy &a = v.c.proxies[item.key >> 32], &b = v.c.proxies[item.key & UINT32_MAX];
+    for (int side = 0; side < 2; ++side) flight_at(&f[side]->flight, item.touch.time, &pose[side]);
+    memset(&hit, 0, sizeof hit);
+    hit.friction = contact_friction(v.c.friction_pairs, v.c.friction_values, v.c.friction_count,
+                                    (uint32_t)(item.key >> 32), (uint32_t)item.key, &a, &b);
+    hit.restitution = larger_of(a.restitution, b.restitution);
+    flyers_hit(of, &item.touch, v.step.settings->restitution_threshold, pose, &hit);
+    hit_solve(&hit);
+    if (!record(v, item, &hit, shared)) {
+        shared->fails = true;
+        return;
+    }
+    flyers_part(f, v.step.settings, item.touch.time, pose, &hit);
+    shared->taken = 1;
+    ++shared->hit_count;
+}
+
+/* The shapes of a body that was hit, and their boxes from then on. Every thread. */
+static __device__ void list_shapes(const hits_view &v, int32_t body, struct take_shared *shared)
+{
+    const struct flyer &f = v.flyers[body];
+    if (threadIdx.x == 0) v.state->shapes = 0;
+    __syncthreads();
+    for (int32_t i = (int32_t)threadIdx.x; i < v.c.leaf_count; i += TAKE_THREADS) {
+        if (v.c.placed[i].filter.body != body) continue;
+        const unsigned long long at = atomicAdd(&v.state->shapes, 1ull);
+        if (at >= TAKE_SHAPES) continue;
+        const struct sadmm_shape *shape = &v.c.shapes[v.c.placed[i].slot];
+        struct sadmm_flight_pose from, to;
+        flight_at(&f.flight, f.flight.since, &from);
+        flight_at(&f.flight, v.step.settings->dt, &to);
+        flyer_box(shape, &v.c.geometries[shape->geometry], &f.flight, v.step.settings->dt, &from, &to, &v.boxes[i]);
+        shared->shapes[at] = i;
+    }
+    __syncthreads();
+    if (threadIdx.x == 0) {
+        shared->shape_count = (int32_t)v.state->shapes;
+        if (shared->shape_count > TAKE_SHAPES) shared->fails = true;
+        v.state->near = 0;
+    }
+    __syncthreads();
+}
+
+static __device__ __forceinline__ bool filters_hit(const hits_view &v, const struct collision_filter &a,
+                                                   const struct collision_filter &b)
+{
+    return a.body != b.body && (a.category & b.mask) != 0 && (b.category & a.mask) != 0 &&
+           kinds_hit(v.kinds[a.body], v.kinds[b.body]) &&
+           (v.c.disabled_count == 0 ||
+            find_key(v.c.disabled_pairs, v.c.disabled_count, unordered_key((uint32_t)a.body, (uint32_t)b.body)) < 0);
+}
+
+static __device__ __forceinline__ bool bounces(const hits_view &v, uint32_t a, uint32_t b)
+{
+    return v.c.proxies[a].restitution > 0 || v.c.proxies[b].restitution > 0;
+}
+
+/* What the leaf, of a body that was hit, comes near: sadmm_collision_list_near. Every thread. */
+static __device__ void list_near(const hits_view &v, int32_t number, int32_t except)
+{
+    const struct collision_leaf &own = v.c.placed[number];
+    const struct sadmm_box3 box = v.boxes[number];
+    const int rank = own.filter.kind & FILTER_RANK;
+    for (int32_t i = (int32_t)threadIdx.x; i < v.c.leaf_count; i += TAKE_THREADS) {
+        const struct collision_leaf &other = v.c.placed[i];
+        if (i == number || other.filter.body == except || !boxes_overlap(&v.boxes[i], &box) ||
+            !(own.group_low <= other.group_high && other.group_low <= own.group_high) ||
+            !filters_hit(v, own.filter, other.filter) || !bounces(v, (uint32_t)own.slot, (uint32_t)other.slot))
+            continue;
+        const int of_other = other.filter.kind & FILTER_RANK;
+        const bool first = rank < of_other || (rank == of_other && own.slot < other.slot);
+        v.near[atomicAdd(&v.state->near, 1ull)] = first ? ordered_key((uint32_t)own.slot, (uint32_t)other.slot)
+                                                        : ordered_key((uint32_t)other.slot, (uint32_t)own.slot);
+    }
+    for (int32_t p = (int32_t)threadIdx.x; p < v.c.plane_count; p += TAKE_THREADS) {
+        const uint64_t entry = v.c.planes[p], group = entry >> 32;
+        const uint32_t plane = (uint32_t)entry;
+        if (v.c.filters[plane].body == except || !bounces(v, plane, (uint32_t)own.slot) ||
+            (group > 0 && own.group_low == own.group_high && own.group_low != (int32_t)group - 1) ||
+            !proxy_plane_meets(&v.c.proxies[plane], &box, 0) || !filters_hit(v, v.c.filters[plane], own.filter))
+            continue;
+        v.near[atomicAdd(&v.state->near, 1ull)] = ordered_key(plane, (uint32_t)own.slot);
+    }
+    __syncthreads();
+}
+
+/* Room for so many more in the list: what does not hold any more goes. Every thread. */
+static __device__ void make_room(const hits_view &v, int64_t initial, int64_t more, struct take_shared *shared)
+{
+    if (shared->count + more > v.foreseen_capacity && threadIdx.x == 0) {
+        int64_t kept = initial;
+        for (int64_t i = initial; i < shared->count; ++i)
+            if (holds(v, v.foreseen[i])) v.foreseen[kept++] = v.foreseen[i];
+        shared->count = kept;
+        if (kept + more > v.foreseen_capacity) shared->fails = true;
+        v.state->foreseen = (unsigned long long)kept;
+    }
+    __syncthreads();
+}
+
+/* What a body that was hit comes near from there on; `except`: a body whose pairs with it are known. Every thread. */
+static __device__ void foresee_body(const hits_view &v, int32_t body, int32_t except, int64_t initial, uint64_t epoch,
+                                    uint64_t mark, struct take_shared *shared)
+{
+    list_shapes(v, body, shared);
+    for (int32_t k = 0; !shared->fails && k < shared->shape_count; ++k) {
+        list_near(v, shared->shapes[k], except);
+        const int64_t near = (int64_t)v.state->near;
+        make_room(v, initial, near, shared);
+        if (shared->fails) break;
+        for (int64_t j = (int64_t)threadIdx.x; j < near; j += TAKE_THREADS) {
+            const uint64_t key = v.near[j];
+            foresee(v, key, &v.flyers[v.c.proxies[key >> 32].body], &v.flyers[v.c.proxies[key & UINT32_MAX].body],
+                    v.flyers[body].flight.since, epoch, mark);
+        }
+        __syncthreads();
+        if (threadIdx.x == 0) {
+            shared->count = (int64_t)v.state->foreseen;
+            v.state->near = 0;
+        }
+        __syncthreads();
+    }
+    __syncthreads();
+}
+
+/* All hits, in the order of time. Every thread. */
+static __device__ void take_all(const hits_view &v, int64_t initial, uint64_t epoch, uint64_t mark,
+                                struct take_shared *shared)
+{
+    while (!shared->fails) {
+        find_next(v, shared);
+        if (shared->item[0] < 0) return;
+        if (threadIdx.x == 0) {
+            shared->next = v.foreseen[shared->item[0]];
+            take_hit(v, shared);
+        }
+        __syncthreads();
+        if (!shared->taken || shared->fails) continue;
+        const int32_t a = shared->next.body[0], b = shared->next.body[1];
+        const bool moves_a = v.flyers[a].dynamic >= 0, moves_b = v.flyers[b].dynamic >= 0;
+        if (moves_a) foresee_body(v, a, -1, initial, epoch, mark, shared);
+        if (moves_b && !shared->fails) foresee_body(v, b, moves_a ? a : -1, initial, epoch, mark, shared);
+    }
+}
+
+/* Bodies that would be hit too often take part no more; are there any? Every thread. */
+static __device__ bool leave_out(const hits_view &v, uint64_t epoch, struct take_shared *shared)
+{
+    if (threadIdx.x == 0) shared->found = 0;
+    __syncthreads();
+    for (int32_t slot = (int32_t)threadIdx.x; slot < v.c.body_count; slot += TAKE_THREADS) {
+        const struct flyer &f = v.flyers[slot];
+        if (f.dynamic < 0 || !(f.too_many || v.marks[slot].lost == epoch) || v.kinds[slot] == SADMM_FLYER_NONE) continue;
+        v.kinds[slot] = SADMM_FLYER_NONE;
+        shared->found = 1;
+    }
+    __syncthreads();
+    return shared->found != 0;
+}
+
+/* What was hit begins the (sub-)step where it would have. Every thread. */
+static __device__ void write_back(const hits_view &v)
+{
+    for (int32_t slot = (int32_t)threadIdx.x; slot < v.c.body_count; slot += TAKE_THREADS) {
+        const struct flyer &f = v.flyers[slot];
+        if (f.hits == 0) continue;
+        struct sadmm_collision_body *out = &v.step.bodies[slot];
+        double *velocity = v.step.velocity + 6 * (size_t)f.dynamic;
+        struct sadmm_flight_pose pose;
+        v.step.start[f.dynamic] = f.start;
+        for (int k = 0; k < 3; ++k) { /* it flies on: what contacts do not change is right from the start */
+            velocity[k] = f.start.velocity[k] + v.step.settings->dt * f.flight.acceleration[k];
+            velocity[3 + k] = f.flight.spin[k];
+        }
+        flight_at(&f.flight, f.flight.since, &pose);
+        memcpy(out->position, f.start.position, sizeof out->position);
+        memcpy(out->velocity, f.start.velocity, sizeof out->velocity);
+        memcpy(out->orientation, pose.orientation, sizeof out->orientation);
+        if (f.flight.inertia[0] > 0) memcpy(out->velocity + 3, pose.spin, sizeof pose.spin);
+        v.since[slot] = f.flight.since;
+    }
+}
+
+/* Thread 0: the (sub-)step's account. */
+static __device__ void end_taking(const hits_view &v, int32_t records, int32_t first, bool quiet)
+{
+    struct hits_state *state = v.state;
+    state->records[v.step.into] = records;
+    state->first[v.step.into] = first;
+    state->listed = state->foreseen = state->lost = 0;
+    state->quiet = quiet;
+    ++state->epoch;
+}
+
+static __global__ void __launch_bounds__(TAKE_THREADS) take_kernel(const __grid_constant__ hits_view v)
+{
+    follow_if(v.c.early);
+    COLLISION_SHARED(take_shared, shared);
+    const bool stops = aborted(v.c), leads = threadIdx.x == 0;
+    const int64_t initial = (int64_t)v.state->foreseen;
+    const int32_t first = v.step.substep > 0 ? v.state->records[v.step.into] : 0;
+    const bool followed = v.state->followed != 0;
+    const uint64_t epoch = v.state->epoch + 1;
+    __syncthreads();
+    if (stops || !followed) {
+        if (leads && stops) v.state->quiet = 1;
+        else if (leads) end_taking(v, first, first, true);
+        return;
+    }
+    if (leads) {
+        shared.fails = initial > v.foreseen_capacity;
+        shared.taken = 0;
+    }
+    bool done = false;
+    for (int times = 0; times < TAKE_TIMES && !done; ++times) {
+        __syncthreads();
+        if (leads) {
+            shared.count = initial;
+            shared.record_count = first;
+            shared.hit_count = 0;
+            v.state->foreseen = (unsigned long long)initial;
+        }
+        begin_flights(v, times == 0, epoch);
+        if (times > 0) follow_listed(v, followed_mark(epoch, times));
+        take_all(v, initial, epoch, followed_mark(epoch, times), &shared);
+        __syncthreads();
+        if (shared.fails) break;
+        done = !leave_out(v, epoch, &shared);
+        __syncthreads();
+    }
+    const bool any = done && !shared.fails && shared.hit_count > 0;
+    __syncthreads();
+    if (any) write_back(v);
+    if (!done || shared.fails) { /* none are taken, and none foreseen */
+        for (int32_t slot = (int32_t)threadIdx.x; slot < v.c.body_count; slot += TAKE_THREADS)
+            v.kinds[slot] = SADMM_FLYER_NONE;
+    }
+    __syncthreads();
+    if (leads) end_taking(v, any ? shared.record_count : first, first, !any);
+}
+
+void COLLISION(hits_take_kernels)(struct hits_kernels *kernels)
+{
+    kernels->list = {list_kernel, HIT_THREADS, 0, "fast pairs"};
+    kernels->foresee = {foresee_kernel, FORESEE_THREADS, 0, "first touches"};
+    kernels->take = {take_kernel, TAKE_THREADS, sizeof(struct take_shared), "hits"};
+}
