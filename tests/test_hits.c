@@ -296,7 +296,7 @@ END_TEST
 START_TEST(a_ball_falls_and_bounces)
 {
     static const double restitutions[] = {1, 0.8, 0.5};
-    for (int e = 0; e < 3; ++e)
+    for (int e = EMULATED ? 1 : 0; e < (EMULATED ? 2 : 3); ++e)
         for (int d = EMULATED ? 2 : 0; d < 3; ++d) {
             const double dt = d == 0 ? 0.001 : d == 1 ? 0.005 : 0.02, g = 9.81, radius = 0.1;
             const struct ball ball = {.x = {0, 0, radius + 1}, .radius = radius, .mass = 2};
@@ -343,7 +343,7 @@ START_TEST(a_turning_box_hits_a_plane)
     double inertia[3];
     sadmm_box_inertia(mass, half, inertia);
     random_state = 11;
-    for (int c = 0; c < 60; ++c) {
+    for (int c = 0; c < (EMULATED ? 10 : 60); ++c) {
         const double restitution = c % 4 == 0 ? ALMOST_NONE : random_in(0, 1), speed = random_in(0.5, 4),
                      spin = random_in(-15, 15), moment = random_in(0.1, 0.9) * dt, angle = random_in(0.2, 1.3),
                      start = angle - spin * moment;
@@ -379,7 +379,7 @@ START_TEST(a_turning_box_hits_a_plane)
         ++tested;
         sadmm_world_destroy(world);
     }
-    ck_assert_int_ge(tested, 15);
+    ck_assert_int_ge(tested, EMULATED ? 2 : 15);
 }
 END_TEST
 
@@ -407,7 +407,7 @@ START_TEST(a_tumbling_box_keeps_its_turning)
         const sadmm_body_id id = add_thrown(world, SADMM_SHAPE_BOX, half, &state, 1.5, 0, 1);
         MUST(world, sadmm_world_set_body_state(world, id, &state));
         const vec3 before = tumbling_sums(world, id, g, &energy[0]);
-        step_world(world, 200);
+        step_world(world, EMULATED ? 80 : 200);
         const vec3 after = tumbling_sums(world, id, g, &energy[1]);
         /* single precision, 200 times; one velocity for a whole step would be off by 1e-2 */
         ck_assert_double_eq_tol(after.z, before.z, 1e-5 * v3_norm(before));
@@ -972,24 +972,25 @@ int main(void)
 #ifdef HITS_ON_CUDA
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
 #endif
-    tcase_add_loop_test(tests, two_balls_meet, 0, TABLES);
-    tcase_add_loop_test(tests, a_hit_is_not_taken_too_soon, 0, TABLES);
-    tcase_add_loop_test(tests, a_row_hands_the_motion_on, 0, TABLES);
-    tcase_add_loop_test(tests, a_hit_goes_through_to_the_floor, 0, TABLES);
-    tcase_add_loop_test(tests, a_ball_falls_and_bounces, 0, TABLES);
-    tcase_add_loop_test(tests, a_turning_box_hits_a_plane, 0, TABLES);
-    tcase_add_loop_test(tests, a_hit_leaves_turning_alone, 0, TABLES);
-    tcase_add_loop_test(tests, a_tumbling_box_keeps_its_turning, 0, TABLES);
-    tcase_add_loop_test(tests, any_two_shapes_hit, 0, TABLES);
-    tcase_add_loop_test(tests, balls_in_a_box_do_what_formulas_say, 0, TABLES);
-    tcase_add_loop_test(tests, a_bounce_can_be_read, 0, TABLES);
-    tcase_add_loop_test(tests, hits_can_be_left_to_the_solve, 0, TABLES);
-    tcase_add_loop_test(tests, what_does_not_bounce_is_left_to_the_solve, 0, TABLES);
+    const int end = EMULATED ? 1 : TABLES; /* hits are taken in double, whatever the precision */
+    tcase_add_loop_test(tests, two_balls_meet, 0, end);
+    tcase_add_loop_test(tests, a_hit_is_not_taken_too_soon, 0, end);
+    tcase_add_loop_test(tests, a_row_hands_the_motion_on, 0, end);
+    tcase_add_loop_test(tests, a_hit_goes_through_to_the_floor, 0, end);
+    tcase_add_loop_test(tests, a_ball_falls_and_bounces, 0, end);
+    tcase_add_loop_test(tests, a_turning_box_hits_a_plane, 0, end);
+    tcase_add_loop_test(tests, a_hit_leaves_turning_alone, 0, end);
+    tcase_add_loop_test(tests, a_tumbling_box_keeps_its_turning, 0, end);
+    tcase_add_loop_test(tests, any_two_shapes_hit, 0, end);
+    tcase_add_loop_test(tests, balls_in_a_box_do_what_formulas_say, 0, end);
+    tcase_add_loop_test(tests, a_bounce_can_be_read, 0, end);
+    tcase_add_loop_test(tests, hits_can_be_left_to_the_solve, 0, end);
+    tcase_add_loop_test(tests, what_does_not_bounce_is_left_to_the_solve, 0, end);
 #ifdef HITS_ON_CUDA
     tcase_add_loop_test(tests, host_and_device_agree, 0, TABLES);
 #else
     tcase_add_test(tests, an_elastic_gas_keeps_its_energy);
-    tcase_add_loop_test(tests, bits_are_the_same, 0, TABLES);
+    tcase_add_loop_test(tests, bits_are_the_same, 0, end);
     tcase_add_test(tests, a_row_has_all_that_meet);
 #endif
     tcase_set_timeout(tests, 60);
