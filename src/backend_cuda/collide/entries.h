@@ -49,9 +49,10 @@ sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, bool sub
 sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *stream,
                                 const struct sadmm_cuda_find *find, struct sadmm_error *error);
 /* The world may have hits of bodies in flight (settings.hits); held: by body slot, not 0: joints hold the body; NULL: it
- * has none. After attach, and before reserve. dynamic: bodies. */
-sadmm_status COLLISION(load_hits)(struct sadmm_cuda_collision *collision, void *stream, const unsigned char *held,
-                                  int32_t dynamic, struct sadmm_error *error);
+ * has none. After attach, with its input, and before reserve. */
+sadmm_status COLLISION(load_hits)(struct sadmm_cuda_collision *collision, void *stream,
+                                  const struct sadmm_collision_input *input, const unsigned char *held,
+                                  struct sadmm_error *error);
 /* Does it take any: not where there are meshes or smooth bodies. */
 bool COLLISION(takes_hits)(const struct sadmm_cuda_collision *collision);
 /* Launches alone, before those of enqueue for the same find, which has `hits`: candidates, and the step's hits. */

@@ -30,10 +30,45 @@ static __device__ __forceinline__ void replace_leaf(const hits_view &v, const st
     v.c.placed[i] = leaf;
 }
 
+struct packing {
+    int32_t counts[HIT_THREADS];
+    int32_t end; /* of what is packed */
+};
+
+/* The hits of all groups become the step's, one group after the other. One block. */
+static __device__ void pack_records(const hits_view &v, struct packing *shared)
+{
+    struct hits_state *state = v.state;
+    const int32_t t = (int32_t)threadIdx.x, into = v.step.into;
+    const bool quiet = state->quiet;
+    if (t == 0) {
+        state->listed = 0;
+        ++state->epoch;
+        state->first[into] = v.step.substep > 0 ? state->records[into] : 0;
+        shared->end = state->first[into];
+    }
+    __syncthreads();
+    for (int32_t first = 0; !quiet && first < v.group_count; first += HIT_THREADS) {
+        const int32_t g = first + t, count = g < v.group_count ? v.progress[g].records : 0;
+        shared->counts[t] = count;
+        __syncthreads();
+        int32_t at = shared->end;
+        for (int32_t k = 0; k < t; ++k) at += shared->counts[k];
+        struct sadmm_world_hit *to = v.records + (size_t)into * (size_t)v.record_capacity + at;
+        for (int32_t k = 0; k < count; ++k) to[k] = v.taken[v.groups[g].record_first + k];
+        __syncthreads();
+        if (t == HIT_THREADS - 1) shared->end = at + count;
+        __syncthreads();
+    }
+    if (t == 0) state->records[into] = shared->end;
+}
+
 /* And the candidates are none: they are looked for again. */
 static __global__ void __launch_bounds__(HIT_THREADS) replace_kernel(const __grid_constant__ hits_view v)
 {
     follow_if(v.c.early);
+    COLLISION_SHARED(packing, shared);
+    if (blockIdx.x == 0 && !aborted(v.c)) pack_records(v, &shared);
     const int64_t thread = collision_thread(HIT_THREADS), stride = (int64_t)gridDim.x * HIT_THREADS;
     if (v.state->quiet) return;
     const struct collision_step step = step_of(v.c);
@@ -118,7 +153,10 @@ static __device__ __noinline__ void emit_later(const hits_view &v, int64_t i, co
 
 static __device__ __forceinline__ bool is_followed(const hits_view &v, int32_t body)
 {
-    return v.marks[body].followed == v.state->followed && v.kinds[body] != SADMM_FLYER_NONE;
+    const int32_t group = v.group_of[body];
+    const uint64_t mark = v.marks[body].followed;
+    if (group < 0) return mark >= v.state->epoch * TAKE_TIMES; /* by any of them */
+    return mark != 0 && mark == v.progress[group].followed && v.kinds[body] != SADMM_FLYER_NONE;
 }
 
 /* As sadmm_world_open_gaps on the host. */
@@ -137,7 +175,7 @@ static __global__ void __launch_bounds__(HIT_THREADS) reopen_kernel(const __grid
     follow_if(v.c.early);
     const int64_t thread = collision_thread(HIT_THREADS), stride = (int64_t)gridDim.x * HIT_THREADS;
     const bool quiet = v.state->quiet;
-    if (aborted(v.c) || v.state->followed == 0) return;
+    if (aborted(v.c) || !v.state->followed) return;
     const int64_t found = usable_candidates(v.c);
     if (v.c.after.counts->points > v.c.point_capacity) return;
     const double dt = step_of(v.c).dt;
@@ -176,7 +214,7 @@ static __global__ void __launch_bounds__(HIT_THREADS) give_kernel(const __grid_c
 
 void COLLISION(hits_contacts_kernels)(struct hits_kernels *kernels)
 {
-    kernels->replace = {replace_kernel, HIT_THREADS, 0, "shapes that were hit"};
+    kernels->replace = {replace_kernel, HIT_THREADS, sizeof(struct packing), "shapes that were hit"};
     kernels->later = {later_kernel, NARROW_THREADS, 0, "narrow phase of what was hit"};
     kernels->reopen = {reopen_kernel, HIT_THREADS, 0, "contacts of what was hit"};
     kernels->give = {give_kernel, HIT_THREADS, 0, "impulses of hits"};

@@ -44,8 +44,15 @@ static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_c
 {
     follow_if(v.c.early);
     const int64_t thread = collision_thread(HIT_THREADS), stride = (int64_t)gridDim.x * HIT_THREADS;
+    if (thread == 0) v.state->quiet = 1;
     if (aborted(v.c)) return;
     if (thread == 0) v.state->followed = 0;
+    for (int64_t g = thread; g < v.group_count; g += stride) {
+        struct hit_progress *progress = &v.progress[g];
+        progress->earlier = v.step.substep > 0 ? progress->earlier + progress->records : 0;
+        progress->foreseen = progress->followed = 0;
+        progress->records = 0;
+    }
     const struct collision_step step = step_of(v.c);
     const double threshold = v.step.settings->restitution_threshold;
     const uint64_t epoch = v.state->epoch + 1;
@@ -104,8 +111,8 @@ static __device__ __forceinline__ struct sadmm_flying_shape flying(const hits_vi
     return {shape, &v.c.geometries[shape->geometry], flight};
 }
 
-/* When do two shapes hit each other, from `from` on? Into the list; what does not fit is counted. */
-static __device__ __noinline__ void foresee(const hits_view &v, uint64_t key, const struct flyer *a,
+/* When do two shapes of the group hit each other, from `from` on? Into its list; what does not fit is counted. */
+static __device__ __noinline__ void foresee(const hits_view &v, int32_t group, uint64_t key, const struct flyer *a,
                                             const struct flyer *b, double from, uint64_t epoch, uint64_t mark)
 {
     struct foreseen_hit hit;
@@ -117,30 +124,42 @@ static __device__ __noinline__ void foresee(const hits_view &v, uint64_t key, co
                                      false};
     v.marks[a->slot].followed = v.marks[b->slot].followed = mark;
     const bool found = flying_first_touch(&pair, from, v.step.settings->dt, &hit.touch);
-    if (pair.lost) {
-        v.marks[a->slot].lost = v.marks[b->slot].lost = epoch;
-        atomicAdd(&v.state->lost, 1ull);
-    }
+    if (pair.lost) v.marks[a->slot].lost = v.marks[b->slot].lost = epoch;
     if (!found) return;
     hit.key = key;
     hit.body[0] = a->slot;
     hit.body[1] = b->slot;
     hit.hits[0] = a->hits;
     hit.hits[1] = b->hits;
-    const unsigned long long at = atomicAdd(&v.state->foreseen, 1ull);
-    if ((int64_t)at < v.foreseen_capacity) v.foreseen[at] = hit;
+    const struct hit_group &of = v.groups[group];
+    const unsigned long long at = atomicAdd(&v.progress[group].foreseen, 1ull);
+    if (at < (unsigned long long)of.room) v.foreseen[of.room_first + at] = hit;
 }
 
 /* Of flyers that were looked at the times + 1st time. */
 static __device__ __forceinline__ uint64_t followed_mark(uint64_t epoch, int times) { return epoch * TAKE_TIMES + times; }
 
+static __device__ __forceinline__ int32_t group_of(const hits_view &v, int32_t a, int32_t b)
+{
+    return v.group_of[a] >= 0 ? v.group_of[a] : v.group_of[b];
+}
+
+/* A body as the (sub-)step begins. */
+static __device__ __forceinline__ void begin_body(const hits_view &v, int32_t slot)
+{
+    load_flyer(v, slot, &v.flyers[slot]);
+    for (int k = 0; k < 6; ++k) v.impulse[6 * (size_t)slot + k] = 0;
+    v.since[slot] = 0;
+}
+
+/* Beside it all flyers and boxes for `take`. */
 static __global__ void __launch_bounds__(FORESEE_THREADS) foresee_kernel(const __grid_constant__ hits_view v)
 {
     follow_if(v.c.early);
     const int64_t thread = collision_thread(FORESEE_THREADS), stride = (int64_t)gridDim.x * FORESEE_THREADS;
     if (aborted(v.c)) return;
     const int64_t count = (int64_t)v.state->listed;
-    const uint64_t epoch = v.state->epoch + 1;
+    const uint64_t epoch = v.state->epoch + 1, mark = followed_mark(epoch, 0);
     for (int64_t j = thread; j < count; j += stride) {
         const struct candidate own = candidate_of(v.c, v.c.candidates[v.listed[j]]);
         const int32_t a = v.c.proxies[own.a].body, b = v.c.proxies[own.b].body;
@@ -148,9 +167,15 @@ static __global__ void __launch_bounds__(FORESEE_THREADS) foresee_kernel(const _
         if (!kinds_hit(kind_of(v, a, epoch), kind_of(v, b, epoch))) continue;
         load_flyer(v, a, &flyers[0]);
         load_flyer(v, b, &flyers[1]);
-        v.state->followed = followed_mark(epoch, 0);
-        foresee(v, ordered_key(own.a, own.b), &flyers[0], &flyers[1], 0, epoch, followed_mark(epoch, 0));
+        v.state->followed = 1;
+        v.progress[group_of(v, a, b)].followed = mark;
+        foresee(v, group_of(v, a, b), ordered_key(own.a, own.b), &flyers[0], &flyers[1], 0, epoch, mark);
     }
+    for (int64_t slot = thread; count > 0 && slot < v.c.body_count; slot += stride) {
+        begin_body(v, (int32_t)slot);
+        v.kinds[slot] = kind_of(v, (int32_t)slot, epoch);
+    }
+    for (int64_t i = thread; count > 0 && i < v.c.leaf_count; i += stride) v.boxes[i] = v.c.placed[i].box;
 }
 
 /* ---- take -------------------------------------------------------------------------------------------------------- */
@@ -160,9 +185,11 @@ struct take_shared {
     uint64_t key[TAKE_THREADS];
     int64_t item[TAKE_THREADS];
     struct foreseen_hit next;
+    struct hit_group own;
+    unsigned long long shapes, near, looks; /* of a body that was hit; near one of these; in all */
     int64_t count;               /* of the list */
-    int32_t shapes[TAKE_SHAPES]; /* leaves of a body that was hit */
-    int32_t shape_count, record_count, hit_count, found, taken;
+    int32_t leaves[TAKE_SHAPES]; /* of a body that was hit */
+    int32_t group, record_count, hit_count, found, taken;
     bool fails;
 };
 
@@ -172,28 +199,28 @@ static __device__ __forceinline__ bool holds(const hits_view &v, const struct fo
     return v.flyers[a].hits == hit.hits[0] && v.flyers[b].hits == hit.hits[1] && kinds_hit(v.kinds[a], v.kinds[b]);
 }
 
-/* All flyers, boxes and sums as the (sub-)step begins. Every thread. */
-static __device__ void begin_flights(const hits_view &v, bool first, uint64_t epoch)
+/* The group's flyers, boxes and sums as the (sub-)step begins, once more. Every thread. */
+static __device__ void begin_again(const hits_view &v, const struct hit_group &own)
 {
-    for (int32_t slot = (int32_t)threadIdx.x; slot < v.c.body_count; slot += TAKE_THREADS) {
-        load_flyer(v, slot, &v.flyers[slot]);
-        if (first) v.kinds[slot] = kind_of(v, slot, epoch);
-        for (int k = 0; k < 6; ++k) v.impulse[6 * (size_t)slot + k] = 0;
-        v.since[slot] = 0;
+    for (int32_t j = (int32_t)threadIdx.x; j < own.body_count; j += TAKE_THREADS)
+        begin_body(v, v.group_bodies[own.body_first + j]);
+    for (int32_t j = (int32_t)threadIdx.x; j < own.leaf_count; j += TAKE_THREADS) {
+        const int32_t i = v.group_leaves[own.leaf_first + j];
+        v.boxes[i] = v.c.placed[i].box;
     }
-    for (int32_t i = (int32_t)threadIdx.x; i < v.c.leaf_count; i += TAKE_THREADS) v.boxes[i] = v.c.placed[i].box;
     __syncthreads();
 }
 
-/* Flyers of fast pairs, once some bodies take part no more. Every thread. */
-static __device__ void follow_listed(const hits_view &v, uint64_t mark)
+/* Flyers of the group's fast pairs, once some bodies take part no more. Every thread. */
+static __device__ void follow_listed(const hits_view &v, int32_t group, uint64_t mark)
 {
     for (int64_t j = (int64_t)threadIdx.x; j < (int64_t)v.state->listed; j += TAKE_THREADS) {
         const struct candidate own = candidate_of(v.c, v.c.candidates[v.listed[j]]);
         const int32_t a = v.c.proxies[own.a].body, b = v.c.proxies[own.b].body;
-        if (kinds_hit(v.kinds[a], v.kinds[b])) v.marks[a].followed = v.marks[b].followed = mark;
+        if (group_of(v, a, b) == group && kinds_hit(v.kinds[a], v.kinds[b]))
+            v.marks[a].followed = v.marks[b].followed = mark;
     }
-    if (threadIdx.x == 0) v.state->followed = mark;
+    if (threadIdx.x == 0) v.progress[group].followed = mark;
     __syncthreads();
 }
 
@@ -210,7 +237,7 @@ static __device__ void find_next(const hits_view &v, struct take_shared *shared)
     uint64_t key = ~UINT64_C(0);
     int64_t best = -1;
     for (int64_t i = t; i < shared->count; i += TAKE_THREADS) {
-        const struct foreseen_hit &hit = v.foreseen[i];
+        const struct foreseen_hit &hit = v.foreseen[shared->own.room_first + i];
         if ((best >= 0 && !is_before(hit.touch.time, hit.key, time, key)) || !holds(v, hit)) continue;
         time = hit.touch.time;
         key = hit.key;
@@ -232,19 +259,14 @@ static __device__ void find_next(const hits_view &v, struct take_shared *shared)
     }
 }
 
-static __device__ __forceinline__ struct sadmm_world_hit *record_at(const hits_view &v, int32_t k)
-{
-    return &v.records[(size_t)v.step.into * (size_t)v.record_capacity + (size_t)k];
-}
-
 /* As `record` on the host; and what it gives bodies. False: there is no room. */
 static __device__ bool record(const hits_view &v, const struct foreseen_hit &item, const struct hit *hit,
                               struct take_shared *shared)
 {
     for (int k = 0; k < hit->count; ++k) {
         if (!(hit->impulse[k].x > 0)) continue;
-        if (shared->record_count == v.record_capacity) return false;
-        struct sadmm_world_hit *out = record_at(v, shared->record_count++);
+        if (v.progress[shared->group].earlier + shared->record_count == shared->own.record_room) return false;
+        struct sadmm_world_hit *out = &v.taken[shared->own.record_first + shared->record_count++];
         memset(out, 0, sizeof *out);
         out->shape_a = (int32_t)(item.key >> 32);
         out->shape_b = (int32_t)(uint32_t)item.key;
@@ -258,6 +280,7 @@ static __device__ bool record(const hits_view &v, const struct foreseen_hit &ite
             v3_store(hit->arm[side][k], out->arm[side]);
             out->dynamic[side] = f.dynamic;
             out->driven[side] = f.driven;
+            if (v.group_of[item.body[side]] < 0) continue; /* it does not move, and other groups meet it */
             for (int j = 0; j < 3; ++j) sum[j] += (side ? 1 : -1) * out->impulse[j];
             add_cross(out->arm[side], out->impulse, side ? 1 : -1, sum + 3);
         }
@@ -283,7 +306,7 @@ static __device__ __noinline__ void take_hit(const hits_view &v, struct take_sha
         may = false;
     }
     if (!may) {
-        v.foreseen[shared->item[0]].hits[0] = UINT32_MAX; /* it does not hold; nor the next time, without one of them */
+        v.foreseen[shared->own.room_first + shared->item[0]].hits[0] = UINT32_MAX; /* it does not hold; nor the next time, without one of them */
         return;
     }
     const struct sadmm_proxy &a = v.c.proxies[item.key >> 32], &b = v.c.proxies[item.key & UINT32_MAX];
@@ -307,24 +330,25 @@ static __device__ __noinline__ void take_hit(const hits_view &v, struct take_sha
 static __device__ void list_shapes(const hits_view &v, int32_t body, struct take_shared *shared)
 {
     const struct flyer &f = v.flyers[body];
-    if (threadIdx.x == 0) v.state->shapes = 0;
+    if (threadIdx.x == 0) shared->shapes = shared->near = 0;
     __syncthreads();
-    for (int32_t i = (int32_t)threadIdx.x; i < v.c.leaf_count; i += TAKE_THREADS) {
+    for (int32_t j = (int32_t)threadIdx.x; j < shared->own.leaf_count; j += TAKE_THREADS) {
+        const int32_t i = v.group_leaves[shared->own.leaf_first + j];
         if (v.c.placed[i].filter.body != body) continue;
-        const unsigned long long at = atomicAdd(&v.state->shapes, 1ull);
+        const unsigned long long at = atomicAdd(&shared->shapes, 1ull);
         if (at >= TAKE_SHAPES) continue;
         const struct sadmm_shape *shape = &v.c.shapes[v.c.placed[i].slot];
         struct sadmm_flight_pose from, to;
         flight_at(&f.flight, f.flight.since, &from);
         flight_at(&f.flight, v.step.settings->dt, &to);
         flyer_box(shape, &v.c.geometries[shape->geometry], &f.flight, v.step.settings->dt, &from, &to, &v.boxes[i]);
-        shared->shapes[at] = i;
+        shared->leaves[at] = i;
     }
     __syncthreads();
     if (threadIdx.x == 0) {
-        shared->shape_count = (int32_t)v.state->shapes;
-        if (shared->shape_count > TAKE_SHAPES) shared->fails = true;
-        v.state->near = 0;
+        shared->looks += (shared->shapes + 1) *
+                         (unsigned long long)(shared->own.leaf_count + v.shared_leaf_count + v.c.plane_count);
+        if (shared->shapes > TAKE_SHAPES || shared->looks > TAKE_LOOKS) shared->fails = true;
     }
     __syncthreads();
 }
@@ -343,23 +367,37 @@ static __device__ __forceinline__ bool bounces(const hits_view &v, uint32_t a, u
     return v.c.proxies[a].restitution > 0 || v.c.proxies[b].restitution > 0;
 }
 
-/* What the leaf, of a body that was hit, comes near: sadmm_collision_list_near. Every thread. */
-static __device__ void list_near(const hits_view &v, int32_t number, int32_t except)
+static __device__ __forceinline__ void add_near(const hits_view &v, uint64_t key, struct take_shared *shared)
+{
+    v.near[shared->own.near_first + atomicAdd(&shared->near, 1ull)] = key;
+}
+
+/* If the leaf, of a body that was hit, comes near the other one: sadmm_collision_list_near. */
+static __device__ __forceinline__ void look_at(const hits_view &v, int32_t number, const struct sadmm_box3 &box,
+                                               int32_t i, int32_t except, struct take_shared *shared)
+{
+    const struct collision_leaf &own = v.c.placed[number], &other = v.c.placed[i];
+    if (i == number || other.filter.body == except || !boxes_overlap(&v.boxes[i], &box) ||
+        !(own.group_low <= other.group_high && other.group_low <= own.group_high) ||
+        !filters_hit(v, own.filter, other.filter) || !bounces(v, (uint32_t)own.slot, (uint32_t)other.slot))
+        return;
+    const int rank = own.filter.kind & FILTER_RANK, of_other = other.filter.kind & FILTER_RANK;
+    const bool first = rank < of_other || (rank == of_other && own.slot < other.slot);
+    add_near(v,
+             first ? ordered_key((uint32_t)own.slot, (uint32_t)other.slot)
+                   : ordered_key((uint32_t)other.slot, (uint32_t)own.slot),
+             shared);
+}
+
+/* All that it comes near. Every thread. */
+static __device__ void list_near(const hits_view &v, int32_t number, int32_t except, struct take_shared *shared)
 {
     const struct collision_leaf &own = v.c.placed[number];
     const struct sadmm_box3 box = v.boxes[number];
-    const int rank = own.filter.kind & FILTER_RANK;
-    for (int32_t i = (int32_t)threadIdx.x; i < v.c.leaf_count; i += TAKE_THREADS) {
-        const struct collision_leaf &other = v.c.placed[i];
-        if (i == number || other.filter.body == except || !boxes_overlap(&v.boxes[i], &box) ||
-            !(own.group_low <= other.group_high && other.group_low <= own.group_high) ||
-            !filters_hit(v, own.filter, other.filter) || !bounces(v, (uint32_t)own.slot, (uint32_t)other.slot))
-            continue;
-        const int of_other = other.filter.kind & FILTER_RANK;
-        const bool first = rank < of_other || (rank == of_other && own.slot < other.slot);
-        v.near[atomicAdd(&v.state->near, 1ull)] = first ? ordered_key((uint32_t)own.slot, (uint32_t)other.slot)
-                                                        : ordered_key((uint32_t)other.slot, (uint32_t)own.slot);
-    }
+    for (int32_t j = (int32_t)threadIdx.x; j < shared->own.leaf_count; j += TAKE_THREADS)
+        look_at(v, number, box, v.group_leaves[shared->own.leaf_first + j], except, shared);
+    for (int32_t j = (int32_t)threadIdx.x; j < v.shared_leaf_count; j += TAKE_THREADS)
+        look_at(v, number, box, v.shared_leaves[j], except, shared);
     for (int32_t p = (int32_t)threadIdx.x; p < v.c.plane_count; p += TAKE_THREADS) {
         const uint64_t entry = v.c.planes[p], group = entry >> 32;
         const uint32_t plane = (uint32_t)entry;
@@ -367,7 +405,7 @@ static __device__ void list_near(const hits_view &v, int32_t number, int32_t exc
             (group > 0 && own.group_low == own.group_high && own.group_low != (int32_t)group - 1) ||
             !proxy_plane_meets(&v.c.proxies[plane], &box, 0) || !filters_hit(v, v.c.filters[plane], own.filter))
             continue;
-        v.near[atomicAdd(&v.state->near, 1ull)] = ordered_key(plane, (uint32_t)own.slot);
+        add_near(v, ordered_key(plane, (uint32_t)own.slot), shared);
     }
     __syncthreads();
 }
@@ -375,36 +413,44 @@ static __device__ void list_near(const hits_view &v, int32_t number, int32_t exc
 /* Room for so many more in the list: what does not hold any more goes. Every thread. */
 static __device__ void make_room(const hits_view &v, int64_t initial, int64_t more, struct take_shared *shared)
 {
-    if (shared->count + more > v.foreseen_capacity && threadIdx.x == 0) {
+    if (threadIdx.x == 0 && shared->count + more > shared->own.room) {
+        struct foreseen_hit *list = v.foreseen + shared->own.room_first;
         int64_t kept = initial;
         for (int64_t i = initial; i < shared->count; ++i)
-            if (holds(v, v.foreseen[i])) v.foreseen[kept++] = v.foreseen[i];
+            if (holds(v, list[i])) list[kept++] = list[i];
         shared->count = kept;
-        if (kept + more > v.foreseen_capacity) shared->fails = true;
-        v.state->foreseen = (unsigned long long)kept;
+        if (kept + more > shared->own.room) shared->fails = true;
+        v.progress[shared->group].foreseen = (unsigned long long)kept;
     }
     __syncthreads();
 }
 
+/* In which (sub-)step, and with which marks, hits are taken. */
+struct taking_marks {
+    uint64_t epoch, followed;
+    int64_t initial; /* foreseen by its candidates */
+};
+
 /* What a body that was hit comes near from there on; `except`: a body whose pairs with it are known. Every thread. */
-static __device__ void foresee_body(const hits_view &v, int32_t body, int32_t except, int64_t initial, uint64_t epoch,
-                                    uint64_t mark, struct take_shared *shared)
+static __device__ void foresee_body(const hits_view &v, int32_t body, int32_t except, const struct taking_marks &marks,
+                                    struct take_shared *shared)
 {
     list_shapes(v, body, shared);
-    for (int32_t k = 0; !shared->fails && k < shared->shape_count; ++k) {
-        list_near(v, shared->shapes[k], except);
-        const int64_t near = (int64_t)v.state->near;
-        make_room(v, initial, near, shared);
+    for (int32_t k = 0; !shared->fails && k < (int32_t)shared->shapes; ++k) {
+        list_near(v, shared->leaves[k], except, shared);
+        const int64_t near = (int64_t)shared->near;
+        make_room(v, marks.initial, near, shared);
         if (shared->fails) break;
         for (int64_t j = (int64_t)threadIdx.x; j < near; j += TAKE_THREADS) {
-            const uint64_t key = v.near[j];
-            foresee(v, key, &v.flyers[v.c.proxies[key >> 32].body], &v.flyers[v.c.proxies[key & UINT32_MAX].body],
-                    v.flyers[body].flight.since, epoch, mark);
+            const uint64_t key = v.near[shared->own.near_first + j];
+            foresee(v, shared->group, key, &v.flyers[v.c.proxies[key >> 32].body],
+                    &v.flyers[v.c.proxies[key & UINT32_MAX].body], v.flyers[body].flight.since, marks.epoch,
+                    marks.followed);
         }
         __syncthreads();
         if (threadIdx.x == 0) {
-            shared->count = (int64_t)v.state->foreseen;
-            v.state->near = 0;
+            shared->count = (int64_t)v.progress[shared->group].foreseen;
+            shared->near = 0;
         }
         __syncthreads();
     }
@@ -412,22 +458,21 @@ static __device__ void foresee_body(const hits_view &v, int32_t body, int32_t ex
 }
 
 /* All hits, in the order of time. Every thread. */
-static __device__ void take_all(const hits_view &v, int64_t initial, uint64_t epoch, uint64_t mark,
-                                struct take_shared *shared)
+static __device__ void take_all(const hits_view &v, const struct taking_marks &marks, struct take_shared *shared)
 {
     while (!shared->fails) {
         find_next(v, shared);
         if (shared->item[0] < 0) return;
         if (threadIdx.x == 0) {
-            shared->next = v.foreseen[shared->item[0]];
+            shared->next = v.foreseen[shared->own.room_first + shared->item[0]];
             take_hit(v, shared);
         }
         __syncthreads();
         if (!shared->taken || shared->fails) continue;
         const int32_t a = shared->next.body[0], b = shared->next.body[1];
         const bool moves_a = v.flyers[a].dynamic >= 0, moves_b = v.flyers[b].dynamic >= 0;
-        if (moves_a) foresee_body(v, a, -1, initial, epoch, mark, shared);
-        if (moves_b && !shared->fails) foresee_body(v, b, moves_a ? a : -1, initial, epoch, mark, shared);
+        if (moves_a) foresee_body(v, a, -1, marks, shared);
+        if (moves_b && !shared->fails) foresee_body(v, b, moves_a ? a : -1, marks, shared);
     }
 }
 
@@ -436,7 +481,8 @@ static __device__ bool leave_out(const hits_view &v, uint64_t epoch, struct take
 {
     if (threadIdx.x == 0) shared->found = 0;
     __syncthreads();
-    for (int32_t slot = (int32_t)threadIdx.x; slot < v.c.body_count; slot += TAKE_THREADS) {
+    for (int32_t j = (int32_t)threadIdx.x; j < shared->own.body_count; j += TAKE_THREADS) {
+        const int32_t slot = v.group_bodies[shared->own.body_first + j];
         const struct flyer &f = v.flyers[slot];
         if (f.dynamic < 0 || !(f.too_many || v.marks[slot].lost == epoch) || v.kinds[slot] == SADMM_FLYER_NONE) continue;
         v.kinds[slot] = SADMM_FLYER_NONE;
@@ -446,85 +492,86 @@ static __device__ bool leave_out(const hits_view &v, uint64_t epoch, struct take
     return shared->found != 0;
 }
 
-/* What was hit begins the (sub-)step where it would have. Every thread. */
-static __device__ void write_back(const hits_view &v)
+/* What was hit begins the (sub-)step where it would have. */
+static __device__ __forceinline__ void write_back(const hits_view &v, int32_t slot)
 {
-    for (int32_t slot = (int32_t)threadIdx.x; slot < v.c.body_count; slot += TAKE_THREADS) {
-        const struct flyer &f = v.flyers[slot];
-        if (f.hits == 0) continue;
-        struct sadmm_collision_body *out = &v.step.bodies[slot];
-        double *velocity = v.step.velocity + 6 * (size_t)f.dynamic;
-        struct sadmm_flight_pose pose;
-        v.step.start[f.dynamic] = f.start;
-        for (int k = 0; k < 3; ++k) { /* it flies on: what contacts do not change is right from the start */
-            velocity[k] = f.start.velocity[k] + v.step.settings->dt * f.flight.acceleration[k];
-            velocity[3 + k] = f.flight.spin[k];
-        }
-        flight_at(&f.flight, f.flight.since, &pose);
-        memcpy(out->position, f.start.position, sizeof out->position);
-        memcpy(out->velocity, f.start.velocity, sizeof out->velocity);
-        memcpy(out->orientation, pose.orientation, sizeof out->orientation);
-        if (f.flight.inertia[0] > 0) memcpy(out->velocity + 3, pose.spin, sizeof pose.spin);
-        v.since[slot] = f.flight.since;
+    const struct flyer &f = v.flyers[slot];
+    if (f.hits == 0) return;
+    struct sadmm_collision_body *out = &v.step.bodies[slot];
+    double *velocity = v.step.velocity + 6 * (size_t)f.dynamic;
+    struct sadmm_flight_pose pose;
+    v.step.start[f.dynamic] = f.start;
+    for (int k = 0; k < 3; ++k) { /* it flies on: what contacts do not change is right from the start */
+        velocity[k] = f.start.velocity[k] + v.step.settings->dt * f.flight.acceleration[k];
+        velocity[3 + k] = f.flight.spin[k];
     }
+    flight_at(&f.flight, f.flight.since, &pose);
+    memcpy(out->position, f.start.position, sizeof out->position);
+    memcpy(out->velocity, f.start.velocity, sizeof out->velocity);
+    memcpy(out->orientation, pose.orientation, sizeof out->orientation);
+    if (f.flight.inertia[0] > 0) memcpy(out->velocity + 3, pose.spin, sizeof pose.spin);
+    v.since[slot] = f.flight.since;
 }
 
-/* Thread 0: the (sub-)step's account. */
-static __device__ void end_taking(const hits_view &v, int32_t records, int32_t first, bool quiet)
+/* Every thread of the block. */
+static __device__ void take_group(const hits_view &v, int32_t group, uint64_t epoch, struct take_shared *shared)
 {
-    struct hits_state *state = v.state;
-    state->records[v.step.into] = records;
-    state->first[v.step.into] = first;
-    state->listed = state->foreseen = state->lost = 0;
-    state->quiet = quiet;
-    ++state->epoch;
+    const bool leads = threadIdx.x == 0;
+    const struct hit_group &own = shared->own;
+    __syncthreads();
+    if (leads) {
+        shared->group = group;
+        shared->own = v.groups[group];
+        shared->taken = 0;
+        shared->looks = 0;
+    }
+    __syncthreads();
+    struct taking_marks marks = {epoch, 0, (int64_t)v.progress[group].foreseen};
+    __syncthreads();
+    if (leads) /* what is sure to be more than it may take is not begun */
+        shared->fails = marks.initial > own.room ||
+                        marks.initial * (own.leaf_count + v.shared_leaf_count + v.c.plane_count) > TAKE_LOOKS;
+    __syncthreads();
+    bool done = false;
+    for (int times = 0; times < TAKE_TIMES && !done && !shared->fails; ++times) {
+        marks.followed = followed_mark(epoch, times);
+        __syncthreads();
+        if (leads) {
+            shared->count = marks.initial;
+            shared->record_count = shared->hit_count = 0;
+            v.progress[group].foreseen = (unsigned long long)marks.initial;
+        }
+        __syncthreads();
+        if (times > 0) {
+            begin_again(v, own);
+            follow_listed(v, group, marks.followed);
+        }
+        take_all(v, marks, shared);
+        __syncthreads();
+        if (!shared->fails) done = !leave_out(v, epoch, shared);
+        __syncthreads();
+    }
+    const bool any = done && shared->hit_count > 0;
+    for (int32_t j = (int32_t)threadIdx.x; j < own.body_count; j += TAKE_THREADS) {
+        const int32_t slot = v.group_bodies[own.body_first + j];
+        if (any) write_back(v, slot);
+        if (done) continue;
+        begin_body(v, slot); /* none is taken, and none was foreseen */
+        v.kinds[slot] = SADMM_FLYER_NONE;
+    }
+    if (!leads || !any) return;
+    v.progress[group].records = shared->record_count;
+    v.state->quiet = 0;
 }
 
 static __global__ void __launch_bounds__(TAKE_THREADS) take_kernel(const __grid_constant__ hits_view v)
 {
     follow_if(v.c.early);
     COLLISION_SHARED(take_shared, shared);
-    const bool stops = aborted(v.c), leads = threadIdx.x == 0;
-    const int64_t initial = (int64_t)v.state->foreseen;
-    const int32_t first = v.step.substep > 0 ? v.state->records[v.step.into] : 0;
-    const bool followed = v.state->followed != 0;
+    if (aborted(v.c) || v.state->listed == 0) return;
     const uint64_t epoch = v.state->epoch + 1;
-    __syncthreads();
-    if (stops || !followed) {
-        if (leads && stops) v.state->quiet = 1;
-        else if (leads) end_taking(v, first, first, true);
-        return;
-    }
-    if (leads) {
-        shared.fails = initial > v.foreseen_capacity;
-        shared.taken = 0;
-    }
-    bool done = false;
-    for (int times = 0; times < TAKE_TIMES && !done; ++times) {
-        __syncthreads();
-        if (leads) {
-            shared.count = initial;
-            shared.record_count = first;
-            shared.hit_count = 0;
-            v.state->foreseen = (unsigned long long)initial;
-        }
-        begin_flights(v, times == 0, epoch);
-        if (times > 0) follow_listed(v, followed_mark(epoch, times));
-        take_all(v, initial, epoch, followed_mark(epoch, times), &shared);
-        __syncthreads();
-        if (shared.fails) break;
-        done = !leave_out(v, epoch, &shared);
-        __syncthreads();
-    }
-    const bool any = done && !shared.fails && shared.hit_count > 0;
-    __syncthreads();
-    if (any) write_back(v);
-    if (!done || shared.fails) { /* none are taken, and none foreseen */
-        for (int32_t slot = (int32_t)threadIdx.x; slot < v.c.body_count; slot += TAKE_THREADS)
-            v.kinds[slot] = SADMM_FLYER_NONE;
-    }
-    __syncthreads();
-    if (leads) end_taking(v, any ? shared.record_count : first, first, !any);
+    for (int32_t group = (int32_t)blockIdx.x; group < v.group_count; group += (int32_t)gridDim.x)
+        if (v.progress[group].followed != 0) take_group(v, group, epoch, &shared);
 }
 
 void COLLISION(hits_take_kernels)(struct hits_kernels *kernels)

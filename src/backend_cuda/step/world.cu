@@ -185,7 +185,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                           buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),
                           &c->view.model.live->abort_code, &kept->settings.dt, &kept->gravity, error));
-    TRY(COLLISION(load_hits)(s->collision, c->stream, world->held, s->bodies, error));
+    TRY(COLLISION(load_hits)(s->collision, c->stream, world->input, world->held, error));
     CUDA(view_into)(c, s->into, 0);
     return CUDA(wait)(c, error);
 }
