@@ -315,6 +315,9 @@ START_TEST(a_ball_falls_and_bounces)
                                             state.linear_velocity[2] * state.linear_velocity[2] / 2,
                                         energy, g * backends[_i].tolerance * 10);
             }
+#ifdef HITS_ON_CUDA
+            ck_assert_int_gt(world_report(world).repeated, 0); /* no bounce was planned, and some steps have them twice */
+#endif
             sadmm_world_destroy(world);
         }
 }
@@ -930,6 +933,7 @@ START_TEST(host_and_device_agree)
             if (c < 2) throw_more(world);
             else throw_apart(world);
             if (w == 0) by_host(world);
+            else if (c == 1) tune_capacities(tables[backends[_i].precision], world->context, 1);
         }
         for (int k = 0; k < STEPS; ++k) {
             for (int w = 0; w < 2; ++w) step_world(worlds[w], 1);

@@ -6,11 +6,6 @@ void sadmm_flight_at(const struct sadmm_flight *flight, double t, struct sadmm_f
     flight_at(flight, t, pose);
 }
 
-bool sadmm_first_touch_of(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_first_touch *touch)
-{
-    return flying_touch_of(pair, from, to, touch);
-}
-
 bool sadmm_first_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_first_touch *touch)
 {
     return flying_first_touch(pair, from, to, touch);

@@ -56,10 +56,8 @@ struct sadmm_first_touch {
     uint32_t feature[SADMM_MANIFOLD_POINTS];
 };
 
-/* False: no point touches in [from, to] that approaches fast enough. Points of the result: all that touch then. */
-bool sadmm_first_touch_of(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_first_touch *touch);
-
-/* The first of all children of the pair, none of which is a mesh; `child`: which. */
+/* False: no point of the pair, none of which is a mesh, touches in [from, to] that approaches fast enough. Points of the
+ * result: all that touch then; `child`: of which of its children, the first one that touches. */
 bool sadmm_first_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_first_touch *touch);
 
 #ifdef __cplusplus

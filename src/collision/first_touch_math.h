@@ -199,6 +199,7 @@ SADMM_INLINE bool touch_balls_meet(const struct sadmm_flying_pair *p, double fro
     return length3(x) <= (1 + TOUCH_NEAR) * (reach + sags);
 }
 
+/* Of one child. */
 SADMM_RARE bool flying_touch_of(struct sadmm_flying_pair *p, double from, double to, struct sadmm_first_touch *touch)
 {
     const double thin = touch_thinner(p), passed = touch_passed_at_once(p, to - from);

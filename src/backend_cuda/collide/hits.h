@@ -31,7 +31,7 @@ enum {
 #endif
     TAKE_BLOCKS = 1024,      /* which go on to other groups */
     TAKE_SHAPES = 64,        /* of a body that was hit, ... */
-    TAKE_LOOKS = 1 << 21,    /* ... shapes that are looked at in a (sub-)step, ... */
+    TAKE_LOOKS = 1 << 18,    /* ... shapes that are looked at in a (sub-)step, ... */
     HIT_ROOM = 64,           /* ... hits that are foreseen at a time, ... */
     HIT_ROOM_A_SHAPE = 4,    /* ... and so many more a shape, ... */
     HIT_RECORDS = 32,        /* ... points of a step's hits, ... */

@@ -58,7 +58,8 @@ static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_c
     const uint64_t epoch = v.state->epoch + 1;
     const int64_t candidates = usable_candidates(v.c), pairs = v.c.before.counts->pairs;
     const int64_t pieces = (int64_t)v.step.body_count * (int64_t)(sizeof(struct sadmm_rigid) / sizeof(wide_piece));
-    for (int64_t i = thread; i < pieces; i += stride) ((wide_piece *)v.step.start)[i] = ((const wide_piece *)v.step.before)[i];
+    const wide_piece *from = (const wide_piece *)v.step.before;
+    for (int64_t i = thread; i < pieces; i += stride) ((wide_piece *)v.step.start)[i] = from[i];
     for (int64_t i = thread; i < candidates; i += stride)
         if (is_fast(v, step, threshold, candidate_of(v.c, v.c.candidates[i])))
             v.listed[atomicAdd(&v.state->listed, 1ull)] = (int32_t)i;
@@ -137,7 +138,10 @@ static __device__ __noinline__ void foresee(const hits_view &v, int32_t group, u
 }
 
 /* Of flyers that were looked at the times + 1st time. */
-static __device__ __forceinline__ uint64_t followed_mark(uint64_t epoch, int times) { return epoch * TAKE_TIMES + times; }
+static __device__ __forceinline__ uint64_t followed_mark(uint64_t epoch, int times)
+{
+    return epoch * TAKE_TIMES + (uint64_t)times;
+}
 
 static __device__ __forceinline__ int32_t group_of(const hits_view &v, int32_t a, int32_t b)
 {
@@ -306,7 +310,8 @@ static __device__ __noinline__ void take_hit(const hits_view &v, struct take_sha
         may = false;
     }
     if (!may) {
-        v.foreseen[shared->own.room_first + shared->item[0]].hits[0] = UINT32_MAX; /* it does not hold; nor the next time, without one of them */
+        /* it does not hold; nor the next time, without one of them */
+        v.foreseen[shared->own.room_first + shared->item[0]].hits[0] = UINT32_MAX;
         return;
     }
     const struct sadmm_proxy &a = v.c.proxies[item.key >> 32], &b = v.c.proxies[item.key & UINT32_MAX];
@@ -484,7 +489,7 @@ static __device__ bool leave_out(const hits_view &v, uint64_t epoch, struct take
     for (int32_t j = (int32_t)threadIdx.x; j < shared->own.body_count; j += TAKE_THREADS) {
         const int32_t slot = v.group_bodies[shared->own.body_first + j];
         const struct flyer &f = v.flyers[slot];
-        if (f.dynamic < 0 || !(f.too_many || v.marks[slot].lost == epoch) || v.kinds[slot] == SADMM_FLYER_NONE) continue;
+        if (f.dynamic < 0 || v.kinds[slot] == SADMM_FLYER_NONE || !(f.too_many || v.marks[slot].lost == epoch)) continue;
         v.kinds[slot] = SADMM_FLYER_NONE;
         shared->found = 1;
     }

@@ -71,8 +71,8 @@ SADMM_INLINE void flyer_turn_evenly(struct sadmm_flight *flight, quat q, vec3 be
     flight->at = at;
 }
 
-/* The most by which a body's angular velocity differs from that halfway: it changes by ((I_y - I_z) / I_x w_y w_z, ...) in
- * the body's frame, w no larger than rigid_rate2 says. */
+/* The most by which a body's angular velocity differs from that halfway: it changes by ((I_y - I_z) / I_x w_y w_z, ...)
+ * in the body's frame, w no larger than rigid_rate2 says. */
 SADMM_INLINE double flyer_sway(vec3 inertia, struct rigid_spin halfway, double dt)
 {
     const vec3 w = m3_tmul(q_matrix(halfway.orientation), halfway.angular),
@@ -292,7 +292,8 @@ SADMM_INLINE void flyers_open_gap(const struct sadmm_contact_pair *pair, const s
                                   const struct sadmm_flight *b, double thinner, const struct sadmm_settings *settings,
                                   struct sadmm_contact_point *point)
 {
-    const double speed = flyers_approach(pair, point, a, b, settings->dt), way = (1 + FLYERS_OPEN) * speed * settings->dt;
+    const double speed = flyers_approach(pair, point, a, b, settings->dt),
+                 way = (1 + FLYERS_OPEN) * speed * settings->dt;
     if (speed > settings->restitution_threshold && way > point->gap && way - point->gap <= FLYERS_OPENED_MOST * thinner)
         point->gap = way;
 }

@@ -250,7 +250,8 @@ struct sadmm_world {
         struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
         unsigned char *held; /* by body slot, of a world that may have hits (hits.c) */
         bool hits, hits_behind; /* it may, as it was loaded; those of the last step are not here yet */
-        size_t held_capacity, steady_capacity, driven_capacity, driven_wrench_capacity, edited_count, edited_capacity, edit_capacity;
+        size_t held_capacity, steady_capacity, driven_capacity, driven_wrench_capacity, edited_count, edited_capacity,
+            edit_capacity;
         struct sadmm_resident_joint *joints; /* as they were loaded; */
         struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
         int32_t *joint_slots;                /* their slots */
