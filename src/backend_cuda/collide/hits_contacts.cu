@@ -72,7 +72,7 @@ static __global__ void __launch_bounds__(HIT_THREADS) replace_kernel(const __gri
     const int64_t thread = collision_thread(HIT_THREADS), stride = (int64_t)gridDim.x * HIT_THREADS;
     if (v.state->quiet) return;
     const struct collision_step step = step_of(v.c);
-    if (thread == 0) v.c.candidate_count[COUNT_FOUND] = 0;
+    if (thread == 0) v.c.candidate_count[COUNT_FOUND] = v.c.candidate_count[COUNT_MESH_PAIRS] = 0;
     for (int64_t i = thread; i < v.c.leaf_count; i += stride) replace_leaf(v, step, (int32_t)i);
     for (int64_t i = thread; !v.few && i < v.c.candidate_capacity; i += stride) v.c.found[i] = ~UINT64_C(0);
 }
@@ -84,6 +84,36 @@ static __device__ __forceinline__ double since_of(const hits_view &v, const stru
                                                   const struct sadmm_proxy *b)
 {
     return larger_of(v.since[a->body], v.since[b->body]);
+}
+
+/* From where a pair with a mesh that moves on is found, as find_triangles has it on the host: where it first touches any
+ * of its triangles. They are neighbours in the list. */
+static __device__ __noinline__ void start_on_mesh(const hits_view &v, const struct collision_step &step,
+                                                  const struct candidate &own, const struct sadmm_proxy *a,
+                                                  const struct sadmm_proxy *b, double left, struct pair_start *start)
+{
+    const uint64_t key = first_candidate(v.c, own.a, own.b);
+    const int64_t count = usable_candidates(v.c);
+    double least = HUGE_VAL;
+    for (int64_t i = lower_bound(v.c.candidates, count, key);
+         i < count && v.c.candidates[i] >> v.c.child_bits == key >> v.c.child_bits; ++i)
+        least = smaller_of(
+            mesh_first_touch(a, b, v.c.hulls, candidate_of(v.c, v.c.candidates[i]).child, step.gravity, left), least);
+    mesh_start_at(a, b, least, step.margin, step.gravity, left, start);
+}
+
+static __device__ __noinline__ void find_on_mesh(const hits_view &v, const struct collision_step &step,
+                                                 const struct candidate &own, const struct sadmm_proxy *a,
+                                                 const struct sadmm_proxy *b, double left, struct pair_start *start,
+                                                 uint32_t cache, struct manifold *m)
+{
+    if (start->moves_on) start_on_mesh(v, step, own, a, b, left, start);
+    m->count = 0;
+    m->cache = 0;
+    triangle_manifold(&a->geometry, &b->geometry, v.c.hulls, own.child, &start->pose, (real)start->limit, cache, m);
+    m->ahead = start->ahead;
+    if (pair_asks_balls(a, b, v.c.hulls, own.child, start, step.gravity, left, m))
+        inner_balls_add(a, b, v.c.hulls, own.child, cache != 0, start->touch, step.gravity, left, m);
 }
 
 /* As find_later on the host. */
@@ -103,13 +133,16 @@ static __global__ void __launch_bounds__(NARROW_THREADS) later_kernel(const __gr
         if (!(since > 0)) continue;
         proxy_begin_later(a, v.since[a->body], since, step.dt, &later_a);
         proxy_begin_later(b, v.since[b->body], since, step.dt, &later_b);
-        const struct pair_start start = pair_start_of(&later_a, &later_b, step.margin, step.gravity, left);
+        struct pair_start start = pair_start_of(&later_a, &later_b, step.margin, step.gravity, left);
         int64_t before = search_pair(v.c, own, count);
         uint32_t cache = 0;
         if (before >= 0 && contact_goes_on(&v.c.before.pairs[before], own.child, &later_a, &later_b))
             cache = contact_memory(&v.c.before.pairs[before], &later_a, &later_b);
         else before = -1;
-        find_manifold(&later_a, &later_b, v.c.hulls, own.child, step.margin, step.gravity, left, &start, cache, &m);
+        if (b->geometry.type == SADMM_SHAPE_MESH)
+            find_on_mesh(v, step, own, &later_a, &later_b, left, &start, cache, &m);
+        else
+            find_manifold(&later_a, &later_b, v.c.hulls, own.child, step.margin, step.gravity, left, &start, cache, &m);
         m.ahead += since;
         store_manifold(v.c, i, m, before);
     }
@@ -164,7 +197,7 @@ static __device__ __forceinline__ void open_gaps(const hits_view &v, const struc
                                                  const struct sadmm_contact_pair *pair)
 {
     const struct sadmm_proxy *a = &v.c.proxies[own.a], *b = &v.c.proxies[own.b];
-    if (!(pair->restitution > 0) || !is_followed(v, a->body) || !is_followed(v, b->body)) return;
+    if (b->geometry.type == SADMM_SHAPE_MESH || !(pair->restitution > 0) || !is_followed(v, a->body) || !is_followed(v, b->body)) return;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
         flyers_open_gap(pair, &v.flyers[a->body].flight, &v.flyers[b->body].flight, fmin(a->thin, b->thin),
                         v.step.settings, &v.c.after.points[k]);

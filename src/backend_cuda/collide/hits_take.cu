@@ -29,12 +29,11 @@ static __device__ __forceinline__ bool pair_presses(const hits_view &v, const st
 }
 
 /* As sadmm_collision_list_fast on the host. */
-static __device__ __forceinline__ bool is_fast(const hits_view &v, const struct collision_step &step, double threshold,
-                                               const struct candidate &own)
+static __device__ __forceinline__ bool is_fast(const struct collision_step &step, double threshold,
+                                               const struct sadmm_proxy &a, const struct sadmm_proxy &b)
 {
-    const struct sadmm_proxy &a = v.c.proxies[own.a], &b = v.c.proxies[own.b];
     const bool both = a.system_body >= 0 && b.system_body >= 0; /* they fall alike */
-    if (own.child > 0 || !(a.restitution > 0 || b.restitution > 0)) return false;
+    if (!(a.restitution > 0 || b.restitution > 0)) return false;
     const double way = relative_speed(a.velocity, b.velocity) * step.dt + a.spin + b.spin + a.fall + b.fall +
                        (both ? 0 : fall_of(step.gravity, step.dt));
     return way > threshold * step.dt;
@@ -60,9 +59,12 @@ static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_c
     const int64_t pieces = (int64_t)v.step.body_count * (int64_t)(sizeof(struct sadmm_rigid) / sizeof(wide_piece));
     const wide_piece *from = (const wide_piece *)v.step.before;
     for (int64_t i = thread; i < pieces; i += stride) ((wide_piece *)v.step.start)[i] = from[i];
-    for (int64_t i = thread; i < candidates; i += stride)
-        if (is_fast(v, step, threshold, candidate_of(v.c, v.c.candidates[i])))
+    for (int64_t i = thread; i < candidates; i += stride) {
+        const struct candidate own = candidate_of(v.c, v.c.candidates[i]);
+        const struct sadmm_proxy &a = v.c.proxies[own.a], &b = v.c.proxies[own.b];
+        if (own.child == 0 && b.geometry.type != SADMM_SHAPE_MESH && is_fast(step, threshold, a, b))
             v.listed[atomicAdd(&v.state->listed, 1ull)] = (int32_t)i;
+    }
     for (int64_t p = thread; p < pairs; p += stride) {
         const struct sadmm_contact_pair &pair = v.c.before.pairs[p];
         if (!pair_presses(v, pair)) continue;
@@ -124,6 +126,7 @@ static __device__ __noinline__ void foresee(const hits_view &v, int32_t group, u
                                      v.step.settings->restitution_threshold,
                                      false};
     v.marks[a->slot].followed = v.marks[b->slot].followed = mark;
+    if (pair.b.geometry->type == SADMM_SHAPE_MESH) return; /* the solve's: what its triangles push along depends on others */
     const bool found = flying_first_touch(&pair, from, v.step.settings->dt, &hit.touch);
     if (pair.lost) v.marks[a->slot].lost = v.marks[b->slot].lost = epoch;
     if (!found) return;
@@ -156,6 +159,24 @@ static __device__ __forceinline__ void begin_body(const hits_view &v, int32_t sl
     v.since[slot] = 0;
 }
 
+/* Pairs with a mesh are the solve's, but flyers that are fast enough are followed. kind: of a body. */
+template <class Kind>
+static __device__ __forceinline__ void follow_on_meshes(const hits_view &v, int64_t thread, int64_t stride,
+                                                        uint64_t mark, const Kind &kind)
+{
+    if (v.c.mesh_count == 0) return;
+    const struct collision_step step = step_of(v.c);
+    const int64_t count = usable_candidates(v.c) > 0 ? (int64_t)v.c.candidate_count[COUNT_MESH_PAIRS] : 0;
+    for (int64_t j = thread; j < count; j += stride) {
+        const struct candidate own = candidate_of(v.c, v.c.mesh_pairs[j]);
+        const struct sadmm_proxy &a = v.c.proxies[own.a], &b = v.c.proxies[own.b];
+        if (!is_fast(step, v.step.settings->restitution_threshold, a, b) ||
+            !kinds_hit(kind(a.body), kind(b.body)))
+            continue;
+        v.marks[a.body].followed = v.marks[b.body].followed = mark;
+    }
+}
+
 /* Beside it all flyers and boxes for `take`. */
 static __global__ void __launch_bounds__(FORESEE_THREADS) foresee_kernel(const __grid_constant__ hits_view v)
 {
@@ -175,6 +196,8 @@ static __global__ void __launch_bounds__(FORESEE_THREADS) foresee_kernel(const _
         v.progress[group_of(v, a, b)].followed = mark;
         foresee(v, group_of(v, a, b), ordered_key(own.a, own.b), &flyers[0], &flyers[1], 0, epoch, mark);
     }
+    if (count > 0)
+        follow_on_meshes(v, thread, stride, mark, [&v, epoch](int32_t body) { return kind_of(v, body, epoch); });
     for (int64_t slot = thread; count > 0 && slot < v.c.body_count; slot += stride) {
         begin_body(v, (int32_t)slot);
         v.kinds[slot] = kind_of(v, (int32_t)slot, epoch);
@@ -224,6 +247,9 @@ static __device__ void follow_listed(const hits_view &v, int32_t group, uint64_t
         if (group_of(v, a, b) == group && kinds_hit(v.kinds[a], v.kinds[b]))
             v.marks[a].followed = v.marks[b].followed = mark;
     }
+    follow_on_meshes(v, (int64_t)threadIdx.x, TAKE_THREADS, mark, [&v, group](int32_t body) {
+        return v.group_of[body] < 0 || v.group_of[body] == group ? v.kinds[body] : (unsigned char)SADMM_FLYER_NONE;
+    });
     if (threadIdx.x == 0) v.progress[group].followed = mark;
     __syncthreads();
 }

@@ -407,8 +407,7 @@ bool sadmm_world_may_hit(const sadmm_world *world)
     for (size_t slot = 0; slot < world->shape_slots; ++slot) {
         const struct sadmm_shape *shape = &world->shapes[slot];
         if (!sadmm_shape_collides(shape)) continue;
-        const struct sadmm_geometry *geometry = &world->geometries[shape->geometry];
-        if (geometry->type == SADMM_SHAPE_MESH || geometry_is_smooth(geometry)) return false;
+        if (geometry_is_smooth(&world->geometries[shape->geometry])) return false;
     }
     return true;
 }
