@@ -121,9 +121,9 @@ typedef struct sadmm_settings {
 
     int hits;                    /* worlds: bodies in flight that hit something, faster than restitution_threshold and
                                     with restitution (of either shape), do so at the moment of their first touch within
-                                    the (sub-)step, so many times each at most; what would be hit more often is left to
-                                    the solve, and so is what rests on something, has joints, or hits a mesh
-                                    (docs/algorithm.md, section 6), and on CUDA worlds with meshes or smooth bodies. In
+                                    the (sub-)step, so many times each at most; one that would be hit more often is left
+                                    to the solve, and so is what rests on something, has joints, or hits a mesh
+                                    (docs/algorithm.md, section 6; CUDA leaves more to it where there are very many). In
                                     [0, SADMM_MOST_HITS = 64]; 0: all is; default 16 */
 
     int threads;                 /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have

@@ -53,7 +53,7 @@ sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *st
 sadmm_status COLLISION(load_hits)(struct sadmm_cuda_collision *collision, void *stream,
                                   const struct sadmm_collision_input *input, const unsigned char *held,
                                   struct sadmm_error *error);
-/* Does it take any: not where there are meshes or smooth bodies. */
+/* Does it take any? */
 bool COLLISION(takes_hits)(const struct sadmm_cuda_collision *collision);
 /* Launches alone, before those of enqueue for the same find, which has `hits`: candidates, and the step's hits. */
 sadmm_status COLLISION(enqueue_hits)(struct sadmm_cuda_collision *collision, void *stream,

@@ -199,7 +199,7 @@ extern "C" sadmm_status COLLISION(load_hits)(struct sadmm_cuda_collision *c, voi
 {
     struct hits_view *h = &c->hits;
     const size_t slots = (size_t)c->view.body_count;
-    c->takes_hits = held && slots > 0 && c->view.leaf_count > 0 && !c->smooth;
+    c->takes_hits = held && slots > 0 && c->view.leaf_count > 0;
     if (!c->takes_hits) return SADMM_OK;
     ENTER(c);
     TRY(begin_work(c, stream, error));

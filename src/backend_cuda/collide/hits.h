@@ -12,8 +12,8 @@
  * that of the least (time, key), a list's length and what becomes of it are the same in any order. Bodies of two
  * environments never meet: each environment is a group, whose hits a block takes by itself, unless a body that moves is in
  * none of them; then all are one group. What a group may take is limited, by the world and the group alone: beyond that
- * its bodies are left to the solve, for the (sub-)step. Of worlds without meshes and smooth bodies; others have none of it.
- * Formulas are the host's: core/world/flyer.h, collision/first_touch_math.h, core/math/hit.h. */
+ * its bodies are left to the solve, for the (sub-)step. Formulas are the host's: core/world/flyer.h, collision/
+ * first_touch_math.h, core/math/hit.h. */
 #ifndef SADMM_CUDA_COLLIDE_HITS_H
 #define SADMM_CUDA_COLLIDE_HITS_H
 

@@ -1,6 +1,5 @@
 /* Contacts after hits (hits.h): shapes of what was hit, where they are now; their manifolds and points; and what hits
  * gave bodies. */
-#define SADMM_WITHOUT_SMOOTH
 #include "hits.h"
 #include "narrow.h"
 

@@ -1,5 +1,4 @@
 /* Hits: from candidates to what is left when all have been taken (hits.h). */
-#define SADMM_WITHOUT_SMOOTH
 #include "hits.h"
 
 /* C headers: an enumerator beside an unsigned number is fine there. */

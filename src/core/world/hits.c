@@ -399,26 +399,13 @@ static sadmm_status take_most(struct taking *t)
     return SADMM_OK;
 }
 
-/* Not where devices do not take them (backend_cuda/collide/hits.h), whoever makes the step. */
-bool sadmm_world_may_hit(const sadmm_world *world)
-{
-    if (world->bouncing_count == 0) return false;
-    if (world->kernels->backend != SADMM_BACKEND_CUDA) return true;
-    for (size_t slot = 0; slot < world->shape_slots; ++slot) {
-        const struct sadmm_shape *shape = &world->shapes[slot];
-        if (!sadmm_shape_collides(shape)) continue;
-        if (geometry_is_smooth(&world->geometries[shape->geometry])) return false;
-    }
-    return true;
-}
-
 sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep)
 {
     struct taking t = {.world = world, .settings = sadmm_settings_of_substep(&world->def.settings)};
     forget(world);
     if (substep == 0) world->start.hit_count = 0;
     world->start.hit_first = world->start.hit_count;
-    if (t.settings.hits == 0 || !sadmm_world_may_hit(world) || !any_fast(world, t.settings.restitution_threshold))
+    if (world->bouncing_count == 0 || t.settings.hits == 0 || !any_fast(world, t.settings.restitution_threshold))
         return SADMM_OK;
     if (!world->hits) world->hits = (struct sadmm_hits *)sadmm_alloc(1, sizeof *world->hits);
     if (!world->hits || !reserve(world->hits, world->body_slots)) return sadmm_fail_memory(&world->error, "hits");

@@ -126,7 +126,7 @@ static void begin_edits(struct sadmm_world_body *body)
 /* Which bodies joints hold, where hits are to be taken at their moment. */
 static sadmm_status list_held(sadmm_world *world)
 {
-    world->resident.hits = sadmm_world_may_hit(world);
+    world->resident.hits = world->bouncing_count > 0;
     if (!world->resident.hits) return SADMM_OK;
     if (!sadmm_grow(&world->resident.held, &world->resident.held_capacity, 0, world->body_slots,
                     sizeof *world->resident.held))

@@ -355,8 +355,6 @@ sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
 /* Hits of bodies in flight in the sub-step at hand, each at its moment: `start` and the bodies as collision sees them
  * become what they are after them. */
 sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep);
-/* May a step have any? It has none on CUDA where there are meshes or smooth bodies. */
-bool sadmm_world_may_hit(const sadmm_world *world);
 /* Dynamic bodies, by slot, that joints hold. */
 void sadmm_world_mark_held(const sadmm_world *world, unsigned char *bodies, unsigned char mark);
 /* Pairs that were followed to the end of the sub-step touch no more in it: planes laid through their contacts may say
