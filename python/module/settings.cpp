@@ -48,7 +48,7 @@ void bind_settings(nb::module_ &m)
     bind_whole(c, "check_period", &S::check_period, "Iterations between convergence checks, in [1, 1000000].");
     bind_whole(c, "hits", &S::hits,
                "Hits of a body in flight, with restitution or so fast that two pass by their own size, that are taken at their\n"
-               "moment within a (sub-)step, at most, in [0, 64]; 0: none, the solve has them all. CUDA takes it for 0.");
+               "moment within a (sub-)step, at most, in [0, 64]; 0: none, the solve has them all.");
     bind_whole(c, "threads", &S::threads, "CPU threads at most, in [0, 1024]; 0: no bound. Results do not depend on it.");
 
     using C = sadmm_certificate;
