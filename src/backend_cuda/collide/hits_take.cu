@@ -44,6 +44,7 @@ static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_c
     const double threshold = v.step.settings->restitution_threshold;
     const uint64_t epoch = v.state->epoch + 1;
     const int64_t candidates = usable_candidates(v.c), pairs = v.c.before.counts->pairs;
+    static_assert(sizeof(struct sadmm_rigid) % sizeof(wide_piece) == 0, "a copy is of whole pieces");
     const int64_t pieces = (int64_t)v.step.body_count * (int64_t)(sizeof(struct sadmm_rigid) / sizeof(wide_piece));
     const wide_piece *from = (const wide_piece *)v.step.before;
     for (int64_t i = thread; i < pieces; i += stride) ((wide_piece *)v.step.start)[i] = from[i];
@@ -220,7 +221,7 @@ struct take_shared {
     struct hit_group own;
     unsigned long long shapes, near, looks; /* of a body that was hit; near one of these; in all */
     int64_t count;               /* of the list */
-    int32_t leaves[TAKE_SHAPES]; /* of a body that was hit */
+    int32_t listed[TAKE_SHAPES], leaves[TAKE_SHAPES]; /* of a body that was hit: as they come, and in order */
     int32_t group, record_count, hit_count, found, taken;
     bool fails;
 };
@@ -364,7 +365,8 @@ static __device__ __noinline__ void take_hit(const hits_view &v, struct take_sha
     ++shared->hit_count;
 }
 
-/* The shapes of a body that was hit, and their boxes from then on. Every thread. */
+/* The shapes of a body that was hit, and their boxes from then on. In order: whether there is room for what one of them
+ * comes near depends on those before it. Every thread. */
 static __device__ void list_shapes(const hits_view &v, int32_t body, struct take_shared *shared)
 {
     const struct flyer &f = v.flyers[body];
@@ -380,9 +382,16 @@ static __device__ void list_shapes(const hits_view &v, int32_t body, struct take
         flight_at(&f.flight, f.flight.since, &from);
         flight_at(&f.flight, v.step.settings->dt, &to);
         flyer_box(shape, &v.c.geometries[shape->geometry], &f.flight, v.step.settings->dt, &from, &to, &v.boxes[i]);
-        shared->leaves[at] = i;
+        shared->listed[at] = i;
     }
     __syncthreads();
+    for (int32_t k = (int32_t)threadIdx.x; shared->shapes <= TAKE_SHAPES && k < (int32_t)shared->shapes;
+         k += TAKE_THREADS) {
+        int32_t rank = 0;
+        for (int32_t other = 0; other < (int32_t)shared->shapes; ++other)
+            rank += shared->listed[other] < shared->listed[k];
+        shared->leaves[rank] = shared->listed[k];
+    }
     if (threadIdx.x == 0) {
         shared->looks += (shared->shapes + 1) *
                          (unsigned long long)(shared->own.leaf_count + v.shared_leaf_count + v.c.plane_count);
