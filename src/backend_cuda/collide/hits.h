@@ -8,8 +8,9 @@
  *   later     manifolds of what was hit, in what is left of the step               a thread a candidate, after `narrow`
  *   reopen    their points, and gaps of flyers                                     after `emit`
  *
- * Where nothing is fast all of them return at once. Lists have no order, and results do not depend on it: the next hit is
- * that of the least (time, key), a list's length and what becomes of it are the same in any order. Bodies of two
+ * Steps have these kernels if they are planned to (CUDA(plan_hits)); where nothing is fast all of them return at once. Lists have no order, and results do not depend on it: the next hit is
+ * that of the least (time, key), shapes of a body are taken in order, a list's length and what becomes of it are the same
+ * in any order. Bodies of two
  * environments never meet: each environment is a group, whose hits a block takes by itself, unless a body that moves is in
  * none of them; then all are one group. What a group may take is limited, by the world and the group alone: beyond that
  * its bodies are left to the solve, for the (sub-)step. Formulas are the host's: core/world/flyer.h, collision/
