@@ -968,6 +968,11 @@ static void throw_fast(sadmm_world *world)
         }
         add_thrown(world, i % 2 ? SADMM_SHAPE_BOX : SADMM_SHAPE_SPHERE, size, &state, random_in(0.5, 3), 0.4, 0);
     }
+    for (int i = 0; i < 3; ++i) { /* in the second step one hits the next, and that one the last */
+        const struct ball ball = {
+            .x = {i ? -0.1 + 0.05 * i : -0.35, 0.36, 0.36}, .v = {i ? 0 : 10}, .radius = 0.01, .mass = i ? 1 : 3};
+        add_ball(world, &ball, SADMM_BODY_DYNAMIC, 0, 0);
+    }
     body.type = SADMM_BODY_KINEMATIC;
     body.angular_velocity[2] = 50;
     MUST(world, sadmm_world_add_body(world, &body, &id));
