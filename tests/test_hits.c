@@ -1,5 +1,11 @@
 /* Hits of bodies in flight, each at its moment within a step: against the laws of Newton and Coulomb in closed form, and
- * against an event-driven simulation of balls in a box. */
+ * against an event-driven simulation of balls in a box. On CUDA in test_cuda_hits.c (HITS_ON_CUDA), which includes this
+ * file. */
+#ifdef HITS_ON_CUDA
+#include "cuda_worlds.h"
+#else
+enum { EMULATED = 0 };
+#endif
 #include "bouncing.h"
 #include "collision/box_row.h"
 #include "collision/candidates.h"
@@ -7,18 +13,28 @@
 #include "core/base/parallel.h"
 #include "core/math/rigid.h"
 #include "fewer.h"
+#ifndef HITS_ON_CUDA
 #include "run_suite.h"
+#endif
 
 static const struct {
     sadmm_backend backend;
     sadmm_precision precision;
     double tolerance; /* of velocities, as a share: rounding of the precision, summed up over some steps */
-} tables[] = {
+} backends[] = {
+#ifdef HITS_ON_CUDA
+    {SADMM_BACKEND_CUDA, SADMM_F64, 1e-9},
+    {SADMM_BACKEND_CUDA, SADMM_F32, 1e-6},
+#else
     {SADMM_BACKEND_CPU, SADMM_F64, 1e-9},
     {SADMM_BACKEND_CPU, SADMM_F32, 1e-6},
     {SADMM_BACKEND_REF, SADMM_F64, 1e-9},
+#endif
 };
-enum { TABLES = sizeof tables / sizeof tables[0] };
+enum { TABLES = sizeof backends / sizeof backends[0] };
+
+/* The emulated device takes seconds for what others do in milliseconds. */
+static int some(int count) { return EMULATED ? (count + 19) / 20 : fewer(count); }
 
 static uint64_t random_state;
 
@@ -31,16 +47,29 @@ static double random_in(double low, double high)
 /* What has no restitution at all is left to the solve. */
 static const double ALMOST_NONE = 1e-12;
 
+/* A world of a backend. */
+static sadmm_world *world_of(sadmm_world_def *def, sadmm_backend backend)
+{
+#ifdef HITS_ON_CUDA
+    def->backend = SADMM_BACKEND_CPU;
+    sadmm_world *world = create_world(def);
+    if (backend == SADMM_BACKEND_CUDA) use_device(world, (int)def->precision, 0);
+    return world;
+#else
+    def->backend = backend;
+    return create_world(def);
+#endif
+}
+
 static sadmm_world *new_world(int table, double dt, double gravity)
 {
     sadmm_world_def def = sadmm_world_def_default();
-    def.backend = tables[table].backend;
-    def.precision = tables[table].precision;
+    def.precision = backends[table].precision;
     def.settings.dt = dt;
     def.settings.threads = 1;
     def.settings.restitution_threshold = 1e-6; /* slow ones are hits as well */
     def.settings.gravity[2] = -gravity;
-    return create_world(&def);
+    return world_of(&def, backends[table].backend);
 }
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -149,7 +178,7 @@ START_TEST(two_balls_meet)
 {
     static const sadmm_body_type types[] = {SADMM_BODY_DYNAMIC, SADMM_BODY_STATIC, SADMM_BODY_KINEMATIC};
     random_state = 7;
-    for (int c = 0; c < fewer(COLLISIONS); ++c) {
+    for (int c = 0; c < some(COLLISIONS); ++c) {
         const sadmm_body_type type = types[c % 3];
         const double dt = c % 2 ? 0.005 : 0.02, speed = pow(10, random_in(-0.3, 1.7)),
                      friction = c % 4 ? random_in(0, 1) : 0,
@@ -187,7 +216,7 @@ START_TEST(two_balls_meet)
         for (int k = 0; k < 3; ++k) a.x[k] += (3 * dt - moment) * a.v[k], b.x[k] += (3 * dt - moment) * b.v[k];
         const char *kind = type == SADMM_BODY_DYNAMIC ? "dynamic" : type == SADMM_BODY_STATIC ? "static" : "kinematic";
         /* what velocities are rounded by turns the normal, by the more the farther the balls go */
-        const double tolerance = tables[_i].tolerance * (1 + speed * dt / fmin(a.radius, b.radius));
+        const double tolerance = backends[_i].tolerance * (1 + speed * dt / fmin(a.radius, b.radius));
         expect_ball(world, id[0], &a, speed, tolerance, kind);
         if (type == SADMM_BODY_DYNAMIC) expect_ball(world, id[1], &b, speed, tolerance, kind);
         sadmm_world_destroy(world);
@@ -199,7 +228,7 @@ END_TEST
  * touches in the next step hits then. */
 START_TEST(a_hit_is_not_taken_too_soon)
 {
-    for (int c = 0; c < 20; ++c) {
+    for (int c = 0; c < 20; c += EMULATED ? 7 : 1) {
         const double dt = 0.005, speed = 4, offset = 0.7, along = sqrt(1 - offset * offset),
                      moment = (1 + 0.02 * (c + 0.5)) * dt; /* of the touch */
         struct ball a = {.v = {speed, 0, 0}, .radius = 0.05, .mass = 1}, b = {.radius = 0.05, .mass = 1};
@@ -212,8 +241,8 @@ START_TEST(a_hit_is_not_taken_too_soon)
         a.x[0] += moment * speed;
         exchange(&a, &b, n, 0.8, 0.3);
         for (int k = 0; k < 3; ++k) a.x[k] += (2 * dt - moment) * a.v[k], b.x[k] += (2 * dt - moment) * b.v[k];
-        expect_ball(world, id[0], &a, speed, 10 * tables[_i].tolerance, "a");
-        expect_ball(world, id[1], &b, speed, 10 * tables[_i].tolerance, "b");
+        expect_ball(world, id[0], &a, speed, 10 * backends[_i].tolerance, "a");
+        expect_ball(world, id[1], &b, speed, 10 * backends[_i].tolerance, "b");
         sadmm_world_destroy(world);
     }
 }
@@ -223,8 +252,8 @@ END_TEST
 START_TEST(a_row_hands_the_motion_on)
 {
     static const double gaps[] = {0, 1e-3, 0.01, 0.1, 0.3, 0.5, 0.9, 1.1, 2};
-    for (int count = 3; count <= 12; count += 3)
-        for (int g = 0; g < (int)(sizeof gaps / sizeof *gaps); ++g) {
+    for (int count = 3; count <= (EMULATED ? 3 : 12); count += 3)
+        for (int g = 0; g < (int)(sizeof gaps / sizeof *gaps); g += EMULATED ? 4 : 1) {
             const double speed = 2, dt = 0.005, radius = 0.05;
             sadmm_world *world = new_world(_i, dt, 0);
             sadmm_body_id id[12];
@@ -234,10 +263,10 @@ START_TEST(a_row_hands_the_motion_on)
                 id[k] = add_ball(world, &ball, SADMM_BODY_DYNAMIC, 0.5, 1);
                 x += 2 * radius + (k == 0 ? 0.0123 : gaps[g] * speed * dt);
             }
-            step_world(world, 60);
+            step_world(world, EMULATED ? 20 : 60);
             for (int k = 0; k < count; ++k)
                 ck_assert_double_eq_tol(body_state(world, id[k]).linear_velocity[0], k == count - 1 ? speed : 0,
-                                        speed * 10 * tables[_i].tolerance);
+                                        speed * 10 * backends[_i].tolerance);
             sadmm_world_destroy(world);
         }
 }
@@ -247,7 +276,7 @@ END_TEST
 START_TEST(a_hit_goes_through_to_the_floor)
 {
     static const double gaps[] = {0, 0.5e-3, 2e-3, 4e-3, 6e-3};
-    for (int g = 0; g < 5; ++g) {
+    for (int g = 0; g < 5; g += EMULATED ? 3 : 1) {
         sadmm_world *world = new_world(_i, 0.001, 0);
         const struct ball below = {.x = {0, 0, 0.1 + gaps[g]}, .radius = 0.1, .mass = 10},
                           above = {.x = {0, 0, 0.3 + gaps[g] + 0.0033}, .v = {0, 0, -5}, .radius = 0.1, .mass = 10};
@@ -255,8 +284,8 @@ START_TEST(a_hit_goes_through_to_the_floor)
         const sadmm_body_id id[2] = {add_ball(world, &below, SADMM_BODY_DYNAMIC, 0, 1),
                                      add_ball(world, &above, SADMM_BODY_DYNAMIC, 0, 1)};
         step_world(world, 30);
-        ck_assert_double_eq_tol(body_state(world, id[0]).linear_velocity[2], 0, 5 * tables[_i].tolerance);
-        ck_assert_double_eq_tol(body_state(world, id[1]).linear_velocity[2], 5, 5 * tables[_i].tolerance);
+        ck_assert_double_eq_tol(body_state(world, id[0]).linear_velocity[2], 0, 5 * backends[_i].tolerance);
+        ck_assert_double_eq_tol(body_state(world, id[1]).linear_velocity[2], 5, 5 * backends[_i].tolerance);
         sadmm_world_destroy(world);
     }
 }
@@ -267,8 +296,8 @@ END_TEST
 START_TEST(a_ball_falls_and_bounces)
 {
     static const double restitutions[] = {1, 0.8, 0.5};
-    for (int e = 0; e < 3; ++e)
-        for (int d = 0; d < 3; ++d) {
+    for (int e = EMULATED ? 1 : 0; e < (EMULATED ? 2 : 3); ++e)
+        for (int d = EMULATED ? 2 : 0; d < 3; ++d) {
             const double dt = d == 0 ? 0.001 : d == 1 ? 0.005 : 0.02, g = 9.81, radius = 0.1;
             const struct ball ball = {.x = {0, 0, radius + 1}, .radius = radius, .mass = 2};
             sadmm_world *world = new_world(_i, dt, g);
@@ -284,8 +313,11 @@ START_TEST(a_ball_falls_and_bounces)
                 const sadmm_body_state state = body_state(world, id);
                 ck_assert_double_eq_tol(g * (state.position[2] - radius) +
                                             state.linear_velocity[2] * state.linear_velocity[2] / 2,
-                                        energy, g * tables[_i].tolerance * 10);
+                                        energy, g * backends[_i].tolerance * 10);
             }
+#ifdef HITS_ON_CUDA
+            ck_assert_int_gt(world_report(world).repeated, 0); /* no bounce was planned, and some steps have them twice */
+#endif
             sadmm_world_destroy(world);
         }
 }
@@ -314,7 +346,7 @@ START_TEST(a_turning_box_hits_a_plane)
     double inertia[3];
     sadmm_box_inertia(mass, half, inertia);
     random_state = 11;
-    for (int c = 0; c < 60; ++c) {
+    for (int c = 0; c < (EMULATED ? 10 : 60); ++c) {
         const double restitution = c % 4 == 0 ? ALMOST_NONE : random_in(0, 1), speed = random_in(0.5, 4),
                      spin = random_in(-15, 15), moment = random_in(0.1, 0.9) * dt, angle = random_in(0.2, 1.3),
                      start = angle - spin * moment;
@@ -350,7 +382,7 @@ START_TEST(a_turning_box_hits_a_plane)
         ++tested;
         sadmm_world_destroy(world);
     }
-    ck_assert_int_ge(tested, 15);
+    ck_assert_int_ge(tested, EMULATED ? 2 : 15);
 }
 END_TEST
 
@@ -369,7 +401,7 @@ START_TEST(a_tumbling_box_keeps_its_turning)
 {
     const double half[3] = {0.1, 0.06, 0.03}, g = 9.81;
     random_state = 23;
-    for (int c = 0; c < fewer(8); ++c) {
+    for (int c = 0; c < some(8); ++c) {
         sadmm_world *world = new_world(_i, 0.005, g);
         sadmm_body_state state = {.position = {0, 0, 0.5}, .orientation = {1, 0, 0, 0}};
         double energy[2];
@@ -378,7 +410,7 @@ START_TEST(a_tumbling_box_keeps_its_turning)
         const sadmm_body_id id = add_thrown(world, SADMM_SHAPE_BOX, half, &state, 1.5, 0, 1);
         MUST(world, sadmm_world_set_body_state(world, id, &state));
         const vec3 before = tumbling_sums(world, id, g, &energy[0]);
-        step_world(world, 200);
+        step_world(world, EMULATED ? 80 : 200);
         const vec3 after = tumbling_sums(world, id, g, &energy[1]);
         /* single precision, 200 times; one velocity for a whole step would be off by 1e-2 */
         ck_assert_double_eq_tol(after.z, before.z, 1e-5 * v3_norm(before));
@@ -423,11 +455,11 @@ START_TEST(a_hit_leaves_turning_alone)
         }
         step_world(world, 1);
         const sadmm_body_state hit = body_state(world, id[0]), beside = body_state(world, id[1]);
-        ck_assert_double_eq_tol(hit.linear_velocity[2], 2, 2 * tables[_i].tolerance);
+        ck_assert_double_eq_tol(hit.linear_velocity[2], 2, 2 * backends[_i].tolerance);
         for (int k = 0; k < 3; ++k)
-            ck_assert_double_eq_tol(hit.angular_velocity[k], beside.angular_velocity[k], spin * tables[_i].tolerance);
+            ck_assert_double_eq_tol(hit.angular_velocity[k], beside.angular_velocity[k], spin * backends[_i].tolerance);
         for (int k = 0; k < 4; ++k)
-            ck_assert_double_eq_tol(hit.orientation[k], beside.orientation[k], spin * dt * tables[_i].tolerance);
+            ck_assert_double_eq_tol(hit.orientation[k], beside.orientation[k], spin * dt * backends[_i].tolerance);
         sadmm_world_destroy(world);
     }
 }
@@ -458,7 +490,7 @@ START_TEST(any_two_shapes_hit)
     enum { TYPES = sizeof types / sizeof types[0] };
     int hit = 0;
     random_state = 5;
-    for (int c = 0; c < fewer(3 * TYPES * TYPES); ++c) {
+    for (int c = 0; c < some(3 * TYPES * TYPES); ++c) {
         const double restitution = c % 3 == 0 ? 1 : random_in(0, 1), friction = c % 3 == 2 ? random_in(0, 1) : 0,
                      dt = 0.005, speed = random_in(2, 20);
         sadmm_world *world = new_world(_i, dt, 0);
@@ -497,7 +529,7 @@ START_TEST(any_two_shapes_hit)
                 left += energy_of(world, id[s]);
             }
             const double lost = 1 - left / energy;
-            for (int k = 0; k < 3; ++k) ck_assert_double_eq_tol(now[k], momentum[k], 40 * tables[_i].tolerance);
+            for (int k = 0; k < 3; ++k) ck_assert_double_eq_tol(now[k], momentum[k], 40 * backends[_i].tolerance);
             /* what is slower than the threshold, or hits too often, is the solve's: it pushes what it finds overlapped */
             ck_assert_msg(lost > -1e-4, "case %d: %g of the energy is made", c, -lost);
             if (c % 3 == 0) ck_assert_msg(lost < 1e-4, "case %d: %g is lost", c, lost);
@@ -505,7 +537,7 @@ START_TEST(any_two_shapes_hit)
         hit += body_state(world, id[0]).linear_velocity[0] < 0.9 * speed;
         sadmm_world_destroy(world);
     }
-    ck_assert_int_gt(hit, fewer(2 * TYPES * TYPES)); /* most do */
+    ck_assert_int_gt(hit, some(3 * TYPES * TYPES) / 2); /* most do */
 }
 END_TEST
 
@@ -614,7 +646,7 @@ START_TEST(balls_in_a_box_do_what_formulas_say)
                                         "with friction, elastic",
                                         "with friction, in gravity",
                                         "with friction, inelastic"};
-    for (int c = 0; c < 6; ++c) {
+    for (int c = EMULATED ? 4 : 0; c < (EMULATED ? 5 : 6); ++c) {
         const double dt = c % 2 ? 0.005 : 0.01, speed = 5, friction = c < 3 ? 0 : 0.4,
                      restitution = c % 3 == 0 ? 1 : 0.9, g = c % 3 == 1 ? 9.81 : 0, acceleration[3] = {0, 0, -g};
         const int steps = (int)(0.2 / dt + 0.5);
@@ -627,12 +659,13 @@ START_TEST(balls_in_a_box_do_what_formulas_say)
         step_world(world, steps);
         ck_assert_int_gt(simulate(balls, BALLS, steps * dt, acceleration, restitution, friction), BALLS);
         for (int i = 0; i < BALLS; ++i)
-            expect_ball(world, id[i], &balls[i], speed, 1000 * tables[_i].tolerance, names[c]);
+            expect_ball(world, id[i], &balls[i], speed, 1000 * backends[_i].tolerance, names[c]);
         sadmm_world_destroy(world);
     }
 }
 END_TEST
 
+#ifndef HITS_ON_CUDA
 /* 666 balls of 5 cm in a box of 2 m keep their energy; here the threshold is the default, and hits below it take what
  * they do: 0.1 m/s of 2. */
 START_TEST(an_elastic_gas_keeps_its_energy)
@@ -671,6 +704,7 @@ START_TEST(an_elastic_gas_keeps_its_energy)
     sadmm_world_destroy(world);
 }
 END_TEST
+#endif
 
 /* ---- what is read ------------------------------------------------------------------------------------------------- */
 
@@ -700,11 +734,11 @@ START_TEST(a_bounce_can_be_read)
             MUST(world, sadmm_world_contacts(world, 0, count, list));
             for (int32_t k = 0; k < count; ++k)
                 for (int j = 0; j < 3; ++j) sum[j] += list[k].impulse[j];
-            ck_assert_double_eq_tol(sum[2], impulse, impulse * tables[_i].tolerance);
+            ck_assert_double_eq_tol(sum[2], impulse, impulse * backends[_i].tolerance);
             ck_assert_double_eq_tol(list[count - 1].position[0], 0.5 * 0.4 * dt, 1e-9);
         }
         MUST(world, sadmm_world_body_contact_wrench(world, id, wrench));
-        ck_assert_double_eq_tol(wrench[2], impulse / dt, impulse / dt * tables[_i].tolerance);
+        ck_assert_double_eq_tol(wrench[2], impulse / dt, impulse / dt * backends[_i].tolerance);
         ck_assert_double_eq_tol(norm3(wrench + 3), 0, impulse / dt * 1e-9);
         MUST(world, sadmm_world_take_events(world, 8, events, &count, NULL));
         ck_assert_int_eq(count, 1);
@@ -735,7 +769,7 @@ START_TEST(hits_can_be_left_to_the_solve)
         const sadmm_body_id last = add_ball(world, &c, SADMM_BODY_DYNAMIC, 0, 1);
         step_world(world, 1);
         /* with one hit a body, the middle one's second one is the solve's, which takes it in the same step */
-        if (hits == 2) ck_assert_double_eq_tol(body_state(world, last).linear_velocity[0], 4, 4 * tables[_i].tolerance);
+        if (hits == 2) ck_assert_double_eq_tol(body_state(world, last).linear_velocity[0], 4, 4 * backends[_i].tolerance);
         if (hits == 0) ck_assert_double_lt(body_state(world, last).linear_velocity[0], 3.9);
         sadmm_world_destroy(world);
     }
@@ -763,6 +797,7 @@ static void throw_all(sadmm_world *world, double restitution)
     }
 }
 
+#ifndef HITS_ON_CUDA
 /* Threads, a save in the middle, and whether a step is one or several. */
 START_TEST(bits_are_the_same)
 {
@@ -797,6 +832,7 @@ START_TEST(bits_are_the_same)
     free(saved);
 }
 END_TEST
+#endif
 
 /* Without restitution nothing is followed. */
 START_TEST(what_does_not_bounce_is_left_to_the_solve)
@@ -808,7 +844,7 @@ START_TEST(what_does_not_bounce_is_left_to_the_solve)
         settings.hits = hits ? SADMM_MOST_HITS : 0;
         MUST(world, sadmm_world_set_settings(world, &settings));
         throw_all(world, 0);
-        step_world(world, 30);
+        step_world(world, EMULATED ? 6 : 30);
         hash[hits] = state_hash(world);
         sadmm_world_destroy(world);
     }
@@ -816,6 +852,280 @@ START_TEST(what_does_not_bounce_is_left_to_the_solve)
 }
 END_TEST
 
+#ifdef HITS_ON_CUDA
+/* Balls, boxes and capsules, one of several shapes, a kinematic and a joined one: steps that the device makes are those
+ * that the host makes with its kernels, to the bit, in one sub-step or two. */
+static void throw_more(sadmm_world *world)
+{
+    sadmm_body_def body = sadmm_body_def_default();
+    sadmm_shape_def shape = sadmm_shape_def_default();
+    sadmm_joint_def joint = sadmm_joint_def_default();
+    sadmm_body_id id[2];
+    throw_all(world, 0.8);
+    body.type = SADMM_BODY_KINEMATIC;
+    body.linear_velocity[0] = 1, body.angular_velocity[1] = 2;
+    MUST(world, sadmm_world_add_body(world, &body, &id[0]));
+    shape.type = SADMM_SHAPE_CAPSULE;
+    shape.size[0] = 0.05, shape.size[1] = 0.08;
+    shape.restitution = 0.5;
+    MUST(world, sadmm_world_add_shape(world, id[0], &shape, NULL));
+    body = sadmm_body_def_default();
+    body.mass = 1;
+    for (int s = 0; s < 2; ++s) {
+        body.position[0] = -0.5 + 0.15 * s, body.position[2] = 0.52;
+        body.linear_velocity[2] = -3;
+        for (int k = 0; k < 3; ++k) body.inertia[k] = 0.01 * (1 + k + s);
+        MUST(world, sadmm_world_add_body(world, &body, &id[s]));
+        for (int k = 0; k < 2; ++k) {
+            shape.position[1] = 0.06 * k;
+            shape.type = k ? SADMM_SHAPE_BOX : SADMM_SHAPE_SPHERE;
+            shape.size[0] = shape.size[1] = shape.size[2] = 0.04;
+            MUST(world, sadmm_world_add_shape(world, id[s], &shape, NULL));
+        }
+    }
+    joint.kind = SADMM_JOINT_SPHERICAL;
+    joint.body_a = id[0], joint.body_b = id[1];
+    joint.position_a[0] = 0.075, joint.position_b[0] = -0.075;
+    MUST(world, sadmm_world_add_joint(world, &joint, NULL));
+}
+
+/* Three environments in the same place: on the device their hits are taken side by side. */
+static void throw_apart(sadmm_world *world)
+{
+    random_state = 19;
+    add_walls(world, 0.3, 0.9);
+    for (int i = 0; i < 36; ++i) {
+        const int cell[3] = {i / 3 % 3 - 1, i / 9 % 2, i / 18};
+        sadmm_body_def body = sadmm_body_def_default();
+        sadmm_shape_def shape = sadmm_shape_def_default();
+        sadmm_body_id id;
+        body.mass = 1 + i % 4;
+        body.environment = 5 * (i % 3);
+        for (int k = 0; k < 3; ++k) {
+            body.inertia[k] = 0.004;
+            body.position[k] = 0.36 * cell[k] + random_in(-0.03, 0.03);
+            body.linear_velocity[k] = random_in(-5, 5);
+        }
+        MUST(world, sadmm_world_add_body(world, &body, &id));
+        shape.type = SADMM_SHAPE_SPHERE;
+        shape.size[0] = random_in(0.1, 0.14);
+        shape.restitution = 0.9;
+        MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+    }
+}
+
+/* Above a floor of triangles, on which hits are the solve's; bodies fall on it that have just been hit. */
+static void throw_on_mesh(sadmm_world *world)
+{
+    static const double vertices[] = {-1, -1, -0.5, 1, -1, -0.52, 1, 1, -0.5, -1, 1, -0.48, 0, 0, -0.55};
+    static const int32_t triangles[] = {0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4};
+    sadmm_mesh_def mesh = sadmm_mesh_def_default();
+    sadmm_body_def body = sadmm_body_def_default();
+    sadmm_shape_def shape = sadmm_shape_def_default();
+    sadmm_body_id id;
+    sadmm_mesh *floor;
+    mesh.vertices = vertices, mesh.vertex_count = 5;
+    mesh.triangles = triangles, mesh.triangle_count = 4;
+    ck_assert_int_eq(sadmm_mesh_create(&mesh, &floor), SADMM_OK);
+    body.type = SADMM_BODY_STATIC;
+    MUST(world, sadmm_world_add_body(world, &body, &id));
+    shape.type = SADMM_SHAPE_MESH;
+    shape.mesh = floor;
+    shape.restitution = 0.6;
+    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+    sadmm_mesh_destroy(floor); /* the world has it */
+    throw_all(world, 0.8);
+    body = sadmm_body_def_default();
+    shape = sadmm_shape_def_default();
+    for (int s = 0; s < 2; ++s) {
+        body.mass = 1;
+        body.position[0] = -0.5 + 0.2 * s, body.position[2] = -0.35;
+        body.linear_velocity[0] = s ? -2 : 3, body.linear_velocity[2] = -1;
+        for (int k = 0; k < 3; ++k) body.inertia[k] = 0.003 + 0.001 * k;
+        MUST(world, sadmm_world_add_body(world, &body, &id));
+        shape.type = s ? SADMM_SHAPE_CONE : SADMM_SHAPE_ELLIPSOID;
+        for (int k = 0; k < 3; ++k) shape.size[k] = 0.06 + 0.02 * k;
+        shape.restitution = 0.8;
+        MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+    }
+}
+
+/* Without restitution: what passes by its own size in a step, and a bar that goes round by a radian. */
+static void throw_fast(sadmm_world *world)
+{
+    sadmm_body_def body = sadmm_body_def_default();
+    sadmm_shape_def shape = sadmm_shape_def_default();
+    sadmm_body_id id;
+    random_state = 23;
+    add_walls(world, 0.4, 0);
+    for (int i = 0; i < 18; ++i) {
+        const double size[3] = {random_in(0.01, 0.03), random_in(0.01, 0.03), random_in(0.01, 0.03)};
+        sadmm_body_state state = {.orientation = {1, 0, 0, 0}};
+        for (int k = 0; k < 3; ++k) {
+            state.position[k] = random_in(-0.35, 0.35);
+            state.linear_velocity[k] = -60 * state.position[k] + random_in(-2, 2);
+            state.angular_velocity[k] = random_in(-40, 40);
+        }
+        add_thrown(world, i % 2 ? SADMM_SHAPE_BOX : SADMM_SHAPE_SPHERE, size, &state, random_in(0.5, 3), 0.4, 0);
+    }
+    for (int i = 0; i < 3; ++i) { /* in the second step one hits the next, and that one the last */
+        const struct ball ball = {
+            .x = {i ? -0.1 + 0.05 * i : -0.35, 0.36, 0.36}, .v = {i ? 0 : 10}, .radius = 0.01, .mass = i ? 1 : 3};
+        add_ball(world, &ball, SADMM_BODY_DYNAMIC, 0, 0);
+    }
+    body.type = SADMM_BODY_KINEMATIC;
+    body.angular_velocity[2] = 50;
+    MUST(world, sadmm_world_add_body(world, &body, &id));
+    shape.size[0] = 0.3, shape.size[1] = shape.size[2] = 0.01;
+    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+}
+
+/* What contacts and hits give bodies, kinematic ones as well: sums in another order. */
+static void expect_same_wrenches(sadmm_world *a, sadmm_world *b)
+{
+    for (int32_t i = 0; i < sadmm_world_body_count(a); ++i) {
+        double wrench[2][6];
+        if (body_def(a, body_at(a, i)).type == SADMM_BODY_STATIC) continue;
+        MUST(a, sadmm_world_body_contact_wrench(a, body_at(a, i), wrench[0]));
+        MUST(b, sadmm_world_body_contact_wrench(b, body_at(b, i), wrench[1]));
+        for (int k = 0; k < 6; ++k)
+            ck_assert_double_eq_tol(wrench[1][k], wrench[0][k], 1e-9 * (1 + norm3(wrench[0]) + norm3(wrench[0] + 3)));
+    }
+}
+
+START_TEST(host_and_device_agree)
+{
+    enum { STEPS = EMULATED ? 6 : 40 };
+    for (int c = 0; c < 6; ++c) {
+        const int substeps = c == 1 || c == 5 ? 2 : 1;
+        sadmm_world *worlds[2];
+        size_t hits = 0;
+        for (int w = 0; w < 2; ++w) {
+            sadmm_world *world = worlds[w] = new_world(_i, 0.02, 9.81);
+            sadmm_settings settings = sadmm_world_settings(world);
+            settings.substeps = substeps;
+            if (c == 4) settings.hits = 1; /* which bodies that pass keep, if there would be more */
+            MUST(world, sadmm_world_set_settings(world, &settings));
+            if (c < 2) throw_more(world);
+            else if (c == 2) throw_apart(world);
+            else if (c == 3) throw_on_mesh(world);
+            else throw_fast(world);
+            if (w == 0) by_host(world);
+            else if (c == 1) tune_capacities(tables[backends[_i].precision], world->context, 1);
+        }
+        for (int k = 0; k < STEPS; ++k) {
+            for (int w = 0; w < 2; ++w) step_world(worlds[w], 1);
+            ck_assert_msg(state_hash(worlds[0]) == state_hash(worlds[1]), "case %d, step %d", c, k);
+            ck_assert_uint_eq(worlds[0]->start.hit_count, worlds[1]->start.hit_count);
+            ck_assert_uint_eq(worlds[0]->start.hit_first, worlds[1]->start.hit_first);
+            expect_same_wrenches(worlds[0], worlds[1]);
+            hits += worlds[0]->start.hit_count;
+            if (c == 2) continue; /* one environment's after the other's */
+            ck_assert(memcmp(worlds[0]->start.hits, worlds[1]->start.hits,
+                             worlds[0]->start.hit_count * sizeof *worlds[0]->start.hits) == 0);
+        }
+        ck_assert_uint_gt(hits, c < 4 ? 2 * STEPS : 4);
+        for (int w = 0; w < 2; ++w) sadmm_world_destroy(worlds[w]);
+    }
+}
+END_TEST
+
+/* Two sub-steps are two steps of half the length. */
+START_TEST(substeps_are_short_steps)
+{
+    uint64_t hash[2];
+    for (int c = 0; c < 2; ++c) {
+        sadmm_world *world = new_world(_i, 0.01, 9.81);
+        sadmm_settings settings = sadmm_world_settings(world);
+        settings.substeps = 2 - c;
+        settings.dt /= 1 + c;
+        settings.iterations /= 1 + c;
+        MUST(world, sadmm_world_set_settings(world, &settings));
+        throw_all(world, 0.7);
+        step_world(world, (1 + c) * (EMULATED ? 5 : 24));
+        hash[c] = state_hash(world);
+        sadmm_world_destroy(world);
+    }
+    ck_assert(hash[0] == hash[1]);
+}
+END_TEST
+
+/* Hits are planned once some pair is fast, and that step is made again; and no more once none has been for long. */
+static void aim(sadmm_world *world, const sadmm_body_id id[2])
+{
+    for (int i = 0; i < 2; ++i) {
+        sadmm_body_state state = body_state(world, id[i]);
+        const double x[3] = {i ? 1 : -1, 0.01 * i, 0}, v[3] = {i ? -30 : 30, 1, 2};
+        memcpy(state.position, x, sizeof x);
+        memcpy(state.linear_velocity, v, sizeof v);
+        MUST(world, sadmm_world_set_body_state(world, id[i], &state));
+    }
+}
+
+START_TEST(hits_are_planned)
+{
+    enum { MEETING = 5 };
+    const int substeps = 1 + (_i == 0), calm = EMULATED && _i > 0 ? 4 : 264;
+    sadmm_world *worlds[2];
+    sadmm_body_id id[2][2];
+    sadmm_step_report report;
+    size_t hits = 0;
+    for (int w = 0; w < 2; ++w) {
+        const struct ball ball = {.radius = 0.02, .mass = 1};
+        sadmm_world *world = worlds[w] = new_world(_i, 0.01, 0);
+        sadmm_settings settings = sadmm_world_settings(world);
+        settings.substeps = substeps;
+        MUST(world, sadmm_world_set_settings(world, &settings));
+        for (int i = 0; i < 2; ++i) id[w][i] = add_ball(world, &ball, SADMM_BODY_DYNAMIC, 0.5, 0);
+        aim(world, id[w]);
+        if (w == 0) by_host(world);
+    }
+    for (int k = 0; k < MEETING + calm + MEETING; ++k) {
+        if (k == MEETING + calm)
+            for (int w = 0; w < 2; ++w) aim(worlds[w], id[w]);
+        for (int w = 0; w < 2; ++w) step_world(worlds[w], 1);
+        ck_assert_msg(state_hash(worlds[0]) == state_hash(worlds[1]), "step %d", k);
+        ck_assert_uint_eq(worlds[0]->start.hit_count, worlds[1]->start.hit_count);
+        hits += worlds[0]->start.hit_count;
+    }
+    ck_assert_uint_eq(hits, 2);
+    MUST(worlds[1], sadmm_world_report(worlds[1], &report));
+    ck_assert_int_ge(report.repeated, 1);
+    for (int w = 0; w < 2; ++w) sadmm_world_destroy(worlds[w]);
+}
+END_TEST
+
+/* What is more than the device takes is the solve's: a body of 65 shapes. */
+START_TEST(what_is_too_much_is_left_to_the_solve)
+{
+    uint64_t hash[2];
+    for (int hits = 0; hits < 2; ++hits) {
+        sadmm_world *world = new_world(_i, 0.01, 9.81);
+        sadmm_settings settings = sadmm_world_settings(world);
+        sadmm_body_def body = sadmm_body_def_default();
+        sadmm_shape_def shape = sadmm_shape_def_default();
+        sadmm_body_id id;
+        settings.hits = hits ? SADMM_MOST_HITS : 0;
+        MUST(world, sadmm_world_set_settings(world, &settings));
+        add_floor(world, 0.5);
+        body.mass = 1;
+        body.position[2] = 0.25;
+        body.linear_velocity[2] = -4;
+        for (int k = 0; k < 3; ++k) body.inertia[k] = 0.01;
+        MUST(world, sadmm_world_add_body(world, &body, &id));
+        shape.type = SADMM_SHAPE_SPHERE;
+        shape.size[0] = 0.1;
+        shape.restitution = 0.7;
+        for (int k = 0; k < 65; ++k) MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+        step_world(world, 6);
+        ck_assert_double_gt(body_state(world, id).linear_velocity[2], 1);
+        hash[hits] = state_hash(world);
+        sadmm_world_destroy(world);
+    }
+    ck_assert(hash[0] == hash[1]);
+}
+END_TEST
+#else
 /* A row gives every box that meets one, of which some are wide, some have moved, and some are not there. */
 START_TEST(a_row_has_all_that_meet)
 {
@@ -860,28 +1170,44 @@ START_TEST(a_row_has_all_that_meet)
     sadmm_box_row_free(&row);
 }
 END_TEST
+#endif
 
 int main(void)
 {
     Suite *suite = suite_create("hits");
     TCase *tests = tcase_create("hits");
-    tcase_add_loop_test(tests, two_balls_meet, 0, TABLES);
-    tcase_add_loop_test(tests, a_hit_is_not_taken_too_soon, 0, TABLES);
-    tcase_add_loop_test(tests, a_row_hands_the_motion_on, 0, TABLES);
-    tcase_add_loop_test(tests, a_hit_goes_through_to_the_floor, 0, TABLES);
-    tcase_add_loop_test(tests, a_ball_falls_and_bounces, 0, TABLES);
-    tcase_add_loop_test(tests, a_turning_box_hits_a_plane, 0, TABLES);
-    tcase_add_loop_test(tests, a_hit_leaves_turning_alone, 0, TABLES);
-    tcase_add_loop_test(tests, a_tumbling_box_keeps_its_turning, 0, TABLES);
-    tcase_add_loop_test(tests, any_two_shapes_hit, 0, TABLES);
-    tcase_add_loop_test(tests, balls_in_a_box_do_what_formulas_say, 0, TABLES);
+#ifdef HITS_ON_CUDA
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
+#endif
+    const int end = EMULATED ? 1 : TABLES; /* hits are taken in double, whatever the precision */
+    tcase_add_loop_test(tests, two_balls_meet, 0, end);
+    tcase_add_loop_test(tests, a_hit_is_not_taken_too_soon, 0, end);
+    tcase_add_loop_test(tests, a_row_hands_the_motion_on, 0, end);
+    tcase_add_loop_test(tests, a_hit_goes_through_to_the_floor, 0, end);
+    tcase_add_loop_test(tests, a_ball_falls_and_bounces, 0, end);
+    tcase_add_loop_test(tests, a_turning_box_hits_a_plane, 0, end);
+    tcase_add_loop_test(tests, a_hit_leaves_turning_alone, 0, end);
+    tcase_add_loop_test(tests, a_tumbling_box_keeps_its_turning, 0, end);
+    tcase_add_loop_test(tests, any_two_shapes_hit, 0, end);
+    tcase_add_loop_test(tests, balls_in_a_box_do_what_formulas_say, 0, end);
+    tcase_add_loop_test(tests, a_bounce_can_be_read, 0, end);
+    tcase_add_loop_test(tests, hits_can_be_left_to_the_solve, 0, end);
+    tcase_add_loop_test(tests, what_does_not_bounce_is_left_to_the_solve, 0, end);
+#ifdef HITS_ON_CUDA
+    tcase_add_loop_test(tests, host_and_device_agree, 0, TABLES);
+    tcase_add_loop_test(tests, substeps_are_short_steps, 0, TABLES);
+    tcase_add_loop_test(tests, hits_are_planned, 0, TABLES);
+    tcase_add_loop_test(tests, what_is_too_much_is_left_to_the_solve, 0, end);
+#else
     tcase_add_test(tests, an_elastic_gas_keeps_its_energy);
-    tcase_add_loop_test(tests, a_bounce_can_be_read, 0, TABLES);
-    tcase_add_loop_test(tests, hits_can_be_left_to_the_solve, 0, TABLES);
-    tcase_add_loop_test(tests, bits_are_the_same, 0, TABLES);
-    tcase_add_loop_test(tests, what_does_not_bounce_is_left_to_the_solve, 0, TABLES);
+    tcase_add_loop_test(tests, bits_are_the_same, 0, end);
     tcase_add_test(tests, a_row_has_all_that_meet);
+#endif
     tcase_set_timeout(tests, 60);
     suite_add_tcase(suite, tests);
+#ifdef HITS_ON_CUDA
+    return run_cuda_suite(suite);
+#else
     return run_suite(suite);
+#endif
 }

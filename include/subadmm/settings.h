@@ -119,13 +119,13 @@ typedef struct sadmm_settings {
                                     along each coordinate, m/s or rad/s; in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
 
-    int hits;                    /* worlds on ref and cpu: bodies in flight that hit something, faster than
-                                    restitution_threshold and with restitution (of either shape), or a body that moves
-                                    so fast that they pass by their own thickness in a step, do so at the moment
-                                    of their first touch within the (sub-)step, so many times each at most; one that
-                                    would be hit more often is left to the solve, and so is what rests on something,
-                                    has joints, or hits a mesh (docs/algorithm.md, section 6). In
-                                    [0, SADMM_MOST_HITS = 64]; 0: all is; default 16. CUDA takes it for 0 */
+    int hits;                    /* worlds: bodies in flight that hit something, faster than restitution_threshold and
+                                    with restitution (of either shape), or a body that moves so fast that they pass by
+                                    their own thickness in a step, do so at the moment of their first touch within the
+                                    (sub-)step, so many times each at most; one that would be hit more often is left to
+                                    the solve, and so is what rests on something, has joints, or hits a mesh
+                                    (docs/algorithm.md, section 6; CUDA leaves more to it where there are very many). In
+                                    [0, SADMM_MOST_HITS = 64]; 0: all is; default 16 */
 
     int threads;                 /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have
                                     enough to do, no more than there are processors (0: than OMP_NUM_THREADS, where that

@@ -32,8 +32,7 @@ enum {
     SLOT_LEFT = 2, /* its box left the larger one, or the entry changed */
     SLOT_PLANE = 4,
     SLOT_REFUSED = 8, /* sadmm_collision_check_shape says why */
-    SLOT_SEAMS = 16,  /* its neighbours may be others (seams.h) */
-    SLOT_BOUNCES = 32 /* it has restitution */
+    SLOT_SEAMS = 16   /* its neighbours may be others (seams.h) */
 };
 
 struct sadmm_collision_kernels;

@@ -2,7 +2,7 @@
  *
  * By conservative advancement: no point of either comes closer along the normal of the distance than the centres of mass
  * and the rotations allow, so that the pair is moved on by what that takes, and again from there. Near the touch the
- * points that approach are followed to where their separation is 0. Host alone, in double.
+ * points that approach are followed to where their separation is 0. In double; flight_touch_math.h is for devices as well.
  *
  * For hits (core/world/hits.c), along ways that bend. What contact finding moves on by is advance.h, along straight ones
  * of the whole step, and not as far as a touch. */
@@ -59,10 +59,8 @@ struct sadmm_flight_touch {
     uint32_t feature[SADMM_MANIFOLD_POINTS];
 };
 
-/* False: no point touches in [from, to] that approaches fast enough. Points of the result: all that touch then. */
-bool sadmm_flight_touch_of(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_flight_touch *touch);
-
-/* The first of all children of the pair, none of which is a mesh; `child`: which. */
+/* False: no point of the pair, none of which is a mesh, touches in [from, to] that approaches fast enough. Points of the
+ * result: all that touch then; `child`: of which of its children, the first one that touches. */
 bool sadmm_flight_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_flight_touch *touch);
 
 #ifdef __cplusplus

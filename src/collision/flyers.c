@@ -1,6 +1,9 @@
 #include "flyers.h"
 
+#include <float.h>
+
 #include "contact_emit.h"
+#include "fast_pair.h"
 #include "pipeline.h"
 
 /* Does it press? Its first point mostly tells. */
@@ -38,67 +41,43 @@ bool sadmm_collision_may_hit(const struct sadmm_collision *collision, const unsi
            (of_a == SADMM_FLYER_DYNAMIC || of_b == SADMM_FLYER_DYNAMIC);
 }
 
-/* How far a pair may go within the step, m. */
-static double way_of(const struct sadmm_collision_input *input, const struct sadmm_proxy *a,
-                     const struct sadmm_proxy *b)
-{
-    const bool both = a->system_body >= 0 && b->system_body >= 0; /* they fall alike */
-    return relative_speed(a->velocity, b->velocity) * input->dt + a->spin + b->spin + a->fall + b->fall +
-           (both ? 0 : fall_of(input->gravity, input->dt));
-}
-
-/* The solve has such an impact with the way until then in the arms of the body that is harder to turn (contact_emit.h):
- * that lets the other one through unless it is so much lighter that the arms do not matter. */
-#define ARMS_MATTER 0.01
-/* And by the plane in which they touch: what turns by more than so many rad takes it away from what it hits. */
-#define TURNS_AWAY  0.3
-static bool passes(const struct sadmm_collision_input *input, const struct sadmm_proxy *a, const struct sadmm_proxy *b)
-{
-    const bool a_is_light = b->system_body < 0 || (a->system_body >= 0 && a->inertia < b->inertia);
-    const struct sadmm_proxy *light = a_is_light ? a : b, *heavy = a_is_light ? b : a;
-    const double way = way_of(input, a, b), size = length3(light->arm) + geometry_radius(&light->geometry);
-    if (light->system_body < 0 || !sadmm_body_moves(heavy->system_body) || !(way > smaller_of(a->thin, b->thin)))
-        return false;
-    return turning_rate(heavy->angular) * input->dt > TURNS_AWAY ||
-           (heavy->system_body >= 0 && way * way * light->inertia > ARMS_MATTER * size * size * heavy->inertia);
-}
-
 bool sadmm_collision_passes(const struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                             uint64_t key)
 {
     const struct sadmm_proxy *a = &collision->candidates.proxies[key >> 32],
                              *b = &collision->candidates.proxies[key & UINT32_MAX];
-    return passes(input, a, b);
+    return pair_passes(a, b, pair_way(a, b, input->gravity, input->dt), input->dt);
 }
 
-/* May any pair pass? By sizes alone: most worlds have none. */
-static bool any_passes(const struct sadmm_candidates *c, const struct sadmm_collision_input *input)
+/* The longest way that any pair may go, and the least thickness of what moves: most worlds have no pair that is fast. */
+struct fastest {
+    double way, thin;
+};
+static struct fastest fastest_of(const struct sadmm_candidates *c, const struct sadmm_collision_input *input)
 {
-    double speed2 = 0, turns = 0, thin = HUGE_VAL;
+    struct fastest of = {0, HUGE_VAL};
     for (size_t slot = 0; slot < c->slot_count; ++slot) {
         const struct sadmm_proxy *p = &c->proxies[slot];
         if (!(c->state[slot] & SLOT_PRESENT) || !sadmm_body_moves(p->system_body)) continue;
-        speed2 = larger_of(speed2, dot3(p->velocity, p->velocity));
-        turns = larger_of(turns, p->spin + p->fall);
-        thin = smaller_of(thin, p->thin);
+        of.way = larger_of(of.way, length3(p->velocity) * input->dt + p->spin + p->fall);
+        of.thin = smaller_of(of.thin, p->thin);
     }
-    return 2 * (sqrt(speed2) * input->dt + turns) > thin;
+    of.way = (1 + 16 * DBL_EPSILON) * (2 * of.way + fall_of(input->gravity, input->dt));
+    return of;
 }
 
 bool sadmm_collision_list_fast(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                                double threshold, bool bounces, struct sadmm_pair_list *list)
 {
     const struct sadmm_candidates *c = &collision->candidates;
+    const struct fastest fastest = fastest_of(c, input);
     const double least = threshold * input->dt;
-    const bool any = any_passes(c, input);
+    const bool any = fastest.way > least && (bounces || fastest.way > fastest.thin);
     list->count = 0;
-    for (size_t i = 0; i < c->list.count && (bounces || any); ++i) {
+    for (size_t i = 0; any && i < c->list.count; ++i) {
         const uint64_t key = c->list.keys[i];
         const uint32_t a = (uint32_t)(key >> 32), b = (uint32_t)key;
-        const bool bounce = (c->state[a] | c->state[b]) & SLOT_BOUNCES;
-        if (!bounce && !any) continue;
-        const struct sadmm_proxy *pa = &c->proxies[a], *pb = &c->proxies[b];
-        if (!(way_of(input, pa, pb) > least) || (!bounce && !passes(input, pa, pb)) ||
+        if (!pair_is_fast(&c->proxies[a], &c->proxies[b], threshold, input->gravity, input->dt) ||
             !sadmm_candidate_meets(c, input, a, b) || sadmm_pair_is_disabled(input, key))
             continue;
         if (!sadmm_pair_list_add(list, a, b)) return false;

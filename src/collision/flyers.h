@@ -27,8 +27,8 @@ void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const
                                   unsigned char *flyers);
 
 /* The pairs of shapes, as (a << 32 | b) in the order of pairs, that approach faster than the threshold, at least as far
- * as their velocities and boxes tell, and of which either has restitution (bounces: any shape has), or which pass: other
- * pairs come as far as the surface in the step in which they are found, as the solve has it. After look_ahead. False:
+ * as their velocities and boxes tell, and of which either has restitution (bounces: any shape has), or which pass
+ * (fast_pair.h): other pairs come as far as the surface in the step in which they are found, as the solve has it. After look_ahead. False:
  * out of memory. */
 bool sadmm_collision_list_fast(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                                double threshold, bool bounces, struct sadmm_pair_list *list);

@@ -2,6 +2,7 @@
 
 #include "core/base/memory.h"
 #include "contact_emit.h"
+#include "later.h"
 #include "mesh_walk.h"
 #define SADMM_SMOOTH_ELSEWHERE SADMM_COLLISION_KERNEL(smooth_manifold)
 #include "pair_manifold.h"
@@ -13,44 +14,17 @@ struct old_pairs {
 };
 static const struct old_pairs no_pairs = {0, 0};
 
-/* Bodies that were hit within the step: the later of both moments. Before it the pair was never where it is taken to
- * come from: it is looked for in what is left of the step, and what overlaps at the start alone does not overlap. */
+/* Bodies that were hit within the step: the later of both moments (later.h). */
 static double since_of(const struct sadmm_collision_input *input, const struct sadmm_proxy *a,
                        const struct sadmm_proxy *b)
 {
     return input->since ? larger_of(input->since[a->body], input->since[b->body]) : 0;
 }
 
-/* The shape in a step that begins `since` seconds later and is as much shorter, placed halfway through that. */
 static void begin_later(const struct sadmm_collision_input *input, const struct sadmm_proxy *p, double since,
                         struct sadmm_proxy *out)
 {
-    const double hit = input->since[p->body], on = turn_ahead(turning_rate(p->angular), input->dt - since);
-    struct sadmm_proxy own = *p, turned;
-    own.ahead -= hit; /* it turns from there */
-    *out = *proxy_at(&own, since + on - hit, 0, &turned);
-    out->ahead = on;
-    for (int k = 0; k < 3; ++k) {
-        out->com[k] += since * p->velocity[k];
-        out->x[k] = out->com[k] + out->arm[k];
-    }
-}
-
-/* As proxy_at of such a pair: its motion is taken back to the start of the whole step. */
-SADMM_RARE const struct sadmm_proxy *proxy_at_later(const struct sadmm_collision_input *input,
-                                                    const struct sadmm_proxy *p, double since, double ahead,
-                                                    struct sadmm_proxy *out)
-{
-    const double left = input->dt - since, on = ahead == since + 0.5 * left ? 0.5 * left : ahead - since;
-    struct sadmm_proxy later, turned;
-    begin_later(input, p, since, &later);
-    *out = *proxy_at(&later, on, left, &turned);
-    out->ahead += since;
-    for (int k = 0; k < 3; ++k) {
-        out->com[k] = p->com[k];
-        out->x[k] = p->com[k] + out->arm[k];
-    }
-    return out;
+    proxy_begin_later(p, input->since[p->body], since, input->dt, out);
 }
 
 /* A shape of a pair that was found `ahead` seconds into the step. */
@@ -58,22 +32,8 @@ SADMM_ALWAYS_INLINE const struct sadmm_proxy *proxy_found_at(const struct sadmm_
                                                              const struct sadmm_proxy *p, double since, double ahead,
                                                              struct sadmm_proxy *turned)
 {
-    return since > 0 ? proxy_at_later(input, p, since, ahead, turned) : proxy_at(p, ahead, input->dt, turned);
-}
-
-/* Where points part (`opens`, m/s), a gap below 0 at the start is that at `since`, and none below 0 by then: what it lacks
- * is what forces and curvature add to the way. */
-#define SINCE_ROUNDING 1e-6
-SADMM_RARE void open_gap(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double since, const double normal[3],
-                         struct sadmm_contact_point *point)
-{
-    double opens = 0, across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0};
-    if (!(point->gap < -SINCE_ROUNDING * smaller_of(a->thin, b->thin))) return;
-    add_cross(normal, a->angular, 1, across_a);
-    add_cross(normal, b->angular, 1, across_b);
-    for (int k = 0; k < 3; ++k) opens += normal[k] * (b->velocity[k] - a->velocity[k]);
-    opens += dot3(across_b, point->arm_b) - dot3(across_a, point->arm_a);
-    if (opens > 0) point->gap = larger_of(point->gap + since * opens, DBL_MIN);
+    return since > 0 ? proxy_at_later(p, input->since[p->body], since, ahead, input->dt, turned)
+                     : proxy_at(p, ahead, input->dt, turned);
 }
 
 /* Write the manifold as a pair with its points; there is capacity. `before`: the pair that it goes on from, or NULL.

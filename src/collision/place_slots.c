@@ -106,8 +106,7 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     }
     geometry = &input->geometries[shape->geometry];
     plane = geometry->type == SADMM_SHAPE_PLANE;
-    kind = (unsigned char)((plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT) | seams |
-                           (shape->restitution > 0 ? SLOT_BOUNCES : 0));
+    kind = (unsigned char)((plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT) | seams);
     proxy_place(shape, geometry, body, turn, input->dt, input->margin, input->gravity, &c->proxies[slot],
                 &c->boxes[slot].box);
     c->boxes[slot].of_plane = plane;

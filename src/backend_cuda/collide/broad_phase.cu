@@ -155,7 +155,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     const uint32_t slot = is_there ? v.present[i] : 0; /* at once, not after what comes next */
     if (stops) return;
     if (i == 0 && FOR != PLACE_AGAIN) v.candidate_count[COUNT_FOUND] = v.candidate_count[COUNT_MESH_PAIRS] = 0;
-    if (i == 0) v.candidate_count[COUNT_LISTED] = v.candidate_count[COUNT_GENERAL] = 0;
+    if (i == 0) v.candidate_count[COUNT_LISTED] = v.candidate_count[COUNT_GENERAL] = v.candidate_count[COUNT_FAST] = 0;
     struct sadmm_proxy proxy;
     struct collision_leaf leaf;
     bool moves = false;

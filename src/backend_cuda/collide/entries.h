@@ -48,6 +48,24 @@ sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, bool sub
  * counts say afterwards whether everything fitted (nothing is written to the set when not). */
 sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *stream,
                                 const struct sadmm_cuda_find *find, struct sadmm_error *error);
+/* What hits of bodies in flight are to know of the world; held: by body slot, not 0: joints hold the body. After attach,
+ * with its input. */
+sadmm_status COLLISION(load_hits)(struct sadmm_cuda_collision *collision, const struct sadmm_collision_input *input,
+                                  const unsigned char *held, struct sadmm_error *error);
+/* Can they be taken in it? */
+bool COLLISION(takes_hits)(const struct sadmm_cuda_collision *collision);
+/* They are to be. After reserve. */
+sadmm_status COLLISION(reserve_hits)(struct sadmm_cuda_collision *collision, struct sadmm_error *error);
+/* Launches alone, before those of enqueue for the same find, which has `hits`: candidates, and the step's hits. */
+sadmm_status COLLISION(enqueue_hits)(struct sadmm_cuda_collision *collision, void *stream,
+                                     const struct sadmm_cuda_find *find, struct sadmm_error *error);
+/* And once wrenches have been recovered: what hits give. */
+sadmm_status COLLISION(give_hits)(struct sadmm_cuda_collision *collision, void *stream,
+                                  const struct sadmm_cuda_hits *step, struct sadmm_error *error);
+/* The hits of the step that ended in `into`, if there is room for them; *first: of its last sub-step. */
+sadmm_status COLLISION(read_hits)(struct sadmm_cuda_collision *collision, void *stream, int into,
+                                  struct sadmm_world_hit *out, size_t capacity, size_t *count, size_t *first,
+                                  struct sadmm_error *error);
 /* A set's pointers; counts are not filled. */
 struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_collision *collision, int which);
 /* Which set is the current one, and with how much in it, after enqueued finds. */

@@ -21,6 +21,7 @@ static __device__ void emit_counts(const collision_view &v, uint64_t total, doub
     v.after.counts->pairs = (int32_t)(total >> 32);
     v.after.counts->points = (int32_t)(uint32_t)total;
     v.after.counts->dt = dt;
+    v.after.counts->fast = v.candidate_count[COUNT_FAST] != 0;
 }
 
 /* What is known of a candidate before it is known how many there are. Beyond them, and without points, it may be

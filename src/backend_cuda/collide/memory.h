@@ -6,6 +6,7 @@
 
 #include "collision/seams.h"
 #include "core/base/memory.h"
+#include "hits.h"
 #include "view.h"
 
 /* Memory of the device or pinned memory of the host. */
@@ -22,6 +23,9 @@ enum buffer_name {
     PAIRS, POINTS, MIGRATIONS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, MIGRATIONS_2, PAIR_KEYS_2, COUNTS_2,
     PAIRS_3, POINTS_3, MIGRATIONS_3, PAIR_KEYS_3, COUNTS_3,
     TOUCHING,
+    HIT_STATE, HIT_MARKS, HIT_HELD, HIT_KINDS, HIT_FLYERS, HIT_SINCE, HIT_IMPULSES, HIT_BOXES, HIT_NEAR, HIT_LISTED,
+    HIT_FORESEEN, HIT_TAKEN, HIT_RECORDS_OF_STEPS, HIT_GROUPS, HIT_PROGRESS, HIT_GROUP_BODIES, HIT_GROUP_LEAVES,
+    HIT_SHARED_LEAVES, HIT_GROUP_OF,
     SHAPES, GEOMETRIES, HULLS, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
     SEAMS, SEAM_NEIGHBOURS,
     /* pinned: first what was uploaded to the last buffers above, in their order */
@@ -41,6 +45,9 @@ static const char *const buffer_names[BUFFERS] = {
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "touching pairs",
+    "hits", "marks of bodies", "bodies held by joints", "kinds of bodies", "flyers", "moments of hits",
+    "impulses of hits", "boxes after hits", "pairs after hits", "fast pairs", "foreseen hits", "hits taken", "list of hits",
+    "groups", "progress of groups", "bodies of groups", "shapes of groups", "shapes of all groups", "groups of bodies",
     "shapes", "geometries", "hulls", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
     "neighbours by shape", "neighbours",
     "staged shapes", "staged geometries", "staged hulls", "staged bodies", "staged list of shapes", "staged planes",
@@ -87,6 +94,11 @@ struct sadmm_cuda_collision {
     size_t input_bytes[INPUTS]; /* as uploaded; SIZE_MAX: not */
     uint32_t hull_revision;
     bool smooth;                /* a shape is a smooth body (collision/geometry.h) */
+    bool takes_hits;            /* the world is one of those of hits.h; */
+    bool hits_ready;            /* and the device has its lists */
+    struct hit_lists *hit_lists;
+    struct hits_kernels hits_kernels;
+    struct hits_view hits;
 
     int current;                /* of the two sets */
     struct contact_counts counts[2];
@@ -191,29 +203,40 @@ static inline sadmm_status reserve(struct sadmm_cuda_collision *c, int name, siz
 template <class T> static T *in(const struct sadmm_cuda_collision *c, int name) { return (T *)c->buffers[name].data; }
 
 #ifdef SADMM_CUDA_EMULATED
-struct emulated_call {
-    void (*kernel)(const collision_view);
-    struct collision_view view;
+template <class View> struct emulated_call {
+    void (*kernel)(const View);
+    View view;
 };
-static inline void run_emulated(const emulated_call call, const int) { call.kernel(call.view); }
+template <class View> static inline void run_emulated(const emulated_call<View> call, const int)
+{
+    call.kernel(call.view);
+}
 #endif
 
-static inline sadmm_status launch(struct sadmm_cuda_collision *c, const struct collision_launch &what, int64_t threads,
-                           struct sadmm_error *error)
+/* what: collision_launch, or another of its kind. */
+template <class Launch, class View>
+static inline sadmm_status launch_view(struct sadmm_cuda_collision *c, const Launch &what, const View &view,
+                                       int64_t threads, struct sadmm_error *error)
 {
     const unsigned blocks = (unsigned)((threads + what.threads - 1) / what.threads);
     if (threads <= 0) return SADMM_OK;
     c->kernel = what.name;
 #ifdef SADMM_CUDA_EMULATED
-    const emulated_call call = {what.kernel, c->view};
-    cudaError_t code = cuda_emulation_launch(run_emulated, blocks, (unsigned)what.threads, what.shared, call, 0);
+    const emulated_call<View> call = {what.kernel, view};
+    cudaError_t code = cuda_emulation_launch(run_emulated<View>, blocks, (unsigned)what.threads, what.shared, call, 0);
 #else
     const dim3 grid(blocks), threads_a_block((unsigned)what.threads);
-    void *parameters[] = {&c->view};
+    void *parameters[] = {const_cast<View *>(&view)};
     cudaError_t code = launch_on(c->stream, c->view.early, (const void *)what.kernel, grid, threads_a_block, 0, parameters);
 #endif
     CUDA_CALL(c, code, what.name);
     return SADMM_OK;
+}
+
+static inline sadmm_status launch(struct sadmm_cuda_collision *c, const struct collision_launch &what, int64_t threads,
+                                  struct sadmm_error *error)
+{
+    return launch_view(c, what, c->view, threads, error);
 }
 
 static inline sadmm_status copy(struct sadmm_cuda_collision *c, void *to, const void *from, size_t bytes,
@@ -249,5 +272,14 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
                                    struct sadmm_cuda_contact_counts *counts, struct sadmm_error *error);
 sadmm_status COLLISION(reserve_set)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
                                       struct sadmm_error *error);
+/* Hits (hits.h): from candidates to where what was hit is, before they are looked for again; after the narrow phase; and
+ * after `emit`. */
+void COLLISION(free_hits)(struct sadmm_cuda_collision *c);
+sadmm_status COLLISION(take_hits)(struct sadmm_cuda_collision *c, const struct sadmm_cuda_hits *step,
+                                  struct sadmm_error *error);
+sadmm_status COLLISION(narrow_hits)(struct sadmm_cuda_collision *c, const struct sadmm_cuda_hits *step,
+                                    struct sadmm_error *error);
+sadmm_status COLLISION(reopen_hits)(struct sadmm_cuda_collision *c, const struct sadmm_cuda_hits *step,
+                                    struct sadmm_error *error);
 
 #endif

@@ -9,6 +9,7 @@
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
+#include "collision/fast_pair.h"
 #include "collision/mesh_walk.h"
 #include "collision/pair_manifold.h"
 #pragma GCC diagnostic pop
@@ -140,6 +141,14 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
         }
         store_wide(features, &out->features[first / FOUND_FEATURES]);
     }
+}
+
+/* pair_is_fast, by what is at hand first. */
+static __device__ __forceinline__ void note_fast(const collision_view &v, const struct collision_step &step, double way,
+                                                 const struct sadmm_proxy *a, const struct sadmm_proxy *b)
+{
+    if (!(way > *v.threshold * step.dt)) return;
+    if (a->restitution > 0 || b->restitution > 0 || pair_passes(a, b, way, step.dt)) v.candidate_count[COUNT_FAST] = 1;
 }
 
 /* What a kernel does for a candidate. */
@@ -284,6 +293,7 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     const bool known = find == NARROW_AGAIN || ((int)find_key_near(near, ordered_key(own.a, own.b), &before) &
                                                (int)(v.child_bits == 0));
     struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
+    if (is_at_once(HOW) && v.threshold) note_fast(v, step, pair_way(&a, &b, step.gravity, step.dt), pa, pb);
     const bool on_mesh = with_meshes(HOW) && b.geometry.type == SADMM_SHAPE_MESH;
     if (on_mesh) {
         if (find != NARROW_ONE && !triangle_now(v, step, own, a, b)) {

@@ -43,6 +43,8 @@ extern "C" sadmm_status COLLISION(create)(int device, struct sadmm_cuda_collisio
     COLLISION(narrow_smooth_kernels)(&c->kernels);
     COLLISION(seam_kernels)(&c->kernels);
     COLLISION(matching_kernels)(&c->kernels);
+    COLLISION(hits_take_kernels)(&c->hits_kernels);
+    COLLISION(hits_contacts_kernels)(&c->hits_kernels);
     *out = c;
     return SADMM_OK;
 }
@@ -60,6 +62,7 @@ extern "C" void COLLISION(destroy)(struct sadmm_cuda_collision *c)
     sadmm_free(c->planes);
     sadmm_free(c->radii);
     sadmm_seams_free(&c->seams);
+    COLLISION(free_hits)(c);
     sadmm_free(c);
 }
 

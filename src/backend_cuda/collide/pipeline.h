@@ -36,8 +36,24 @@ struct sadmm_cuda_find {
     int from, into;
     int substep, substeps; /* substeps 1: nothing is taken from, or left for, another find */
     bool early;            /* kernels are launched early (device/early.h) */
+    const struct sadmm_cuda_hits *hits; /* NULL: there are none to be taken */
+    const double *threshold; /* of restitution, on the device; not NULL: is any pair faster (contact_counts.fast)? */
 };
 enum { SADMM_CUDA_SETS = 3 }; /* the third for what lies between two sub-steps */
+
+/* What hits of bodies in flight change of a step (hits.h). Device memory. */
+struct sadmm_cuda_hits {
+    const struct sadmm_rigid *before;     /* dynamic bodies, as the (sub-)step begins */
+    struct sadmm_rigid *start;            /* out: the same, as it begins after its hits */
+    struct sadmm_collision_body *bodies;  /* by body slot */
+    double *velocity;                     /* dynamic bodies x 6: the warm start */
+    const struct sadmm_settings *settings; /* numbers alone count */
+    int32_t body_count;                   /* dynamic */
+    int32_t most;                         /* a body may have (settings.hits) */
+    int32_t into;                         /* step that ends there, 0 or 1: whose hits are kept */
+    int32_t substep, substeps;
+    double *wrench, *driven_wrench;       /* bodies x 6, driven bodies x 6: contacts' */
+};
 
 /* For tests and measurements; 0: the default. */
 struct sadmm_cuda_collision_tuning {

@@ -156,10 +156,11 @@ static sadmm_status sort_candidates(struct sadmm_cuda_collision *c, struct sadmm
     return SADMM_OK;
 }
 
-static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, struct sadmm_error *error)
+/* clear: they may be something. */
+static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, bool clear, struct sadmm_error *error)
 {
     const struct collision_view *v = &c->view;
-    if (!ranked(c)) TRY(launch(c, c->kernels.clear, v->candidate_capacity, error));
+    if (clear && !ranked(c)) TRY(launch(c, c->kernels.clear, v->candidate_capacity, error));
     if (tree) {
         TRY(launch(c, c->kernels.walk, v->leaf_count, error));
     } else {
@@ -205,14 +206,18 @@ static sadmm_status emit_contacts(struct sadmm_cuda_collision *c, struct sadmm_e
     return launch(c, c->kernels.emit, lanes, error);
 }
 
-static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+/* hits: what they change of the step; NULL: nothing. */
+static sadmm_status make_contacts(struct sadmm_cuda_collision *c, const struct sadmm_cuda_hits *hits,
+                                  struct sadmm_error *error)
 {
     const struct collision_view *v = &c->view;
     TRY(narrow_phase(c, error));
+    if (hits) TRY(COLLISION(narrow_hits)(c, hits, error));
     if (v->seams.first) TRY(launch(c, c->kernels.seams, v->candidate_capacity, error));
     TRY(emit_contacts(c, error));
     TRY(launch(c, c->kernels.emit_general,
                std::min<int64_t>((int64_t)v->candidate_capacity * GENERAL_LANES, GENERAL_BLOCKS * GENERAL_THREADS), error));
+    if (hits) TRY(COLLISION(reopen_hits)(c, hits, error));
     if (v->mesh_count == 0) return SADMM_OK;
     return launch(c, c->kernels.carry, (int64_t)v->candidate_capacity * POINT_LANES, error);
 }
@@ -250,8 +255,8 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
         TRY(COLLISION(reserve_set)(c, 1 - c->current, (size_t)c->candidate_capacity, (size_t)c->point_capacity, error));
         use_sets(c, c->current, 1 - c->current);
         TRY(reserve_temp(c, v->leaf_count, (int)c->candidate_capacity, error));
-        TRY(find_candidates(c, tree, error));
-        TRY(make_contacts(c, error));
+        TRY(find_candidates(c, tree, true, error));
+        TRY(make_contacts(c, nullptr, error));
         TRY(copy(c, staged, v->after.counts, sizeof *staged, false, error));
         TRY(wait(c, error));
         c->pending = true;
@@ -361,13 +366,40 @@ extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void 
     c->pending = true;
     c->view.substeps = find->substeps;
     c->view.substep = find->substep;
+    c->view.threshold = find->threshold;
     use_sets(c, find->from, find->into);
     if (find->substep > 0) {
         TRY(launch(c, c->kernels.place_again[many_placed(c)],
                    std::max(c->view.leaf_count + c->view.plane_count, 1), error));
-        return make_contacts(c, error);
+        return make_contacts(c, nullptr, error);
     }
+    if (!find->hits) { /* else all of this is done */
+        TRY(place_shapes(c, tree, error));
+        TRY(find_candidates(c, tree, true, error));
+    }
+    return make_contacts(c, find->hits, error);
+}
+
+extern "C" sadmm_status COLLISION(enqueue_hits)(struct sadmm_cuda_collision *c, void *stream,
+                                                const struct sadmm_cuda_find *find, struct sadmm_error *error)
+{
+    const bool tree = c->view.leaf_count >= c->tree_from;
+    int32_t *const abort_code = c->view.abort_code;
+    c->stream = (cudaStream_t)stream;
+    c->view.early = find->early;
+    c->pending = true;
+    c->view.substeps = 1;
+    c->view.substep = 0;
+    use_sets(c, find->from, find->into);
     TRY(place_shapes(c, tree, error));
-    TRY(find_candidates(c, tree, error));
-    return make_contacts(c, error);
+    TRY(find_candidates(c, tree, true, error));
+    TRY(COLLISION(take_hits)(c, find->hits, error));
+    if (tree) { /* as it is, with other boxes */
+        TRY(launch(c, c->kernels.build, c->view.leaf_count, error));
+        TRY(launch(c, c->kernels.refit, c->view.leaf_count, error));
+    }
+    c->view.abort_code = &c->hits.state->quiet; /* nothing was hit: nothing is looked for again */
+    const sadmm_status status = find_candidates(c, tree, false, error);
+    c->view.abort_code = abort_code;
+    return status;
 }

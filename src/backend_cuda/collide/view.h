@@ -6,6 +6,7 @@
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
  *            (a pair with a mesh is listed; a warp of `expand` finds its triangles: meshes.cu)
  *   sort     candidates by (slot of a, slot of b, child), the host's order
+ *   hits     where they are planned: flyers hit each other, and the candidates are looked for again: hits.h
  *   narrow   the last step's pair (a guess or a search), manifold by candidate     a thread a candidate
  *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
  *   seams    where shapes have neighbours: manifolds that their union does not have  the same
@@ -182,6 +183,7 @@ struct collision_view {
     struct collision_grid *grid;                   /* of this step */
     int32_t *abort_code;                           /* not NULL and not 0: do nothing */
     const double *dt, *gravity;                    /* not NULL: of the step, in the place of step's (step_of) */
+    const double *threshold;                       /* of restitution, m/s; not NULL: is any pair fast (COUNT_FAST)? */
 
     struct sadmm_proxy *proxies;                   /* by slot */
     struct collision_filter *filters;              /* of planes, by slot */
@@ -195,7 +197,8 @@ struct collision_view {
     int32_t *parents;                              /* of nodes; -1: the root */
     int32_t *arrivals;                             /* at inner nodes, bottom up */
 
-    unsigned long long *candidate_count;           /* found, whether they fit or not; listed; mesh_pairs; general (COUNT_) */
+    unsigned long long *candidate_count;           /* found, whether they fit or not; listed; mesh_pairs; general; is
+                                                      any fast? (COUNT_) */
     uint64_t *mesh_pairs;                          /* first_candidate of pairs with a mesh, of which there may be as many as
                                                       candidates; as they come */
     double *touches;                               /* by candidate, of triangles and pairs that are fast: mesh_first_touch */
@@ -256,7 +259,7 @@ static __device__ __forceinline__ uint32_t candidates_of(const collision_view &v
 }
 
 /* Counters. */
-enum { COUNT_FOUND, COUNT_LISTED, COUNT_MESH_PAIRS, COUNT_GENERAL, COUNTERS };
+enum { COUNT_FOUND, COUNT_LISTED, COUNT_MESH_PAIRS, COUNT_GENERAL, COUNT_FAST, COUNTERS };
 
 /* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */
 static __device__ __forceinline__ int32_t usable_candidates(const collision_view &v)

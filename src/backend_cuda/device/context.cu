@@ -70,6 +70,7 @@ static const char *const buffer_names[] = {
     "world's body slots",
     "world's places of bodies",
     "control of a step",
+    "bodies after hits",
     "driven bodies",
     "what bodies ride on",
     "joints",

@@ -55,6 +55,8 @@ sadmm_status CUDA(read_bodies)(struct sadmm_context *, struct sadmm_rigid *, str
 sadmm_status CUDA(read_driven)(struct sadmm_context *, struct sadmm_driven_body *, double *wrench, double *velocity,
                                struct sadmm_error *);
 sadmm_status CUDA(read_contacts)(struct sadmm_context *, struct sadmm_contact_set *, struct sadmm_error *);
+sadmm_status CUDA(read_hits)(struct sadmm_context *, struct sadmm_world_hit *, size_t capacity, size_t *count,
+                             size_t *first, struct sadmm_error *);
 sadmm_status CUDA(read_touching)(struct sadmm_context *, struct sadmm_touching_shapes *, struct sadmm_error *);
 sadmm_status CUDA(view_world)(struct sadmm_context *, struct sadmm_resident_view *, struct sadmm_error *);
 sadmm_status CUDA(read_start)(struct sadmm_context *, struct sadmm_rigid *, double *velocity, double *impulse,

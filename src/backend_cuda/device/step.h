@@ -29,6 +29,9 @@
  * what overlaps is made without its push, and behind `finish` the second problem is gathered and solved, in a context of
  * its own, and bodies are moved by it (step/push.cu).
  *
+ * Hits of bodies in flight (collide/hits.h) come between the candidates and the narrow phase of steps that are planned to
+ * have some: the narrow phase of others says whether any pair is fast.
+ *
  * fast, small islands (c->prologue): `iterate` does penalties and limit too, and the last two check the plan.
  *
  * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, warm or
@@ -136,6 +139,7 @@ struct cuda_step_view {
     int32_t measured;                     /* residuals of the last iteration are in view.iteration.residual */
     int32_t limits;                       /* there are contacts: momentum is restored, energies are limited
                                              (view.islands) */
+    int32_t leaves_hits;                  /* none are looked for: a step in which some pair is fast is made again */
     int32_t substep, substeps;
 };
 

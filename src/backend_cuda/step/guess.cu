@@ -24,6 +24,18 @@ struct preview {
     struct cuda_joint_counts joints;
 };
 
+void CUDA(plan_hits)(struct sadmm_context *c)
+{
+    c->step->hits_planned = true;
+    c->step->calm = 0;
+}
+
+static sadmm_status reserve_hits(struct sadmm_context *c, struct sadmm_error *error)
+{
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_HIT, 2 * (size_t)c->step->bodies * sizeof(struct sadmm_rigid), error));
+    return COLLISION(reserve_hits)(c->step->collision, error);
+}
+
 static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
@@ -32,12 +44,14 @@ static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, s
     for (;;) {
         TRY(COLLISION(reserve)(s->collision, c->settings.substeps > 1, &s->candidate_capacity, &s->point_capacity,
                                error));
+        if (takes_hits(c)) TRY(reserve_hits(c, error));
         CUDA(view_counts)(c, s->candidate_capacity);
         TRY(CUDA(reserve_layout)(c, error));
         CUDA(view_into)(c, s->into, 0);
         TRY(CUDA(clear_abort)(c, error));
         TRY(CUDA(launch_start)(c, error));
         TRY(CUDA(launch_joint_rows)(c, error));
+        TRY(CUDA(enqueue_hits)(c, 0, error));
         TRY(CUDA(enqueue_find)(c, 0, error));
         TRY(CUDA(enqueue_statistics)(c, true, error));
         TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
@@ -46,6 +60,10 @@ static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, s
         TRY(copy_out(c, &staged->joints, &c->view.step.control->joints, sizeof staged->joints, error));
         TRY(CUDA(wait)(c, error));
         *out = *staged;
+        if (out->live.abort_code == ABORT_HITS) {
+            CUDA(plan_hits)(c);
+            continue;
+        }
         if (out->live.abort_code != ABORT_CAPACITY) return SADMM_OK;
         s->candidate_capacity = std::max(s->candidate_capacity, generous(out->counts.candidates));
         /* points are counted only where all candidates fitted */

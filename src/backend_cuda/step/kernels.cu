@@ -180,6 +180,7 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
         v.model.live->abort_code = ABORT_CAPACITY;
         return;
     }
+    if (counts.fast && v.step.leaves_hits) v.model.live->abort_code = ABORT_HITS;
     v.model.live->bodies = v.model.bodies;
     v.model.live->pairs = counts.pairs;
     v.model.live->points = counts.points;

@@ -41,6 +41,7 @@ static sadmm_status launch_step(struct sadmm_context *c, int64_t sequence, struc
         TRY(CUDA(launch_edits)(c, error));
     }
     TRY(prepare(c, edited, error));
+    slot_of(s, sequence)->hits = takes_hits(c);
     c->kernel = "a step's graph";
     ((volatile struct cuda_step_report *)&step_reports(c)[sequence % STEPS_AHEAD])->ready = 0;
     CUDA_CALL(c, cudaGraphLaunch(s->graphs[edited].into[s->into], c->stream), "cudaGraphLaunch");
@@ -122,6 +123,16 @@ static void see_pushes(struct sadmm_context *c, const struct cuda_step_report *r
     s->pushes = s->planned = false;
 }
 
+/* A step was done. */
+static void see_hits(struct sadmm_context *c, const struct cuda_step_report *report)
+{
+    struct cuda_step *s = c->step;
+    if (!s->hits_planned) return;
+    s->calm = report->counts.fast ? 0 : s->calm + 1;
+    if (s->calm < CALM_STEPS) return;
+    s->hits_planned = s->planned = false;
+}
+
 /* The step `first` of the queue has failed, and nothing behind it has been done. */
 static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct cuda_step_report *report,
                             struct sadmm_error *error)
@@ -167,7 +178,8 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         s->push_streams = s->push_streams || report->totals.pushed < 0;
         s->quiet = 0;
     }
-    if (report->abort_code == ABORT_REACH) s->careful = CAREFUL_STEPS;
+    if (report->abort_code == ABORT_HITS) CUDA(plan_hits)(c);
+    else if (report->abort_code == ABORT_REACH) s->careful = CAREFUL_STEPS;
     else if (together) s->learned.step = -1; /* nothing is known of it with its rows */
     else if (report->substep > 0) learn(c, first, report);
     return repeat_steps(c, first, end, error);
@@ -201,12 +213,14 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     struct queued_step *q = slot_of(s, s->seen);
     q->edit_count = 0;
     s->last_settings = q->settings;
+    s->last_hits = q->hits;
     s->time += q->settings.dt;
     ++s->seen;
     ++s->done;
     if (s->careful > 0 && --s->careful == 0) s->planned = false;
     see_joined(c, &report);
     see_pushes(c, &report);
+    see_hits(c, &report);
     /* A plan with far too large capacities wastes launches. */
     if (report.counts.pairs < c->view.contacts.pair_capacity / 4 - 256) s->planned = false;
     return SADMM_OK;

@@ -126,6 +126,15 @@ static sadmm_status stiffen_start(struct sadmm_context *c, struct sadmm_rigid *r
     return status;
 }
 
+extern "C" sadmm_status CUDA(read_hits)(struct sadmm_context *c, struct sadmm_world_hit *hits, size_t capacity,
+                                        size_t *count, size_t *first, struct sadmm_error *error)
+{
+    const struct cuda_step *s = c->step;
+    *count = *first = 0;
+    if (s->done == 0 || !s->last_hits) return SADMM_OK;
+    return COLLISION(read_hits)(s->collision, c->stream, 1 - s->into, hits, capacity, count, first, error);
+}
+
 extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_rigid *rigid, double *velocity,
                                          double *impulse, struct sadmm_error *error)
 {
@@ -134,8 +143,10 @@ extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_r
     CUDA_ENTER(c);
     const int substeps = s->last_settings.substeps, /* of the last one */
               from = step_state(1 - s->into, substeps - 2, substeps);
-    TRY(CUDA(get)(c, rigid, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)from * n, n * sizeof *rigid,
-                  error));
+    TRY(CUDA(get)(c, rigid,
+                  s->last_hits ? buffer<struct sadmm_rigid>(c, BUFFER_WORLD_HIT) + (size_t)(1 - s->into) * n /* after them */
+                               : buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)from * n,
+                  n * sizeof *rigid, error));
     TRY(stiffen_start(c, rigid, error));
     TRY(CUDA(get)(c, velocity, buffer<double>(c, BUFFER_WORLD_VELOCITY), 6 * n * sizeof *velocity, error));
     return CUDA(get)(c, impulse, buffer<double>(c, BUFFER_WORLD_IMPULSE), 3 * points * sizeof *impulse, error);

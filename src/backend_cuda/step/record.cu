@@ -9,15 +9,51 @@
 
 /* ---- stages ---------------------------------------------------------------------------------------------------- */
 
+static struct sadmm_cuda_find find_of(const struct sadmm_context *c, int substep)
+{
+    const struct cuda_step *s = c->step;
+    const int substeps = c->settings.substeps;
+    const bool hits = takes_hits(c), alone = s->careful > 0 || hits; /* each with candidates of its own */
+    const struct sadmm_cuda_find find = {step_state(s->into, substep - 1, substeps),
+                                         step_state(s->into, substep, substeps),
+                                         alone ? 0 : substep,
+                                         alone ? 1 : substeps,
+                                         all_begin_early(c),
+                                         hits ? &s->hits : nullptr,
+                                         c->view.step.leaves_hits ? &c->view.model.settings->restitution_threshold
+                                                                  : nullptr};
+    return find;
+}
+
+sadmm_status CUDA(enqueue_hits)(struct sadmm_context *c, int substep, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    const struct sadmm_cuda_find find = find_of(c, substep);
+    if (!find.hits) return SADMM_OK;
+    struct sadmm_rigid *start = buffer<struct sadmm_rigid>(c, BUFFER_WORLD_HIT) + (size_t)s->into * (size_t)s->bodies;
+    s->hits = {c->view.step.before,
+               start,
+               c->view.step.bodies,
+               c->view.step.start_velocity,
+               c->view.model.settings,
+               s->bodies,
+               c->settings.hits,
+               s->into,
+               substep,
+               c->settings.substeps,
+               c->view.step.wrench,
+               c->view.driven.count > 0 ? c->view.driven.wrench : nullptr};
+    TRY(COLLISION(enqueue_hits)(s->collision, c->stream, &find, error));
+    c->view.step.before = c->view.raw.system.rigid = start;
+    if (c->view.push.planned) s->push->view.raw.system.rigid = start;
+    return SADMM_OK;
+}
+
 /* Contacts, up to the gate. */
 sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, int substep, struct sadmm_error *error)
 {
     const struct cuda_step *s = c->step;
-    const int substeps = c->settings.substeps;
-    const bool alone = s->careful > 0; /* each with candidates of its own */
-    const struct sadmm_cuda_find find = {step_state(s->into, substep - 1, substeps),
-                                         step_state(s->into, substep, substeps), alone ? 0 : substep,
-                                         alone ? 1 : substeps, all_begin_early(c)};
+    const struct sadmm_cuda_find find = find_of(c, substep);
     TRY(COLLISION(enqueue)(s->collision, c->stream, &find, error));
     return CUDA(launch_admit)(c, error);
 }
@@ -221,6 +257,8 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
     if (joints && apart) TRY(wait_for_joints(c, error));
     TRY(joints && !apart ? record_joined_finish(c, error) : CUDA(launch_finish)(c, true, error));
     TRY(CUDA(launch_driven_finish)(c, error));
+    if (takes_hits(c) && c->view.model.wrenches)
+        TRY(COLLISION(give_hits)(c->step->collision, c->stream, &c->step->hits, error));
     if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;
 }
@@ -310,8 +348,15 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
 {
     const enum cuda_limit limit = limit_by_iterations(c);
     switch (stage->kind) {
-    case SADMM_STAGE_GATHER: TRY(CUDA(launch_start)(c, error)); return record_bodies(c, error);
-    case SADMM_STAGE_FIND: return CUDA(enqueue_find)(c, c->view.step.substep, error);
+    case SADMM_STAGE_GATHER:
+        TRY(CUDA(launch_start)(c, error));
+        return takes_hits(c) ? SADMM_OK : record_bodies(c, error);
+    case SADMM_STAGE_FIND:
+        if (takes_hits(c)) { /* first, since bodies start from where they leave them */
+            TRY(CUDA(enqueue_hits)(c, c->view.step.substep, error));
+            TRY(record_bodies(c, error));
+        }
+        return CUDA(enqueue_find)(c, c->view.step.substep, error);
     case SADMM_STAGE_PLAN: return record_plan(c, error);
     case SADMM_STAGE_PENALTY:
         TRY(CUDA(enqueue_penalties)(c, error));
@@ -330,7 +375,7 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
         TRY(CUDA(launch_turn)(c, error));
         view_substep(c, c->view.step.substep + 1);
         *residuals = false;
-        return record_bodies(c, error);
+        return takes_hits(c) ? SADMM_OK : record_bodies(c, error);
     case SADMM_STAGE_COMMIT: return CUDA(launch_commit)(c, error);
     case SADMM_STAGE_BODIES:   /* beside FIND */
     case SADMM_STAGE_CONTACTS: /* beside PLAN */

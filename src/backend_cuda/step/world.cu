@@ -39,6 +39,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     step->edit_capacity = s->edit_capacity;
     step->measured = c->plan.residuals && !stop_rule_checked(c);
     step->limits = c->plan.momentum;
+    step->leaves_hits = may_take_hits(c) && !s->hits_planned;
     step->substep = substep;
     step->substeps = substeps;
     c->view.raw.system.rigid = step->before;
@@ -136,6 +137,8 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->apart = false;
     s->quiet = 0;
     s->push_streams = false;
+    s->hits_planned = s->last_hits = false;
+    s->calm = 0;
     s->untouched = 0;
     s->patience = LEAST_PATIENCE;
     for (struct queued_step &q : s->queue) q.edit_count = 0;
@@ -188,6 +191,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                           buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),
                           &c->view.model.live->abort_code, &kept->settings.dt, &kept->gravity, error));
+    TRY(COLLISION(load_hits)(s->collision, world->input, world->held, error));
     CUDA(view_into)(c, s->into, 0);
     return CUDA(wait)(c, error);
 }

@@ -21,6 +21,7 @@ struct queued_step {
     cudaEvent_t done;
     struct sadmm_settings settings;
     size_t edit_count;
+    bool hits; /* are looked for (takes_hits) */
 };
 
 /* A step's graphs, by the set that is written. */
@@ -48,6 +49,8 @@ enum { LEAST_PATIENCE = 16, MOST_PATIENCE = 1 << 16 };
 /* Steps without a push until they are planned to have none: to plan takes what a second problem's empty kernels do in as
  * many. */
 enum { QUIET_STEPS = 32 };
+/* The same of hits, whose empty kernels take less. */
+enum { CALM_STEPS = 256 };
 
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
@@ -68,6 +71,9 @@ struct cuda_step {
     int32_t quiet;              /* but none has been for so many steps */
     struct sadmm_context *push; /* of that; made with the first one */
 
+    bool hits_planned;          /* hits are looked for, where the world has any (takes_hits), */
+    int32_t calm;               /* but no pair has been fast for so many steps */
+
     bool planned;               /* capacities, partition and guess are for the world as it is */
     struct step_graphs graphs[2]; /* of steps without edits, and with (queue.cu) */
     struct cuda_step_guess guess;
@@ -75,6 +81,7 @@ struct cuda_step {
 
     struct substep_plan plans[SADMM_MOST_SUBSTEPS];
     struct learned learned;
+    struct sadmm_cuda_hits hits; /* of the (sub-)step that is being enqueued (takes_hits) */
     int64_t careful;            /* so many steps more look for candidates in every sub-step: shapes left their reach */
 
     /* The queue: steps [seen, enqueued), at most STEPS_AHEAD. */
@@ -86,6 +93,7 @@ struct cuda_step {
 
     struct cuda_step_report last; /* of the last step that was done, */
     struct sadmm_settings last_settings;
+    bool last_hits;               /* queued_step */
     double time;                  /* simulated until after it, s */
     int64_t done, repeats;
     int64_t misfit;             /* the last step that its partition did not fit; -1: none */
@@ -105,6 +113,13 @@ static inline struct cuda_step_report *step_reports(const struct sadmm_context *
 /* The next step is planned anew: there are no graphs of it. */
 static inline void forget_graphs(struct cuda_step *s) { s->graphs[false].recorded = s->graphs[true].recorded = false; }
 
+/* May hits of bodies in flight be taken at their moment (collide/hits.h)? Is that planned? */
+static inline bool may_take_hits(const struct sadmm_context *c)
+{
+    return c->settings.hits > 0 && COLLISION(takes_hits)(c->step->collision);
+}
+static inline bool takes_hits(const struct sadmm_context *c) { return c->step->hits_planned && may_take_hits(c); }
+
 /* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
 static inline bool stop_rule_checked(const struct sadmm_context *c)
 {
@@ -122,6 +137,8 @@ void CUDA(view_counts)(struct sadmm_context *, int64_t pairs);
 sadmm_status CUDA(clear_abort)(struct sadmm_context *, struct sadmm_error *error);
 /* guess.cu: what the next step and those like it need. Nothing is running. */
 sadmm_status CUDA(guess_step)(struct sadmm_context *, struct sadmm_error *error);
+/* guess.cu: some pair is fast. */
+void CUDA(plan_hits)(struct sadmm_context *);
 /* guess.cu: the plan of a step, of this many pairs and points with these statistics, or a sub-step. */
 struct substep_plan CUDA(plan_of)(const struct sadmm_context *, int32_t pairs, int32_t points,
                                   const struct cuda_graph_statistics *statistics,
@@ -130,6 +147,8 @@ struct substep_plan CUDA(plan_of)(const struct sadmm_context *, int32_t pairs, i
 bool CUDA(may_be_apart)(const struct sadmm_context *);
 /* guess.cu: *a becomes what a partition for both needs. */
 void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_graph_statistics *b);
+/* record.cu: where there are hits, what a (sub-)step begins with after them is what it begins with from here on; */
+sadmm_status CUDA(enqueue_hits)(struct sadmm_context *, int substep, struct sadmm_error *error);
 /* record.cu: contacts, up to the gate. */
 sadmm_status CUDA(enqueue_find)(struct sadmm_context *, int substep, struct sadmm_error *error);
 /* record.cu: the graph of a step that writes state and set `into`; edited: its edits come first. */

@@ -61,7 +61,7 @@ static void count(struct sadmm_context *c)
     v->rows.count = (int32_t)sadmm_row_constraint_count(c->system);
     v->joints.count = 0;
     v->driven.count = 0;
-    v->model.contact_rows = c->plan.contact_rows;
+    v->model.contact_rows = c->plan.contact_rows == 1 ? 1 : 3; /* as in whole steps, which may have none as well */
     v->model.warm_start = c->plan.warm_start;
     c->bounces = false;
     for (size_t p = 0; p < c->system->contacts->pair_count; ++p)

@@ -35,6 +35,7 @@
             .view = sadmm_cuda_view_world##suffix,             \
             .read_contacts = sadmm_cuda_read_contacts##suffix, \
             .read_touching = sadmm_cuda_read_touching##suffix, \
+            .read_hits = sadmm_cuda_read_hits##suffix, \
             .read_start = sadmm_cuda_read_start##suffix,       \
             .read_joints = sadmm_cuda_read_joints##suffix,     \
             .read_rows = sadmm_cuda_read_rows##suffix,         \

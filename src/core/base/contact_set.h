@@ -93,6 +93,18 @@ struct sadmm_contact_set {
     double dt; /* of the step that its impulses are for, s; 0: of none */
 };
 
+/* A point of a hit that a step has taken at its moment (world/hits.c). */
+struct sadmm_world_hit {
+    int32_t shape_a, shape_b; /* slots */
+    uint32_t child, feature;
+    double position[3], normal[3]; /* m; unit, from a to b; world */
+    double impulse[3];             /* on b, N s */
+    double arm[2][3];              /* from the centres of mass of a's and b's bodies, m */
+    int32_t dynamic[2], driven[2]; /* their numbers in the step, -1: none */
+    double speed;                  /* of approach, m/s */
+    double friction;
+};
+
 /* NULL: it has none. */
 SADMM_INLINE const struct sadmm_contact_migration *sadmm_migration_of(const struct sadmm_contact_point *points,
                                                                       const struct sadmm_contact_migration *migrations,

@@ -44,6 +44,8 @@ struct sadmm_resident_world {
     int32_t gear_count;
     const struct sadmm_resident_gear *gears;   /* (gear_count) */
     const double *gear_force;                  /* (gear_count) along the first coordinate, of the last step: N or N m */
+    const unsigned char *held;                 /* by body slot: joints hold it, and it is not hit at its moment
+                                                  (world/hits.c) */
     double time;                               /* simulated until now, s */
 };
 
@@ -124,6 +126,10 @@ struct sadmm_resident_kernels {
     /* Which pairs of the last step done touch (base/contact_set.h): as many as its report has pairs, in the order of
      * read_contacts. Nothing may be enqueued. */
     sadmm_status (*read_touching)(struct sadmm_context *, struct sadmm_touching_shapes *, struct sadmm_error *);
+    /* Hits that the last step done has taken at their moment, if there is room for them; *first: of its last sub-step.
+     * Nothing may be enqueued. */
+    sadmm_status (*read_hits)(struct sadmm_context *, struct sadmm_world_hit *, size_t capacity, size_t *count,
+                              size_t *first, struct sadmm_error *);
     /* What the last step done started from: bodies, velocities (bodies x 6, m/s and rad/s) and impulses (points x 3, N
      * s); any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_start)(struct sadmm_context *, struct sadmm_rigid *rigid, double *velocity, double *impulse,

@@ -10,9 +10,8 @@
 static int32_t readable_contacts(const sadmm_world *world)
 {
     if (!world->contacts_readable) return 0;
-    return world->resident.contacts_behind
-               ? world->report.contacts
-               : (int32_t)(world->contacts.point_count + world->start.hit_count - world->start.hit_first);
+    return (world->resident.contacts_behind ? world->report.contacts : (int32_t)world->contacts.point_count) +
+           (int32_t)(world->start.hit_count - world->start.hit_first);
 }
 
 int32_t sadmm_world_contact_count(sadmm_world *world)

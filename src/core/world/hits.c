@@ -15,31 +15,13 @@
  * then, is from its last hit on.
  *
  * Order: by time, then by the pair's slots: results do not depend on threads. */
-#include <math.h>
 #include <string.h>
 
 #include "collision/broad_phase.h"
-#include "collision/flight_touch.h"
 #include "collision/flyers.h"
-#include "collision/geometry.h"
 #include "core/base/memory.h"
-#include "core/math/hit.h"
-#include "core/math/rigid.h"
-#include "core/model/forces.h"
-#include "core/model/spin.h"
+#include "flyer.h"
 #include "world_internal.h"
-
-/* A body that takes part. */
-struct flyer {
-    int32_t slot, dynamic; /* dynamic: -1 if it is not */
-    int32_t driven;        /* -1 if it is not */
-    struct sadmm_rigid start;
-    struct sadmm_flight flight;
-    uint32_t hits; /* that it has had: what was foreseen before the last one does not hold */
-    bool too_many; /* there would be more than it may have */
-    bool passes;   /* it may go through what is thin: the hits it has had are kept then, */
-    bool ended;    /* and what comes after them is left to the solve */
-};
 
 /* A hit that is foreseen. */
 struct foreseen {
@@ -103,140 +85,6 @@ static int32_t take_from_queue(struct sadmm_hits *h)
 
 /* ---- ways -------------------------------------------------------------------------------------------------------- */
 
-/* v after the step over v at its start but for what forces add, along the body's centre of mass. */
-static double kept(const struct sadmm_rigid *body, double dt)
-{
-    const struct forces_damping linear = forces_damping_of(body, 0, dt);
-    return linear.keep / linear.mass;
-}
-
-/* The acceleration that the step gives its velocity. */
-static void accelerate(const struct sadmm_rigid *body, const sadmm_settings *settings, double acceleration[3])
-{
-    double free[6];
-    forces_free(body, body->velocity, settings->gravity, settings->dt, free);
-    for (int k = 0; k < 3; ++k) acceleration[k] = (free[k] - body->velocity[k]) / settings->dt;
-}
-
-/* dt I^-1 torque, as damping lets it be. */
-static vec3 torque_gain(const struct sadmm_rigid *body, quat q, double dt)
-{
-    const double share = dt / forces_damping_of(body, 1, dt).mass;
-    return v3_scale(rigid_angular_velocity(q, v3_load(body->inertia), v3_load(body->wrench + 3)), share);
-}
-
-/* What torques and damping make of an angular velocity in a step (core/model/system_math.h: b over A); and back. */
-static vec3 spin_after(const struct sadmm_rigid *body, quat q, vec3 before, double dt)
-{
-    const struct forces_damping angular = forces_damping_of(body, 1, dt);
-    return v3_add(v3_scale(before, angular.keep / angular.mass), torque_gain(body, q, dt));
-}
-static vec3 spin_without(const struct sadmm_rigid *body, quat q, vec3 after, double dt)
-{
-    const struct forces_damping angular = forces_damping_of(body, 1, dt);
-    return v3_scale(v3_sub(after, torque_gain(body, q, dt)), angular.mass / angular.keep);
-}
-
-/* Of equal moments: as the step takes its lead back (math/lead.h). */
-static void turn_evenly(struct sadmm_flight *flight, quat q, vec3 before, vec3 after, double at)
-{
-    q_store(q, flight->orientation);
-    v3_store(after, flight->spin);
-    v3_store(v3_sub(after, v3_scale(v3_sub(after, before), 0.5)), flight->turn);
-    flight->at = at;
-}
-
-/* The most by which a body's angular velocity differs from that halfway: it changes by ((I_y - I_z) / I_x w_y w_z, ...) in
- * the body's frame, w no larger than rigid_rate2 says. */
-static double sway_of(vec3 inertia, struct rigid_spin halfway, double dt)
-{
-    const vec3 w = m3_tmul(q_matrix(halfway.orientation), halfway.angular),
-               share = v3((inertia.y - inertia.z) / inertia.x, (inertia.z - inertia.x) / inertia.y,
-                          (inertia.x - inertia.y) / inertia.z);
-    const double rate2 = rigid_rate2(inertia, w);
-    return fmin(dt / 2 * v3_max_abs(share) * rate2, 2 * sqrt(rate2));
-}
-
-/* Of others: as the step turns it about the middle (core/model/spin.h). */
-static void turn_freely(struct sadmm_flight *flight, vec3 inertia, struct rigid_spin halfway, double dt)
-{
-    q_store(halfway.orientation, flight->orientation);
-    v3_store(halfway.angular, flight->spin);
-    v3_store(halfway.angular, flight->turn);
-    v3_store(inertia, flight->inertia);
-    flight->sway = sway_of(inertia, halfway, dt);
-    flight->at = dt / 2;
-}
-
-static void turn_from_start(struct flyer *f, double dt)
-{
-    const struct sadmm_rigid *start = &f->start;
-    const vec3 inertia = v3_load(start->inertia);
-    if (rigid_is_isotropic(inertia)) {
-        const struct rigid_spin spin = spin_start(start);
-        const vec3 after = spin_after(start, spin.orientation, spin.angular, dt);
-        turn_evenly(&f->flight, spin.orientation, spin.angular, after, 0);
-    } else {
-        struct rigid_spin halfway = spin_halfway(start, dt);
-        halfway.angular = spin_after(start, halfway.orientation, halfway.angular, dt);
-        turn_freely(&f->flight, inertia, halfway, dt);
-    }
-}
-
-/* By its spin at t, which it has after what acts on it in the step, the one at its start. */
-static void turn_from_hit(struct flyer *f, double dt, double t, struct rigid_spin hit)
-{
-    const vec3 inertia = v3_load(f->start.inertia);
-    struct rigid_spin start = hit;
-    if (rigid_is_isotropic(inertia)) {
-        start.angular = spin_without(&f->start, hit.orientation, hit.angular, dt);
-        turn_evenly(&f->flight, hit.orientation, start.angular, hit.angular, t);
-        start.orientation = rigid_turn(hit.orientation, v3_load(f->flight.turn), -t);
-    } else {
-        start = rigid_tumble(hit, inertia, dt / 2 - t);
-        turn_freely(&f->flight, inertia, start, dt);
-        start.angular = spin_without(&f->start, start.orientation, start.angular, dt);
-        start = rigid_tumble(start, inertia, -dt / 2);
-    }
-    q_store(start.orientation, f->start.orientation);
-    v3_store(start.angular, f->start.velocity + 3);
-}
-
-static void fly_from_start(struct flyer *f, const sadmm_settings *settings)
-{
-    struct sadmm_flight *flight = &f->flight;
-    memset(flight, 0, sizeof *flight);
-    memcpy(flight->position, f->start.position, sizeof flight->position);
-    memcpy(flight->orientation, f->start.orientation, sizeof flight->orientation);
-    if (f->dynamic < 0 && f->driven < 0) return;
-    memcpy(flight->velocity, f->start.velocity, sizeof flight->velocity);
-    memcpy(flight->turn, f->start.velocity + 3, sizeof flight->turn);
-    memcpy(flight->spin, f->start.velocity + 3, sizeof flight->spin);
-    if (f->dynamic < 0) return;
-    accelerate(&f->start, settings, flight->acceleration);
-    turn_from_start(f, settings->dt);
-}
-
-/* The start from which a body would come to the pose at t with these velocities. */
-static void fly_from_hit(struct flyer *f, const sadmm_settings *settings, double t,
-                         const struct sadmm_flight_pose *pose, vec3 linear, vec3 spin)
-{
-    const double dt = settings->dt, s = t / dt, k = kept(&f->start, dt), share = 1 + s * (k - 1);
-    const struct rigid_spin hit = {q_load(pose->orientation), spin};
-    struct sadmm_rigid *start = &f->start;
-    double gained[3];
-    accelerate(start, settings, gained); /* dt a = (k - 1) v + what forces add */
-    for (int j = 0; j < 3; ++j) gained[j] = dt * gained[j] - (k - 1) * start->velocity[j];
-    v3_store(v3_scale(v3_madd(linear, -s, v3_load(gained)), 1 / share), start->velocity);
-    accelerate(start, settings, f->flight.acceleration);
-    for (int j = 0; j < 3; ++j)
-        start->position[j] = pose->position[j] - t * (start->velocity[j] + t / 2 * f->flight.acceleration[j]);
-    turn_from_hit(f, dt, t, hit);
-    memcpy(f->flight.position, start->position, sizeof f->flight.position);
-    memcpy(f->flight.velocity, start->velocity, sizeof f->flight.velocity);
-    f->flight.since = t;
-}
-
 /* The number of a body's flyer, -1: out of memory. */
 static int32_t flyer_of(struct taking *t, int32_t slot)
 {
@@ -253,7 +101,7 @@ static int32_t flyer_of(struct taking *t, int32_t slot)
     f->start = system >= 0                    ? world->start.rigid[system]
                : sadmm_body_is_driven(system) ? world->driven[f->driven].rigid
                                               : world->bodies[slot].rigid;
-    fly_from_start(f, &t->settings);
+    flyer_begin(f, &t->settings);
     h->index[slot] = (int32_t)++h->count;
     return (int32_t)h->count - 1;
 }
@@ -300,18 +148,11 @@ static bool set_box(struct taking *t, uint32_t slot, const struct flyer *f)
 {
     const struct sadmm_shape *shape = &t->world->shapes[slot];
     const struct sadmm_geometry *geometry = &t->world->geometries[shape->geometry];
-    const double dt = t->settings.dt, left = dt - f->flight.since, arm = v3_norm(v3_load(shape->position)),
-                 sags = left * left / 8 * v3_norm(v3_load(f->flight.acceleration)),
-                 reach = arm + geometry_radius(geometry) + sags;
     struct sadmm_flight_pose from, to;
     struct sadmm_box3 box;
     sadmm_flight_at(&f->flight, f->flight.since, &from);
-    sadmm_flight_at(&f->flight, dt, &to);
-    for (int k = 0; k < 3; ++k) {
-        const double rounding = 8 * DBL_EPSILON * (fabs(from.position[k]) + fabs(to.position[k]) + reach);
-        box.lo[k] = fmin(from.position[k], to.position[k]) - reach - rounding;
-        box.hi[k] = fmax(from.position[k], to.position[k]) + reach + rounding;
-    }
+    sadmm_flight_at(&f->flight, t->settings.dt, &to);
+    flyer_box(shape, geometry, &f->flight, t->settings.dt, &from, &to, &box);
     return sadmm_collision_set_box(t->world->collision, slot, &box);
 }
 
@@ -337,38 +178,6 @@ static bool foresee_body(struct taking *t, int32_t number, int32_t except)
 }
 
 /* ---- a hit ------------------------------------------------------------------------------------------------------- */
-
-static void hit_body_of(const struct flyer *f, const struct sadmm_flight_pose *pose, struct hit_body *out)
-{
-    memset(out, 0, sizeof *out);
-    out->linear = v3_load(pose->velocity);
-    out->angular = v3_load(pose->spin);
-    if (f->dynamic < 0) return;
-    const mat3 R = q_matrix(q_load(pose->orientation));
-    const double *I = f->start.inertia;
-    const sym3 inverse = rigid_world_inertia(R, v3(1 / I[0], 1 / I[1], 1 / I[2]));
-    out->inverse_mass = 1 / f->start.mass;
-    out->inverse_inertia.r[0] = v3(inverse.xx, inverse.xy, inverse.xz);
-    out->inverse_inertia.r[1] = v3(inverse.xy, inverse.yy, inverse.yz);
-    out->inverse_inertia.r[2] = v3(inverse.xz, inverse.yz, inverse.zz);
-}
-
-static void make_hit(const struct taking *t, const struct foreseen *item, const struct sadmm_flight_pose pose[2],
-                     struct hit *hit)
-{
-    const struct sadmm_flight_touch *touch = &item->touch;
-    memset(hit, 0, sizeof *hit);
-    sadmm_collision_pair_law(t->world->collision, &t->input, item->key, &hit->friction, &hit->restitution);
-    hit->threshold = t->settings.restitution_threshold;
-    hit->frame.r[0] = v3_load(touch->normal);
-    v3_tangents(hit->frame.r[0], &hit->frame.r[1], &hit->frame.r[2]);
-    hit->count = touch->count;
-    for (int side = 0; side < 2; ++side) {
-        hit_body_of(&t->hits->list[item->flyer[side]], &pose[side], &hit->body[side]);
-        for (int k = 0; k < touch->count; ++k)
-            hit->arm[side][k] = v3_sub(v3_load(touch->point[k]), v3_load(pose[side].position));
-    }
-}
 
 /* Into `start`, for those who read what has happened. False: out of memory. */
 static bool record(struct taking *t, const struct foreseen *item, const struct hit *hit)
@@ -400,51 +209,19 @@ static bool record(struct taking *t, const struct foreseen *item, const struct h
     return true;
 }
 
-/* What the hit leaves together and forces press on each other stays together: their ways would part and overlap again
- * by what falls within the step. Apart by `along` at the start, along the normal. */
-static double overlap_of_held(const struct taking *t, const struct foreseen *item, const struct hit *hit,
-                              const vec3 linear[2], const vec3 spin[2])
-{
-    const struct sadmm_flight *a = &t->hits->list[item->flyer[0]].flight, *b = &t->hits->list[item->flyer[1]].flight;
-    const double time = item->touch.time, left = t->settings.dt - time,
-                 falls = -v3_dot(hit->frame.r[0], v3_sub(v3_load(b->acceleration), v3_load(a->acceleration)));
-    double parts = HUGE_VAL;
-    for (int k = 0; k < hit->count; ++k) {
-        const vec3 at_a = v3_add(linear[0], v3_cross(spin[0], hit->arm[0][k])),
-                   at_b = v3_add(linear[1], v3_cross(spin[1], hit->arm[1][k]));
-        parts = fmin(parts, v3_dot(hit->frame.r[0], v3_sub(at_b, at_a)));
-    }
-    return falls > 0 && parts < falls * left ? fmax(parts, 0) * time + falls * time * time / 2 : 0;
-}
-
-static void move_start(struct flyer *f, vec3 way)
-{
-    if (f->dynamic < 0) return;
-    for (int k = 0; k < 3; ++k) {
-        f->start.position[k] += v3_part(way, k);
-        f->flight.position[k] += v3_part(way, k);
-    }
-}
-
 static bool take_hit(struct taking *t, const struct foreseen item)
 {
     struct flyer *f[2] = {&t->hits->list[item.flyer[0]], &t->hits->list[item.flyer[1]]};
+    const struct flyer *const of[2] = {f[0], f[1]};
     struct sadmm_flight_pose pose[2];
     struct hit hit;
-    vec3 linear[2], spin[2];
     for (int side = 0; side < 2; ++side) sadmm_flight_at(&f[side]->flight, item.touch.time, &pose[side]);
-    make_hit(t, &item, pose, &hit);
+    memset(&hit, 0, sizeof hit);
+    sadmm_collision_pair_law(t->world->collision, &t->input, item.key, &hit.friction, &hit.restitution);
+    flyers_hit(of, &item.touch, t->settings.restitution_threshold, pose, &hit);
     hit_solve(&hit);
-    for (int side = 0; side < 2; ++side) hit_apply(&hit, side, &linear[side], &spin[side]);
     if (!record(t, &item, &hit)) return false;
-    const double overlap = overlap_of_held(t, &item, &hit, linear, spin),
-                 mass = hit.body[0].inverse_mass + hit.body[1].inverse_mass;
-    for (int side = 0; side < 2; ++side) {
-        if (f[side]->dynamic < 0) continue;
-        ++f[side]->hits;
-        fly_from_hit(f[side], &t->settings, item.touch.time, &pose[side], linear[side], spin[side]);
-        move_start(f[side], v3_scale(hit.frame.r[0], (side ? 1 : -1) * overlap * hit.body[side].inverse_mass / mass));
-    }
+    flyers_part(f, &t->settings, item.touch.time, pose, &hit);
     const int32_t slot_a = f[0]->slot;
     return (f[0]->dynamic < 0 || foresee_body(t, item.flyer[0], -1)) &&
            (t->hits->list[item.flyer[1]].dynamic < 0 ||
@@ -458,18 +235,6 @@ static bool holds(const struct sadmm_hits *h, const struct foreseen *item)
 
 /* ---- a sub-step's ------------------------------------------------------------------------------------------------ */
 
-/* May any body be hit? It moves by more than half of the threshold, or turns. */
-static bool any_fast(const sadmm_world *world, double threshold)
-{
-    for (int32_t i = 0; i < world->dynamic_count; ++i) {
-        const double *v = world->start.rigid[i].velocity;
-        if (4 * dot3(v, v) > threshold * threshold || size3(v + 3) > 1e-3) return true;
-    }
-    for (int32_t k = 0; k < 6 * world->start.driven_count; ++k)
-        if (world->start.driven[k] != 0) return true;
-    return false;
-}
-
 static bool reserve(struct sadmm_hits *h, size_t slots)
 {
     return sadmm_grow(&h->flyers, &h->flyer_capacity, 0, slots, sizeof *h->flyers) &&
@@ -477,11 +242,20 @@ static bool reserve(struct sadmm_hits *h, size_t slots)
            sadmm_grow(&h->since, &h->since_capacity, 0, slots, sizeof *h->since);
 }
 
-/* What loses most of its velocity within the step has no start from which it would come. */
 static unsigned char flyer_kind(const struct sadmm_world_body *body, double dt)
 {
     if (!body->alive || body->type != SADMM_BODY_DYNAMIC) return SADMM_FLYER_FIXED;
-    return body->rigid.damping[0] * dt > 1 || body->rigid.damping[1] * dt > 1 ? SADMM_FLYER_NONE : SADMM_FLYER_DYNAMIC;
+    return flyer_is_damped(&body->rigid, dt) ? SADMM_FLYER_NONE : SADMM_FLYER_DYNAMIC;
+}
+
+void sadmm_world_mark_held(const sadmm_world *world, unsigned char *bodies, unsigned char mark)
+{
+    for (size_t k = 0; k < world->joint_slots; ++k) {
+        const struct sadmm_world_joint *joint = &world->joints[k];
+        for (int side = 0; joint->alive && side < 2; ++side)
+            if (joint->body[side] >= 0 && world->bodies[joint->body[side]].type == SADMM_BODY_DYNAMIC)
+                bodies[joint->body[side]] = mark;
+    }
 }
 
 static void mark_bodies(struct taking *t)
@@ -490,12 +264,7 @@ static void mark_bodies(struct taking *t)
     unsigned char *flyers = t->hits->flyers;
     for (size_t slot = 0; slot < world->body_slots; ++slot)
         flyers[slot] = flyer_kind(&world->bodies[slot], t->settings.dt);
-    for (size_t k = 0; k < world->joint_slots; ++k) {
-        const struct sadmm_world_joint *joint = &world->joints[k];
-        for (int side = 0; joint->alive && side < 2; ++side)
-            if (joint->body[side] >= 0 && flyers[joint->body[side]] == SADMM_FLYER_DYNAMIC)
-                flyers[joint->body[side]] = SADMM_FLYER_NONE;
-    }
+    sadmm_world_mark_held(world, flyers, SADMM_FLYER_NONE);
     sadmm_collision_mark_pressed(world->collision, &world->contacts, flyers);
 }
 
@@ -644,28 +413,13 @@ sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep)
     forget(world);
     if (substep == 0) world->start.hit_count = 0;
     world->start.hit_first = world->start.hit_count;
-    if (t.settings.hits == 0 || world->kernels->backend == SADMM_BACKEND_CUDA ||
-        !any_fast(world, t.settings.restitution_threshold))
-        return SADMM_OK;
+    if (t.settings.hits == 0) return SADMM_OK;
     if (!world->hits) world->hits = (struct sadmm_hits *)sadmm_alloc(1, sizeof *world->hits);
     if (!world->hits || !reserve(world->hits, world->body_slots)) return sadmm_fail_memory(&world->error, "hits");
     t.hits = world->hits;
     t.input = sadmm_world_collision_input(world, substep);
     t.input.team = &world->team;
     return take_most(&t);
-}
-
-/* How fast the two come closer at a point by their own motions, at the end of the sub-step, m/s. */
-static double approach_of(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point,
-                          const struct sadmm_flight *a, const struct sadmm_flight *b, double dt)
-{
-    double across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0}, speed = 0;
-    add_cross(pair->normal, a->spin, 1, across_a);
-    add_cross(pair->normal, b->spin, 1, across_b);
-    for (int k = 0; k < 3; ++k)
-        speed -= pair->normal[k] * (b->velocity[k] - a->velocity[k] + dt * (b->acceleration[k] - a->acceleration[k])) -
-                 across_a[k] * point->arm_a[k] + across_b[k] * point->arm_b[k];
-    return speed;
 }
 
 /* The flyer of a shape's body, NULL: it was not followed to the end. */
@@ -690,10 +444,6 @@ static double thinner_of(const sadmm_world *world, const struct sadmm_contact_pa
                 geometry_thickness(&world->geometries[world->shapes[pair->shape_b].geometry]));
 }
 
-/* Gaps are opened by so much more, and by no more than this share of the thinner shape: nothing goes through where the
- * touch of thin shapes is lost in rounding. */
-#define OPEN        1e-6
-#define OPENED_MOST 0.25
 void sadmm_world_open_gaps(sadmm_world *world)
 {
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
@@ -702,14 +452,9 @@ void sadmm_world_open_gaps(sadmm_world *world)
         const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
         const struct flyer *a = followed_of(world, pair->shape_a), *b = followed_of(world, pair->shape_b);
         if (!is_followed(world, pair, a, b)) continue;
-        const double most = OPENED_MOST * thinner_of(world, pair);
-        for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
-            struct sadmm_contact_point *point = &world->contacts.points[k];
-            const double speed = approach_of(pair, point, &a->flight, &b->flight, settings.dt),
-                         way = (1 + OPEN) * speed * settings.dt;
-            if (speed > settings.restitution_threshold && way > point->gap && way - point->gap <= most)
-                point->gap = way;
-        }
+        const double thinner = thinner_of(world, pair);
+        for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
+            flyers_open_gap(pair, &a->flight, &b->flight, thinner, &settings, &world->contacts.points[k]);
     }
 }
 

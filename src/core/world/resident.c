@@ -123,6 +123,17 @@ static void begin_edits(struct sadmm_world_body *body)
     for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) body->set_at[kind] = -1;
 }
 
+/* Which bodies joints hold. */
+static sadmm_status list_held(sadmm_world *world)
+{
+    if (!sadmm_grow(&world->resident.held, &world->resident.held_capacity, 0, world->body_slots,
+                    sizeof *world->resident.held))
+        return sadmm_fail_memory(&world->error, "hits");
+    if (world->body_slots > 0) memset(world->resident.held, 0, world->body_slots);
+    sadmm_world_mark_held(world, world->resident.held, 1);
+    return SADMM_OK;
+}
+
 /* The world as it is now. What the last step started from stays: it can be read until a step is done. */
 static sadmm_status load(sadmm_world *world)
 {
@@ -145,6 +156,7 @@ static sadmm_status load(sadmm_world *world)
     TRY(sadmm_world_list_driven(world));
     TRY(sadmm_world_list_joints(world));
     TRY(sadmm_world_list_gears(world));
+    TRY(list_held(world));
     struct sadmm_collision_input input = sadmm_world_collision_input(world, 0);
     struct sadmm_resident_world whole = {
         .input = &input,
@@ -165,6 +177,7 @@ static sadmm_status load(sadmm_world *world)
         .gear_count = world->resident.gear_count,
         .gears = world->resident.gears,
         .gear_force = world->resident.gear_force,
+        .held = world->resident.held,
         .time = world->report.time,
     };
     TRY(world->kernels->resident->load(world->context, &whole, &world->def.settings, &world->error));
@@ -244,12 +257,32 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     if (steps <= 0) return;
     world->resident.done = done->done;
     world->resident.bodies_behind = world->resident.contacts_behind = true;
-    world->start.hit_count = world->start.hit_first = 0; /* it takes none by themselves */
+    world->start.hit_count = world->start.hit_first = 0;
+    world->resident.hits_behind = true;
     world->resident.joints_behind = world->resident.joint_count > 0;
     world->stepped = world->contacts_readable = true;
     world->plan = done->plan;
     world->step_settings = done->settings;
     sadmm_world_report_steps(world, steps, done);
+}
+
+/* Hits of the last step, for who reads contacts, or events. */
+static sadmm_status pull_hits(sadmm_world *world)
+{
+    const struct sadmm_resident_kernels *backend = world->kernels->resident;
+    struct sadmm_step_start *start = &world->start;
+    size_t count, first;
+    if (!world->resident.hits_behind) return SADMM_OK;
+    for (;;) {
+        TRY(backend->read_hits(world->context, start->hits, start->hit_capacity, &count, &first, &world->error));
+        if (count <= start->hit_capacity) break;
+        if (!sadmm_grow(&start->hits, &start->hit_capacity, 0, count, sizeof *start->hits))
+            return sadmm_fail_memory(&world->error, "hits");
+    }
+    start->hit_count = count;
+    start->hit_first = first;
+    world->resident.hits_behind = false;
+    return SADMM_OK;
 }
 
 /* `status`: of the call before, or SADMM_OK. The error of a step that failed is returned once. */
@@ -263,6 +296,7 @@ static sadmm_status settle(sadmm_world *world, sadmm_status status)
     if (waited == SADMM_OK) world->error = before;
     else status = waited;
     take_report(world, &report);
+    if (status == SADMM_OK) status = pull_hits(world);
     if (status != SADMM_OK) {
         /* The step that failed may have written over what the last one started from: only a copy on the host is
          * left. */

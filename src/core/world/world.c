@@ -88,7 +88,7 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->velocity, world->wrench, world->steady, world->wrench_sum, world->slot_of,
                       world->resident.steady, world->resident.driven, world->resident.driven_wrench,
                       world->resident.gears, world->resident.gear_force, world->resident.tables,
-                      world->resident.edited, world->resident.edits,
+                      world->resident.edited, world->resident.edits, world->resident.held,
                       world->resident.joints, world->resident.memory, world->resident.joint_slots,
                       world->resident.solution, world->resident.edited_joints,
                       world->resident.coupling_memory, world->query.prelude, world->query.hits,

@@ -127,18 +127,6 @@ struct sadmm_world_gear {
     int64_t set_at;
 };
 
-/* A point of a hit that a step has taken at its moment (hits.c). */
-struct sadmm_world_hit {
-    int32_t shape_a, shape_b; /* slots */
-    uint32_t child, feature;
-    double position[3], normal[3]; /* m; unit, from a to b; world */
-    double impulse[3];             /* on b, N s */
-    double arm[2][3];              /* from the centres of mass of a's and b's bodies, m */
-    int32_t dynamic[2], driven[2]; /* their numbers in the step, -1: none */
-    double speed;                  /* of approach, m/s */
-    double friction;
-};
-
 struct sadmm_hits;
 
 /* K of a body's joints in its frame (model/stiffening.h); what they add to its inertia, kg m^2, world; its own stiffness. */
@@ -277,7 +265,10 @@ struct sadmm_world {
         double *driven_wrench;       /* (x 6) likewise */
         uint32_t *edited;    /* slots of bodies with `edits`; capacity: all that move */
         struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
-        size_t steady_capacity, driven_capacity, driven_wrench_capacity, edited_count, edited_capacity, edit_capacity;
+        unsigned char *held; /* by body slot: joints hold it (hits.c) */
+        bool hits_behind;    /* those of the last step are not here yet */
+        size_t held_capacity, steady_capacity, driven_capacity, driven_wrench_capacity, edited_count, edited_capacity,
+            edit_capacity;
         struct sadmm_resident_joint *joints; /* as they were loaded; */
         struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
         int32_t *joint_slots;                /* their slots */
@@ -381,6 +372,8 @@ sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
 /* Hits of bodies in flight in the sub-step at hand, each at its moment: `start` and the bodies as collision sees them
  * become what they are after them. */
 sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep);
+/* Dynamic bodies, by slot, that joints hold. */
+void sadmm_world_mark_held(const sadmm_world *world, unsigned char *bodies, unsigned char mark);
 /* Pairs that were followed to the end of the sub-step touch no more in it: planes laid through their contacts may say
  * that they do, where surfaces are round or turn. Their gaps are what the bodies close by themselves, at least, so that
  * such contacts act only on what others push together. After contacts are found. */

@@ -1,0 +1,263 @@
+/* flight_touch.h for whoever computes it: on the host (flight_touch.c) and on devices. Manifolds of smooth bodies as the
+ * includer has them (pair_manifold.h). */
+#ifndef SADMM_COLLISION_FLIGHT_TOUCH_MATH_H
+#define SADMM_COLLISION_FLIGHT_TOUCH_MATH_H
+
+#include <string.h>
+
+#include "core/math/array3.h"
+#include "core/math/rigid.h"
+#include "flight_touch.h"
+#include "pair_manifold.h"
+
+/* Most moves towards a touch; a pair that takes more is the solve's. */
+enum { TOUCH_MOVES = 128 };
+/* Nearer than this share of the thinner shape, points are followed. */
+#define TOUCH_NEAR        1e-3
+/* Points within this share of it touch together: what a rounded pose takes for a plane is one. */
+#define TOUCH_TOGETHER    1e-9
+/* A separation of this share is none. */
+#define TOUCH_NONE        1e-12
+/* Where nothing near approaches fast enough, this share of the time is passed at once: a point that has come through by
+ * then is followed back. */
+#define TOUCH_PASSED      0.5
+/* But no more than closes this share of the thinner shape, or it would come out on the other side. */
+#define TOUCH_PASSED_WAY  0.25
+/* Nor more than the two turn by so much in, rad: what turns may come through and go again. */
+#define TOUCH_PASSED_TURN 0.25
+
+/* Where moments differ. */
+SADMM_INLINE struct rigid_spin flight_tumbled(const struct sadmm_flight *flight, double t)
+{
+    const struct rigid_spin spin = {q_load(flight->orientation), v3_load(flight->spin)};
+    return t == flight->at ? spin : rigid_tumble(spin, v3_load(flight->inertia), t - flight->at);
+}
+
+SADMM_CALLED void flight_at(const struct sadmm_flight *flight, double t, struct sadmm_flight_pose *pose)
+{
+    const quat q = q_load(flight->orientation);
+    const vec3 turn = v3_load(flight->turn);
+    for (int k = 0; k < 3; ++k) {
+        pose->position[k] = flight->position[k] + t * (flight->velocity[k] + t / 2 * flight->acceleration[k]);
+        pose->velocity[k] = flight->velocity[k] + t * flight->acceleration[k];
+    }
+    if (flight->inertia[0] > 0) {
+        const struct rigid_spin spin = flight_tumbled(flight, t);
+        q_store(spin.orientation, pose->orientation);
+        v3_store(spin.angular, pose->spin);
+        return;
+    }
+    q_store(t == flight->at || v3_max_abs(turn) == 0 ? q : rigid_turn(q, turn, t - flight->at), pose->orientation);
+    memcpy(pose->spin, flight->spin, sizeof pose->spin);
+}
+
+/* A shape at a moment. */
+struct placed_shape {
+    struct sadmm_flight_pose body;
+    double R[9], x[3];
+    double reach; /* farthest that a rotation of the body moves a point of the shape by, m / rad */
+};
+
+SADMM_INLINE void touch_place(const struct sadmm_flying_shape *s, double t, struct placed_shape *out)
+{
+    flight_at(s->flight, t, &out->body);
+    const quat body = q_load(out->body.orientation);
+    const mat3 R = q_matrix(q_normalize(q_mul(body, q_load(s->shape->orientation))));
+    const vec3 arm = m3_mul(q_matrix(body), v3_load(s->shape->position));
+    for (int i = 0; i < 3; ++i) v3_store(R.r[i], out->R + 3 * i);
+    v3_store(v3_add(v3_load(out->body.position), arm), out->x);
+    /* a ball that turns about its centre stays what it is */
+    out->reach = v3_norm(arm) + (s->geometry->type == SADMM_SHAPE_SPHERE ? 0 : geometry_radius(s->geometry));
+}
+
+/* The pair at a moment. */
+struct touch_moment {
+    struct placed_shape a, b;
+    struct pair_pose pose;
+    double distance;   /* no less than this are they apart */
+    double normal[3];  /* of the distance, world, from a to b */
+    struct manifold m; /* where they are near */
+    double manifold_normal[3];
+};
+
+SADMM_CALLED void touch_look(const struct sadmm_flying_pair *p, double t, struct touch_moment *at)
+{
+    vec3 n;
+    touch_place(&p->a, t, &at->a);
+    touch_place(&p->b, t, &at->b);
+    at->pose = pair_pose(p->a.geometry->type == SADMM_SHAPE_PLANE, at->a.R, at->a.x, at->b.R, at->b.x);
+    at->distance = (double)shapes_apart(p->a.geometry, p->b.geometry, p->hulls, p->child, &at->pose, &n);
+    rotate_to_world(at->b.R, n, at->normal);
+}
+
+/* By the points that come near. */
+SADMM_CALLED void touch_look_closely(const struct sadmm_flying_pair *p, struct touch_moment *at)
+{
+    at->m.count = 0;
+    at->m.cache = 0;
+    pair_manifold(p->a.geometry, p->b.geometry, p->hulls, p->child, &at->pose, SADMM_REAL_MAX, 0, &at->m);
+    rotate_to_world(at->b.R, at->m.normal, at->manifold_normal);
+    if (at->m.count > 0) memcpy(at->normal, at->manifold_normal, sizeof at->normal);
+}
+
+/* Of the manifold's k-th point, in the world. */
+SADMM_INLINE void touch_point_at(const struct touch_moment *at, int k, double x[3])
+{
+    rotate_to_world(at->b.R, at->m.points[k].position, x);
+    for (int j = 0; j < 3; ++j) x[j] += at->b.x[j];
+}
+
+SADMM_INLINE vec3 touch_velocity_at(const struct placed_shape *s, const double x[3])
+{
+    const vec3 arm = v3_sub(v3_load(x), v3_load(s->body.position));
+    return v3_add(v3_load(s->body.velocity), v3_cross(v3_load(s->body.spin), arm));
+}
+
+/* How fast the surfaces approach at a point. */
+SADMM_INLINE double touch_approach(const struct touch_moment *at, int k)
+{
+    double x[3];
+    touch_point_at(at, k, x);
+    const vec3 relative = v3_sub(touch_velocity_at(&at->b, x), touch_velocity_at(&at->a, x));
+    return -v3_dot(relative, v3_load(at->manifold_normal));
+}
+
+/* How fast turning may bring what is nearest along the normal, m/s. */
+SADMM_INLINE double touch_turning(const struct placed_shape *s, const struct sadmm_flight *flight, vec3 normal)
+{
+    return s->reach * (v3_norm(v3_cross(normal, v3_load(flight->turn))) + flight->sway);
+}
+
+/* The most that the pair closes along the normal until `to`, m/s. */
+SADMM_INLINE double touch_closing(const struct sadmm_flying_pair *p, const struct touch_moment *at, double left)
+{
+    const vec3 n = v3_load(at->normal), v = v3_sub(v3_load(at->b.body.velocity), v3_load(at->a.body.velocity)),
+               acceleration = v3_sub(v3_load(p->b.flight->acceleration), v3_load(p->a.flight->acceleration));
+    const double falls = -v3_dot(n, acceleration);
+    return -v3_dot(n, v) + (falls > 0 ? falls * left : 0) + touch_turning(&at->a, p->a.flight, n) +
+           touch_turning(&at->b, p->b.flight, n);
+}
+
+SADMM_INLINE double touch_thinner(const struct sadmm_flying_pair *p)
+{
+    return smaller_of(geometry_thickness(p->a.geometry), geometry_thickness(p->b.geometry));
+}
+
+/* Among points that approach fast enough the one that gets there first: by when, s; HUGE_VAL: there is none. */
+SADMM_INLINE double touch_first_point(const struct sadmm_flying_pair *p, const struct touch_moment *at,
+                                      double *separation)
+{
+    double first = HUGE_VAL;
+    for (int k = 0; k < at->m.count; ++k) {
+        const double speed = touch_approach(at, k), own = (double)at->m.points[k].separation;
+        if (!(speed > p->threshold) || !(own / speed < first)) continue;
+        first = own / speed;
+        *separation = own;
+    }
+    return first;
+}
+
+SADMM_INLINE void touch_keep(const struct touch_moment *at, double t, double together, struct sadmm_flight_touch *touch)
+{
+    touch->time = t;
+    touch->count = 0;
+    memcpy(touch->normal, at->manifold_normal, sizeof touch->normal);
+    for (int k = 0; k < at->m.count; ++k) {
+        if ((double)at->m.points[k].separation > together) continue;
+        touch_point_at(at, k, touch->point[touch->count]);
+        touch->feature[touch->count++] = at->m.points[k].feature;
+    }
+}
+
+/* How long the pair may go unseen where it is near, s. */
+SADMM_INLINE double touch_passed_at_once(const struct sadmm_flying_pair *p, double whole)
+{
+    const double rate = v3_norm(v3_load(p->a.flight->turn)) + p->a.flight->sway + v3_norm(v3_load(p->b.flight->turn)) +
+                        p->b.flight->sway;
+    return rate * TOUCH_PASSED * whole > TOUCH_PASSED_TURN ? TOUCH_PASSED_TURN / rate : TOUCH_PASSED * whole;
+}
+
+/* Do balls around the two, about their centres of mass, meet within the time? Accelerations bend ways by `sags` at most. */
+SADMM_INLINE bool touch_balls_meet(const struct sadmm_flying_pair *p, double from, double to)
+{
+    const struct sadmm_flight *a = p->a.flight, *b = p->b.flight;
+    const double left = to - from, reach = v3_norm(v3_load(p->a.shape->position)) + geometry_radius(p->a.geometry) +
+                                           v3_norm(v3_load(p->b.shape->position)) + geometry_radius(p->b.geometry);
+    double x[3], v[3], acceleration[3];
+    if (p->a.geometry->type == SADMM_SHAPE_PLANE) return true;
+    for (int k = 0; k < 3; ++k) {
+        acceleration[k] = b->acceleration[k] - a->acceleration[k];
+        v[k] = b->velocity[k] - a->velocity[k] + from * acceleration[k];
+        x[k] = b->position[k] - a->position[k] + from * (b->velocity[k] - a->velocity[k] + from / 2 * acceleration[k]);
+    }
+    const double along = -dot3(x, v), square = dot3(v, v),
+                 s = along <= 0              ? 0
+                     : along < left * square ? along / square
+                                             : left,
+                 sags = left * left / 2 * length3(acceleration);
+    for (int k = 0; k < 3; ++k) x[k] += s * v[k];
+    return length3(x) <= (1 + TOUCH_NEAR) * (reach + sags);
+}
+
+/* Of one child. */
+SADMM_RARE bool flying_touch_of(struct sadmm_flying_pair *p, double from, double to, struct sadmm_flight_touch *touch)
+{
+    const double thin = touch_thinner(p), passed = touch_passed_at_once(p, to - from);
+    struct touch_moment at;
+    double t = from;
+    if (!touch_balls_meet(p, from, to)) return false;
+    for (int move = 0; move < TOUCH_MOVES; ++move) {
+        double separation = 0, next, most;
+        touch_look(p, t, &at);
+        most = touch_closing(p, &at, to - t);
+        if (at.distance > TOUCH_NEAR * thin) {
+            if (!(most > p->threshold)) return false;
+            t += at.distance / most;
+            if (!(t <= to)) return false;
+            continue;
+        }
+        touch_look_closely(p, &at);
+        most = touch_closing(p, &at, to - t); /* what touches has no distance to have a normal of */
+        next = touch_first_point(p, &at, &separation);
+        if (next < HUGE_VAL &&
+            (fabs(separation) <= TOUCH_NONE * thin || (separation < 0 && t <= from) || (next != 0 && t + next == t))) {
+            touch_keep(&at, t, fabs(separation) + TOUCH_TOGETHER * thin, touch);
+            return true;
+        }
+        if (next < HUGE_VAL && t + next <= to) {
+            t = larger_of(t + next, from);
+            continue;
+        }
+        /* what is near parts, or is slow: on to where another point may touch */
+        if (!(t < to) || !(most > p->threshold)) return false;
+        t = smaller_of(t + larger_of(at.distance / most, smaller_of(passed, TOUCH_PASSED_WAY * thin / most)), to);
+    }
+    p->lost = true;
+    return false;
+}
+
+/* The earlier of the two. */
+SADMM_INLINE bool touch_is_earlier(struct sadmm_flying_pair *pair, double from, double to, bool found,
+                                  const struct sadmm_flight_touch *best, struct sadmm_flight_touch *touch)
+{
+    return flying_touch_of(pair, from, found ? best->time : to, touch) && (!found || touch->time < best->time);
+}
+
+SADMM_INLINE bool flying_touch(struct sadmm_flying_pair *pair, double from, double to,
+                                     struct sadmm_flight_touch *touch)
+{
+    const uint32_t children = pair_children(pair->a.geometry, pair->b.geometry);
+    struct sadmm_flight_touch own;
+    uint32_t first = 0;
+    bool found = false;
+    for (pair->child = 0; pair->child < children; ++pair->child) {
+        if (!touch_is_earlier(pair, from, to, found, touch, &own)) continue;
+        *touch = own;
+        first = pair->child;
+        found = true;
+    }
+    pair->child = first;
+    return found;
+}
+
+#endif
