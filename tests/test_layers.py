@@ -19,7 +19,8 @@ CUDA = ["backend_cuda/" + name for name in
         ("device", "collide", "graph", "assemble", "weight", "iterate", "step", "table")]
 MAY_USE = {folder: CORE[:place] for place, folder in enumerate(CORE)}
 MAY_USE.update({
-    "core/world": CORE + ["collision"],
+    "core/flight": CORE + ["collision"],
+    "core/world": CORE + ["collision", "core/flight"],
     "collision": ["core/base", "core/math"],
     "mesh_file": ["core/base"],
     "backend_ref": CORE,
@@ -29,7 +30,7 @@ MAY_USE.update({
     "fclib": ["core/base", "core/model"],
     "cli": ["core/base", "scene_file", "scenes", "fclib"],
 })
-MAY_USE.update({folder: CORE + ["collision"] + CUDA[:place] for place, folder in enumerate(CUDA)})
+MAY_USE.update({folder: CORE + ["collision", "core/flight"] + CUDA[:place] for place, folder in enumerate(CUDA)})
 # The list of backends: the one place that names them (each through its find function).
 BACKEND_LIST = "core/solve/registry.c"
 

@@ -13,7 +13,7 @@
  * in any order. Bodies of two
  * environments never meet: each environment is a group, whose hits a block takes by itself, unless a body that moves is in
  * none of them; then all are one group. What a group may take is limited, by the world and the group alone: beyond that
- * its bodies are left to the solve, for the (sub-)step. Formulas are the host's: core/world/flyer.h, collision/
+ * its bodies are left to the solve, for the (sub-)step. Formulas are the host's: core/flight/flyer.h, collision/
  * flight_touch_math.h, core/math/hit.h. */
 #ifndef SADMM_CUDA_COLLIDE_HITS_H
 #define SADMM_CUDA_COLLIDE_HITS_H
@@ -23,7 +23,7 @@
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
-#include "core/world/flyer.h"
+#include "core/flight/flyer.h"
 #pragma GCC diagnostic pop
 
 enum {

@@ -24,7 +24,7 @@ const struct sadmm_setting *sadmm_settings_list(void) { return list; }
 
 sadmm_settings sadmm_settings_default(void)
 {
-    static const sadmm_settings s = {SADMM_SETTINGS(ROW_DEFAULT, )}; /* padding is 0 */
+    const sadmm_settings s = {SADMM_SETTINGS(ROW_DEFAULT, )};
     return s;
 }
 

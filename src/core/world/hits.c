@@ -20,7 +20,7 @@
 #include "collision/broad_phase.h"
 #include "collision/flyers.h"
 #include "core/base/memory.h"
-#include "flyer.h"
+#include "core/flight/flyer.h"
 #include "world_internal.h"
 
 /* A hit that is foreseen. */

@@ -1,7 +1,7 @@
 /* A body in flight: the way it goes within a (sub-)step, what a hit makes of that, and the start from which it would be
  * where it is (hits.c says why). For the host and devices; in double. */
-#ifndef SADMM_CORE_WORLD_FLYER_H
-#define SADMM_CORE_WORLD_FLYER_H
+#ifndef SADMM_CORE_FLIGHT_FLYER_H
+#define SADMM_CORE_FLIGHT_FLYER_H
 
 #include <float.h>
 #include <math.h>
