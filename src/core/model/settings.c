@@ -1,7 +1,6 @@
 #include "settings.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #define ROW_DEFAULT(X, kind, role, name, value, ...) .name = value,
@@ -20,8 +19,6 @@ _Static_assert(sizeof((sadmm_settings){SADMM_SETTINGS(ROW_MEMBER, )}) == sizeof(
 
 static const struct sadmm_setting list[SADMM_SETTING_COUNT] = {SADMM_SETTINGS(SADMM_SETTING_ROW, )};
 
-const struct sadmm_setting *sadmm_settings_list(void) { return list; }
-
 sadmm_settings sadmm_settings_default(void)
 {
     const sadmm_settings s = {SADMM_SETTINGS(ROW_DEFAULT, )};
@@ -30,32 +27,28 @@ sadmm_settings sadmm_settings_default(void)
 
 /* ---- ranges ------------------------------------------------------------------------------------------------------ */
 
-static sadmm_status refuse(struct sadmm_error *error, const struct sadmm_setting *of, double x, const char *range)
-{
-    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %.10g: must be %s", of->name, x,
-                      range);
-}
-
 /* Comparisons are written so that NaN fails them. */
-static sadmm_status check(const struct sadmm_setting *of, double x, struct sadmm_error *error)
+static bool in_range(const struct sadmm_setting *of, double x)
 {
-    char range[64];
     switch (of->ends) {
-    case SADMM_SETTING_CLOSED:
-        snprintf(range, sizeof range, "in [%.10g, %.10g]", of->lo, of->hi);
-        return x >= of->lo && x <= of->hi ? SADMM_OK : refuse(error, of, x, range);
-    case SADMM_SETTING_BELOW:
-        snprintf(range, sizeof range, "in [%.10g, %.10g)", of->lo, of->hi);
-        return x >= of->lo && x < of->hi ? SADMM_OK : refuse(error, of, x, range);
-    case SADMM_SETTING_FROM:
-        snprintf(range, sizeof range, "finite and >= %.10g", of->lo);
-        return x >= of->lo && x < INFINITY ? SADMM_OK : refuse(error, of, x, range);
-    case SADMM_SETTING_ABOVE:
-        snprintf(range, sizeof range, "finite and > %.10g", of->lo);
-        return x > of->lo && x < INFINITY ? SADMM_OK : refuse(error, of, x, range);
+    case SADMM_SETTING_CLOSED: return x >= of->lo && x <= of->hi;
+    case SADMM_SETTING_BELOW: return x >= of->lo && x < of->hi;
+    case SADMM_SETTING_FROM: return x >= of->lo && x < INFINITY;
+    case SADMM_SETTING_ABOVE: return x > of->lo && x < INFINITY;
     case SADMM_SETTING_ANY: break;
     }
-    return SADMM_OK;
+    return true;
+}
+
+static sadmm_status check(const struct sadmm_setting *of, double x, struct sadmm_error *error)
+{
+    const bool to_hi = of->ends == SADMM_SETTING_CLOSED || of->ends == SADMM_SETTING_BELOW;
+    if (in_range(of, x)) return SADMM_OK;
+    if (to_hi)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %.10g: must be in [%.10g, %.10g%c", of->name,
+                          x, of->lo, of->hi, of->ends == SADMM_SETTING_BELOW ? ')' : ']');
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %.10g: must be finite and %s %.10g", of->name, x,
+                      of->ends == SADMM_SETTING_ABOVE ? ">" : ">=", of->lo);
 }
 
 _Static_assert((int)SADMM_MOST_SUBSTEPS == 64 && (int)SADMM_MOST_DIRECT_POINTS == 128 && (int)SADMM_MOST_HITS == 64,

@@ -22,9 +22,6 @@ sadmm_settings sadmm_settings_of_substep(const struct sadmm_settings *whole);
 /* Are all members the same, bit for bit? Padding between them does not count. */
 bool sadmm_settings_equal(const struct sadmm_settings *a, const struct sadmm_settings *b);
 
-/* The list of all settings, in the struct's order; SADMM_SETTING_COUNT of them. Static storage. */
-const struct sadmm_setting *sadmm_settings_list(void);
-
 /* Settings are of two kinds (core/base/settings_fields.h). Numbers are what formulas read: they may change from step to
  * step, and a backend keeps them as data. The rest says what a step consists of: how many iterations in which order, what
  * is checked, measured, kept. */

@@ -246,13 +246,14 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
     return SADMM_OK;
 }
 
-bool sadmm_joined_find_left(const struct sadmm_joined *joined, const struct sadmm_row_constraint *slots, double *left)
+bool sadmm_joined_has_loops(const struct sadmm_joined *joined) { return joined->loops; }
+
+void sadmm_joined_find_left(const struct sadmm_joined *joined, const struct sadmm_row_constraint *slots, double *left)
 {
-    for (int32_t k = 0; joined->loops && k < joined->order.parts; ++k) {
+    for (int32_t k = 0; k < joined->order.parts; ++k) {
         const struct joined_view *v = &joined->parts[k].view;
         if (joined->parts[k].loop) EACH_JOINED_ROW(slots, v, r, from) left[from] = joined_left(v, r);
     }
-    return joined->loops;
 }
 
 void sadmm_joined_mark_parts(const struct sadmm_joined *joined, uint8_t *bodies)

@@ -50,9 +50,11 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
                                 const struct sadmm_settings *settings, const uint8_t *stiffened, bool after,
                                 struct sadmm_error *error);
 
-/* joined_left (core/model/joined.h) of rows of parts with loops, as they were solved last; of others `left` stays what it
- * is. Is there any such part? slots: as above. */
-bool sadmm_joined_find_left(const struct sadmm_joined *joined, const struct sadmm_row_constraint *slots, double *left);
+/* Has any part a loop (core/model/joined.h)? */
+bool sadmm_joined_has_loops(const struct sadmm_joined *joined);
+
+/* joined_left of rows of parts with loops, as they were solved last; of others `left` stays what it is. slots: as above. */
+void sadmm_joined_find_left(const struct sadmm_joined *joined, const struct sadmm_row_constraint *slots, double *left);
 
 /* Marks all bodies (of the system) of parts that have a marked one. */
 void sadmm_joined_mark_parts(const struct sadmm_joined *joined, uint8_t *bodies);

@@ -120,15 +120,17 @@ static void mark_islands(const sadmm_world *world, const uint8_t *bodies)
 /* Which bodies are of parts that fold; what is left of rows is kept for the next step. Are there any? */
 static sadmm_status find_folding(sadmm_world *world, bool *any)
 {
-    const size_t n = (size_t)world->dynamic_count, rows = world->joint_rows;
+    const size_t n = (size_t)world->dynamic_count, rows = world->start.rows.row_count;
     *any = false;
-    if (!sadmm_grow_empty(&world->folding, &world->folding_capacity, n, sizeof *world->folding) ||
-        !sadmm_grow_empty(&world->row_left, &world->row_left_capacity, world->start.rows.row_count, sizeof *world->row_left))
+    if (!sadmm_grow_empty(&world->folding, &world->folding_capacity, n, sizeof *world->folding))
         return sadmm_fail_memory(&world->error, "joints that fold");
     memset(world->folding, 0, n);
-    memset(world->row_left, 0, world->start.rows.row_count * sizeof *world->row_left);
-    if (!sadmm_joined_find_left(world->joined, world->joint_constraints, world->row_left)) return SADMM_OK;
-    for (size_t r = 0; r < rows; ++r) {
+    if (!sadmm_joined_has_loops(world->joined)) return SADMM_OK;
+    if (!sadmm_grow_empty(&world->row_left, &world->row_left_capacity, rows, sizeof *world->row_left))
+        return sadmm_fail_memory(&world->error, "joints that fold");
+    memset(world->row_left, 0, rows * sizeof *world->row_left);
+    sadmm_joined_find_left(world->joined, world->joint_constraints, world->row_left);
+    for (size_t r = 0; r < world->joint_rows; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
         struct sadmm_world_joint *joint = &world->joints[source->joint];
         double *was = &joint->next.left[source->coordinate];
