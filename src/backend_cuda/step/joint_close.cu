@@ -13,8 +13,15 @@
 /* What a part's threads tell each other. */
 struct close_shared {
     unsigned long long most;
-    int32_t bits, flag; /* of its island, but what this kernel says of it; */
+    int32_t flag;
 };
+
+/* Bits of a body's island: a part with joints that are not enabled may be of several. What other parts of the same island
+ * add to them here is not asked for. */
+static __device__ __forceinline__ int32_t bits_of(const cuda_view &v, int32_t body)
+{
+    return v.joints.touch[joined_label(v, body)];
+}
 
 /* Joint j as its bodies' places have it; is it to be closed? folds: it is of a part that does. */
 static __device__ __noinline__ bool closing_of(const cuda_view &v, int32_t j, bool folds, struct joint_closing *out)
@@ -22,18 +29,19 @@ static __device__ __noinline__ bool closing_of(const cuda_view &v, int32_t j, bo
     const struct sadmm_resident_joint *joint = &v.joints.joints[j];
     const struct sadmm_settings settings = *v.model.settings;
     struct joint_end start[2], end[2];
-    bool moves[2];
+    bool moves[2], may_open = folds;
     double scale = 0;
     for (int s = 0; s < 2; ++s) {
         const struct joint_body body = body_of(v, joint->body[s]);
         moves[s] = body.system_body >= 0;
+        may_open = may_open || (moves[s] && joint_island_may_open(bits_of(v, body.system_body)));
         start[s] = joint_end_on(&joint->frame[s], body.rigid);
         end[s] = joint_end_after(v, j, s, moves[s] ? v.joints.closed[body.system_body].place : nullptr);
         scale += joint_closing_scale(&end[s], moves[s] ? body.rigid : nullptr);
     }
     *out = joint_closing_of(&joint->def, start, end, scale, &settings);
     if (folds) return out->share > JOINT_CLOSE_FOLDING;
-    return !joint_opens_little(&joint->def, end, moves, joint_opening(&joint->def, end)) &&
+    return may_open && !joint_opens_little(&joint->def, end, moves, joint_opening(&joint->def, end)) &&
            out->share > JOINT_CLOSE_FROM;
 }
 
@@ -105,7 +113,7 @@ static __device__ __forceinline__ bool close_part(const cuda_view &v, const join
 {
     bool any = false;
     each(p.s.bodies, [&](int32_t e) {
-        joint_place(v, p.s.body[e], shared->bits, v.joints.closed[p.s.body[e]].place);
+        joint_place(v, p.s.body[e], bits_of(v, p.s.body[e]), v.joints.closed[p.s.body[e]].place);
         add_energy(v, p.s.body[e], false);
     });
     __syncthreads();
@@ -130,18 +138,24 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     struct close_shared *shared = (struct close_shared *)memory;
     wait_for_stream();
     let_next_begin();
-    const int32_t label = joined_label(v, v.joints.parts[blockIdx.x].label - 1);
-    if (threadIdx.x == 0) shared->bits = v.model.live->abort_code ? 0 : v.joints.touch[label];
+    if (v.model.live->abort_code) return;
+    const struct cuda_joined_part part = v.joints.parts[blockIdx.x];
+    const bool folds = v.joints.folds[blockIdx.x];
+    if (threadIdx.x == 0) shared->flag = folds;
     __syncthreads();
-    /* Another part of the island may have said already that it is closed: of one that may be opened alone. */
-    const bool folds = !v.model.live->abort_code && v.joints.folds[blockIdx.x];
-    if (!folds && !joint_island_may_open(shared->bits)) return;
+    each(part.body_count, [&](int32_t k) {
+        if (joint_island_may_open(bits_of(v, v.joints.members[part.first_body + k]))) shared->flag = 1;
+    });
+    __syncthreads();
+    const bool looks = shared->flag;
+    __syncthreads();
+    if (!looks) return;
     const joined_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
     if (!close_part(v, p, folds, shared) && !folds) return;
     each(p.s.bodies, [&](int32_t e) { add_energy(v, p.s.body[e], true); });
     __syncthreads();
     if (folds) turn_speeds(v, p, shared);
-    if (threadIdx.x == 0) atomicOr(&v.joints.touch[label], ISLAND_CLOSED);
+    each(p.s.bodies, [&](int32_t e) { atomicOr(&v.joints.touch[joined_label(v, p.s.body[e])], ISLAND_CLOSED); });
 }
 
 sadmm_status CUDA(launch_joint_close)(struct sadmm_context *c, struct sadmm_error *error)

@@ -254,6 +254,7 @@ sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *
         if (!any && !folding) begin_costs(world, settings);
         any = true;
         if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
+        sadmm_joined_mark_parts(world->joined, world->opened);
         mark_islands(world, world->opened);
         TRY(sadmm_joined_close(world->joined, &system, world->closing_slots, world->joint_constraint_count, settings,
                                world->opened, false, world->next, &world->error));
