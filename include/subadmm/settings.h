@@ -113,7 +113,8 @@ typedef struct sadmm_settings {
 
     double baumgarte;            /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2. Bodies
                                     are moved by it and get no velocity that stays (docs/algorithm.md, section 6), but
-                                    on CUDA and in islands with joints */
+                                    in islands with joints, and on CUDA in worlds of more than 8,192 dynamic bodies or
+                                    with kinematic ones */
     double slop;                 /* penetration left alone, m, in [0, 1]; default 1e-5 */
     double correction_speed;     /* cap of the corrective speed of contacts along their normals, m/s, and of joints
                                     along each coordinate, m/s or rad/s; in [0, 1e3]; default 1 */

@@ -244,7 +244,7 @@ SADMM_INLINE bool touch_is_earlier(struct sadmm_flying_pair *pair, double from, 
 }
 
 SADMM_INLINE bool flying_touch(struct sadmm_flying_pair *pair, double from, double to,
-                                     struct sadmm_flight_touch *touch)
+                               struct sadmm_flight_touch *touch)
 {
     const uint32_t children = pair_children(pair->a.geometry, pair->b.geometry);
     struct sadmm_flight_touch own;
