@@ -273,7 +273,7 @@ static sadmm_body_id add_roller(sadmm_world *world, const sadmm_hull *hull, doub
  *     omega+ = kappa omega-,     kappa = (I + m r^2 cos(2 pi / n)) / (I + m r^2),
  *
  * so every edge takes 1 - kappa^2 of the energy that it has on a side: however many sides there are, a prism does not
- * roll as what is round. By how much of that its energy is off at most, between edges, after `edges` of them. */
+ * roll as what is round. By how much of that its energy is off at most, between edges, over `edges` of them. */
 static double rolled_off(int sides, int edges, double dt)
 {
     const double r = 0.5, half = 0.25, mass = 1, g = 9.81, spin = 3.9; /* no edge leaves the ground: r spin^2 < g */
@@ -325,12 +325,12 @@ static double rolled_off(int sides, int edges, double dt)
     return off;
 }
 
-/* Of first order: an edge lands within a step. */
+/* Of first order: an edge lands within a step. With 12 sides it is off by 0.012 and 0.007, the others are by less. */
 START_TEST(prisms_roll_over_their_edges)
 {
     static const struct {
         int sides, edges;
-    } prisms[] = {{6, 2}, {12, 12}, {24, 24}}; /* 0.71, 0.89, 0.66 of the energy are gone then */
+    } prisms[] = {{6, 2}, {12, 12}, {24, 24}}; /* 0.58, 0.88, 0.65 of the energy are gone then */
     for (int k = 0; k < 3; ++k) {
         ck_assert_double_lt(rolled_off(prisms[k].sides, prisms[k].edges, 0.001), 0.02);
         ck_assert_double_lt(rolled_off(prisms[k].sides, prisms[k].edges, 0.0005), 0.01);

@@ -230,9 +230,13 @@ START_TEST(folding_windows_keep_their_energy)
     struct sadmm_scene scene;
     sadmm_world *world = open_world(_i ? "four_bar:10" : "four_bar:5", 0, 60, &scene);
     const double before = energy_of(world);
-    step_world(world, 2000); /* 10 s */
+    double drift = 0;
+    for (int step = 0; step < 2000; ++step) { /* 10 s */
+        step_world(world, 1);
+        drift = fmax(drift, world_report(world).joint_drift);
+    }
     ck_assert_double_eq_tol(energy_of(world) / before, 1, 0.01);
-    ck_assert_double_lt(world_report(world).joint_drift, 1e-4); /* m: of rods of 1 m */
+    ck_assert_double_lt(drift, 1e-4); /* m; it is 2.3e-5 at most, of third order in the step */
     sadmm_world_destroy(world);
 }
 END_TEST

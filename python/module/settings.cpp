@@ -40,6 +40,7 @@ void bind_settings(nb::module_ &m)
         set_members(self.h, values);
     });
     SADMM_SETTINGS(BIND, )
+#undef BIND
 
     using C = sadmm_certificate;
     nb::class_<C>(m, "Certificate", "True error of a step, computed in double from raw data.")

@@ -28,6 +28,9 @@ def missing(need):
     return next((name for name in need.split(", ") if importlib.util.find_spec(name) is None), None)
 
 
+assert list(blocks()), "no guide"
+
+
 @pytest.mark.parametrize("code", list(blocks()))
 def test_block(code, tmp_path, monkeypatch):
     needs = NEEDS.match(code)

@@ -249,7 +249,7 @@ static int run(int argc, char **argv)
     if ((code = cli_open_scene(spec, &scene)) != CLI_DONE) return code;
     if (o.method_given) sadmm_scene_set_method(&scene, o.method);
     if (o.iterations > 0) scene.def.settings.iterations = (int)o.iterations;
-    scene.def.settings.hits = 0; /* CUDA has none, and what is compared is solved */
+    scene.def.settings.hits = 0; /* what is compared is the solve */
     interrupts_expect();
     cli_protect_scene(spec);
     code = cli_open_json(o.json, &json);

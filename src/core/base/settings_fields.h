@@ -20,7 +20,7 @@
 #define SADMM_SETTINGS(F, X)                                                                                            \
     F(X, REAL, NUMBER, dt, 0.005, 1e-6, 1, CLOSED, "Time step, s.")                                                     \
     F(X, WHOLE, PLAN, substeps, 1, 1, 64, CLOSED, "Sub-steps of a step, which share its iterations.")                   \
-    F(X, VECTOR, NUMBER, gravity, SADMM_THREE(0, 0, -9.81), -1e6, 1e6, ANY, "m/s^2, world frame.")                      \
+    F(X, VECTOR, NUMBER, gravity, SADMM_THREE(0, 0, -9.81), -1e6, 1e6, ANY, "m/s^2, world frame; norm <= 1e6.")                      \
     F(X, METHOD, PLAN, method, SADMM_METHOD_FAST, 0, 1, ANY, "'fast' or 'paper'.")                                      \
     F(X, WHOLE, PLAN, iterations, 20, 1, 1000000, CLOSED, "Iterations a step.")                                         \
     F(X, REAL, NUMBER, relaxation, 1.8, 1, 2, BELOW, "Over-relaxation of 'fast'.")                                      \
@@ -47,7 +47,7 @@
     F(X, REAL, NUMBER, restitution_threshold, 0.1, 0, 0, FROM,                                                          \
       "Approach speed under which restitution is ignored, m/s.")                                                        \
     F(X, WHOLE, PLAN, hits, 16, 0, 64, CLOSED,                                                                          \
-      "Hits a body in flight may have at their moments within a (sub-)step; 0: none, the solve has them all.")         \
+      "Hits of a body in flight that are taken at their moments, at most, a (sub-)step; 0: the solve has all.")         \
     F(X, WHOLE, PLAN, threads, 0, 0, 1024, CLOSED, "CPU threads at most; 0: no bound. Results do not depend on it.")
 
 /* ---- as a table -------------------------------------------------------------------------------------------------- */
