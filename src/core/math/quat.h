@@ -41,13 +41,43 @@ SADMM_INLINE mat3 q_matrix(quat q)
     m.r[2] = v3(2 * (xz - wy), 2 * (yz + wx), 1 - 2 * (xx + yy));
     return m;
 }
-/* exp of a rotation vector (world frame). Series below 1e-4 rad: its next term is under 1e-19. */
+/* cos x and sin x / x by y = x^2 <= QUAT_SERIES: their series, whose next terms are under 1e-17. By sums and products
+ * alone, so that hosts and devices give the same bits. */
+#define QUAT_SERIES 0.62
+SADMM_INLINE void q_series(double y, double *cosine, double *sine_over_x)
+{
+    *cosine = 1 - y * (1. / 2 - y * (1. / 24 - y * (1. / 720 - y * (1. / 40320 - y * (1. / 3628800 -
+              y * (1. / 479001600 - y * (1. / 87178291200 - y * (1. / 20922789888000))))))));
+    *sine_over_x = 1 - y * (1. / 6 - y * (1. / 120 - y * (1. / 5040 - y * (1. / 362880 - y * (1. / 39916800 -
+                   y * (1. / 6227020800 - y * (1. / 1307674368000 - y * (1. / 355687428096000))))))));
+}
+
+/* The same by any y: of x halved until the series does, doubled as often. */
+SADMM_RARE void q_long_series(double y, double *cosine, double *sine_over_x)
+{
+    const double x = sqrt(y);
+    double s;
+    int halved = 0, k;
+    for (; y > QUAT_SERIES && y <= DBL_MAX; y *= 0.25) ++halved;
+    q_series(y, cosine, sine_over_x);
+    s = *sine_over_x * sqrt(y);
+    for (k = 0; k < halved; ++k) { /* each time of norm 1, which rounding would take further from it */
+        const double c = *cosine * *cosine - s * s, twice = 2 * *cosine * s, norm = sqrt(c * c + twice * twice);
+        *cosine = c / norm, s = twice / norm;
+    }
+    *sine_over_x = s / x;
+}
+
+/* exp of a rotation vector (world frame). */
 SADMM_INLINE quat q_exp(vec3 w)
 {
-    double t2 = (double)v3_norm2(w), t = sqrt(t2), half = 0.5 * t;
-    double s = t < 1e-4 ? 0.5 - t2 / 48.0 : sin(half) / t;
+    const double y = 0.25 * (double)v3_norm2(w);
+    double c, s;
     quat q;
-    q.w = (real)cos(half); q.x = (real)s * w.x; q.y = (real)s * w.y; q.z = (real)s * w.z;
+    if (y <= QUAT_SERIES) q_series(y, &c, &s);
+    else q_long_series(y, &c, &s);
+    s *= 0.5;
+    q.w = (real)c; q.x = (real)s * w.x; q.y = (real)s * w.y; q.z = (real)s * w.z;
     return q;
 }
 

@@ -84,35 +84,8 @@ SADMM_INLINE real rigid_half_tangent(real y)
  *
  *     I m - I w + h/2 m x I m = 0,    c = h/2 ((I_z - I_y) / I_x, (I_x - I_z) / I_y, (I_y - I_x) / I_z)
  *
- * By Newton's method, from near it. rate: |c| |w|. */
-SADMM_RARE vec3 rigid_mean_spin_near(vec3 m, vec3 w, vec3 c, real rate)
-{
-    real error = 1;
-    int k;
-    for (k = 0; k < 8 && error > SADMM_EPSILON; ++k) {
-        const vec3 f = v3(m.x - w.x + c.x * (m.y * m.z), m.y - w.y + c.y * (m.z * m.x), m.z - w.z + c.z * (m.x * m.y));
-        vec3 d;
-        mat3 J;
-        J.r[0] = v3(1, c.x * m.z, c.x * m.y);
-        J.r[1] = v3(c.y * m.z, 1, c.y * m.x);
-        J.r[2] = v3(c.z * m.y, c.z * m.x, 1);
-        d = m3_solve(J, f);
-        m = v3_sub(m, d);
-        error = rate * v3_norm2(d) / v3_norm2(m);
-    }
-    return m;
-}
-
-/* The same by sweeps over the equations, two of which take the error down by rate^3. Beyond a rate of RIGID_SLOW Newton's
- * method is faster; not on a device, where divisions and what differs between threads are dear: a piece has a rate of 1/3
- * at most. */
-#ifdef __CUDA_ARCH__
-#define RIGID_SLOW ((real)0.5)
-#define RIGID_NEAR(m, w, c, rate) (m)
-#else
-#define RIGID_SLOW ((real)0.02)
-#define RIGID_NEAR rigid_mean_spin_near
-#endif
+ * By sweeps over the equations, two of which take the error down by (|c| |w|)^3: in a piece of a motion |c| |w| is 1/3 at
+ * most. */
 SADMM_INLINE vec3 rigid_mean_spin(vec3 w, vec3 c)
 {
     const real rate = v3_max_abs(c) * v3_max_abs(w), faster = rate * rate * rate;
@@ -126,8 +99,8 @@ SADMM_INLINE vec3 rigid_mean_spin(vec3 w, vec3 c)
             m.z = w.z - c.z * (m.x * m.y);
         }
         error *= faster;
-    } while (error > SADMM_EPSILON && rate < RIGID_SLOW);
-    return error > SADMM_EPSILON ? RIGID_NEAR(m, w, c, rate) : m;
+    } while (error > SADMM_EPSILON && rate < (real)0.5);
+    return m;
 }
 
 /* Of a body whose moments differ, in its own frame: where it is turned to, that as a matrix, how fast it turns. */
@@ -154,7 +127,7 @@ SADMM_INLINE real rigid_rate2(vec3 inertia, vec3 own)
     return rate2 / scale;
 }
 
-/* In how many pieces of half a radian at most, in which Newton's method closes in at once, a motion without torque goes.
+/* In how many pieces of half a radian at most, in which the mean spin is soon found, a motion without torque goes.
  * The way back goes in as many. */
 SADMM_INLINE real rigid_pieces(vec3 inertia, real energy2, real momentum2, real dt)
 {
