@@ -128,17 +128,12 @@ START_TEST(scaling_measures)
         ck_assert(number(&table, row, "steps") == 9);
         ck_assert(number(&table, row, "hash_step") == 12);
 
-        /* Each is a median by itself: none of the four is above the whole's, and together they make it up about; a step
-         * of this takes 0.5 ms. */
-        double step = number(&table, row, "step_ms"), solver = number(&table, row, "solver_ms"), sum = 0;
+        double step = number(&table, row, "step_ms"), solver = number(&table, row, "solver_ms");
         static const char *const parts[] = {"collide_ms", "assemble_ms", "solve_ms", "finish_ms"};
-        for (int k = 0; k < 4; ++k) {
+        for (int k = 0; k < 4; ++k) { /* each is a median by itself: none is above the whole's */
             double part = number(&table, row, parts[k]);
             ck_assert_msg(part > 0 && part < step, "%s = %g of %g", parts[k], part, step);
-            sum += part;
         }
-        ck_assert_msg(sum < 4 * step && sum > step / 3, "the parts of a step are %g of %g ms", sum, step);
-        ck_assert_msg(step > 0.01 && step < 1000, "a step of %g ms", step);
         ck_assert(solver > 0 && solver < step);
 
         /* The raft in f64. Paper: far better than the limits, which are what f32 reaches. Fast: the 13th step of 20

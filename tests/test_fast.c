@@ -268,30 +268,6 @@ static sadmm_settings warm_settings(int iterations, int threads)
     return s;
 }
 
-/* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the 60
- * iterations that are not few; less the faster the stack moves by itself, and no more than the stack's 3 kg. Of the
- * highest contacts it is 1/4 kg, and phi / w half as much, since both cubes give way. */
-START_TEST(under_iterated_weights_are_larger)
-{
-    static const struct {
-        int iterations;
-        double speed, factor; /* over V */
-    } cases[] = {{60, 0, 1}, {100, 0, 1}, {30, 0, 2}, {20, 0, 3}, {1, 0, 6}, {30, 0.5, 2}, {30, 0.8, 1.25}, {30, 2, 1}};
-    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
-        struct contact_problem *problem = deep_stack(3);
-        sadmm_settings settings = warm_settings(cases[k].iterations, 1);
-        struct runner r;
-        for (int i = 0; i < 3; ++i) problem->system.velocity[6 * i] = cases[k].speed * 9.81 * 0.005;
-        runner_start_settings(&r, literal(), &settings, problem);
-        ck_assert(r.plan.warm);
-        ck_assert_double_eq_tol(r.c->constraints[0].B[0], fmin(3.0 / 4 * cases[k].factor, 3) + 3.0 / 4, 1e-8);
-        ck_assert_double_eq_tol(r.c->constraints[8].B[0], 1.0 / 4 * cases[k].factor + 3.0 / 8, 1e-8);
-        runner_stop(&r);
-        contact_problem_free(problem);
-    }
-}
-END_TEST
-
 /* A problem is no step of a world, but may be solved in short batches: few iterations in one mean nothing. */
 START_TEST(few_iterations_of_a_problem_weigh_the_same)
 {
@@ -803,7 +779,6 @@ int main(void)
     tcase_add_test(weights, weight_is_the_mass_carried);
     tcase_add_test(weights, deep_stacks_are_stiff);
     tcase_add_loop_test(weights, deep_stacks_equal_ref, 0, 2 * table_count);
-    tcase_add_test(weights, under_iterated_weights_are_larger);
     tcase_add_test(weights, few_iterations_of_a_problem_weigh_the_same);
     tcase_add_test(weights, bounces_are_taken_back);
     tcase_add_test(weights, work_counts_by_its_share);

@@ -1,49 +1,10 @@
-/* Leads of bodies (core/math/lead.h): which are taken back, and what by. */
+/* Leads of bodies (core/math/lead.h): what they are at contact points. */
 #include <check.h>
 #include <math.h>
 
 #include "core/math/lead.h"
 #include "core/math/rigid.h"
 #include "run_suite.h"
-
-START_TEST(kinds)
-{
-    static const struct {
-        int island, body;
-        enum lead_kind kind;
-    } cases[] = {
-        {0, 0, LEAD_OWN}, /* in the air */
-        {TOUCH_FRICTION, TOUCH_CARRIED | TOUCH_MOVED, LEAD_OWN},
-        {TOUCH_FRICTION, TOUCH_CARRIED, LEAD_STAYS}, /* it rests */
-        {TOUCH_SMOOTH, TOUCH_CARRIED | TOUCH_MOVED, LEAD_OWN},
-        {TOUCH_INNER | TOUCH_FRICTION, TOUCH_CARRIED | TOUCH_MOVED, LEAD_OWN},
-        {TOUCH_INNER | TOUCH_FRICTION | TOUCH_JOLT, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
-        {TOUCH_FRICTION | TOUCH_JOLT, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
-        {TOUCH_INNER | TOUCH_FRICTION | TOUCH_JOLT, 0, LEAD_OWN}, /* it flies */
-        /* momentum along which nothing static acts: a lead of each would change it */
-        {TOUCH_INNER, TOUCH_CARRIED | TOUCH_MOVED, LEAD_SHARED},
-        {TOUCH_INNER | TOUCH_JOLT, TOUCH_CARRIED | TOUCH_MOVED, LEAD_SHARED},
-        {TOUCH_INNER | TOUCH_JOLT, 0, LEAD_SHARED},
-        {TOUCH_INNER | TOUCH_SMOOTH, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
-        /* nor is what gravity gives its bodies the same */
-        {TOUCH_INNER | TOUCH_DIFFERS, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
-        {TOUCH_INNER | TOUCH_DIFFERS, TOUCH_MOVED, LEAD_OWN},
-        {TOUCH_INNER | TOUCH_DIFFERS | TOUCH_SMOOTH, TOUCH_MOVED, LEAD_STAYS},
-        {TOUCH_INNER | TOUCH_FRICTION | TOUCH_DIFFERS, TOUCH_CARRIED | TOUCH_MOVED, LEAD_OWN},
-    };
-    ck_assert_int_eq(lead_kind_of(cases[_i].island, cases[_i].body), cases[_i].kind);
-}
-END_TEST
-enum { KINDS = 16 };
-
-START_TEST(half_of_the_change)
-{
-    const double before[6] = {1, 2, 3, 0.5, -1, 2}, v[6] = {2, 2, 1, 1, 2, -1};
-    double lead[6];
-    lead_own(before, v, lead);
-    for (int k = 0; k < 6; ++k) ck_assert(lead[k] == (v[k] - before[k]) / 2);
-}
-END_TEST
 
 /* dt 0.01 s, slop 1e-5 m: 1e-6 m of noise. Leads are along the normal. */
 START_TEST(points)
@@ -100,8 +61,6 @@ int main(void)
 {
     Suite *suite = suite_create("lead");
     TCase *cases = tcase_create("lead");
-    tcase_add_loop_test(cases, kinds, 0, KINDS);
-    tcase_add_test(cases, half_of_the_change);
     tcase_add_loop_test(cases, points, 0, POINTS);
     suite_add_tcase(suite, cases);
     return run_suite(suite);

@@ -62,7 +62,7 @@ static __global__ void __launch_bounds__(3 * GRID_SAMPLES) grid_kernel(const __g
     __syncthreads();
     if (threadIdx.x > 0) return;
     double range = 0;
-    for (int k = 0; k < 3; ++k) range = fmax(range, shared.bounds[1][k] - shared.bounds[0][k]);
+    for (int k = 0; k < 3; ++k) range = max_of(range, shared.bounds[1][k] - shared.bounds[0][k]);
     for (int k = 0; k < 3; ++k)
         v.grid->origin[k] = 0.5 * (shared.bounds[0][k] + shared.bounds[1][k]) - 1.5 * range;
     v.grid->scale = range > 0 && range < HUGE_VAL ? (double)(1 << MORTON_BITS) / (3 * range) : 0;

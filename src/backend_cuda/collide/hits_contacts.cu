@@ -201,7 +201,7 @@ static __device__ __forceinline__ void open_gaps(const hits_view &v, const struc
     const struct flyer *of_a = &v.flyers[a->body], *of_b = &v.flyers[b->body];
     if (!(pair->restitution > 0 || of_a->hits > 0 || of_b->hits > 0)) return;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
-        flyers_open_gap(pair, &of_a->flight, &of_b->flight, fmin(a->thin, b->thin), v.step.settings,
+        flyers_open_gap(pair, &of_a->flight, &of_b->flight, min_of(a->thin, b->thin), v.step.settings,
                         &v.c.after.points[k]);
 }
 

@@ -26,7 +26,7 @@ static __device__ __forceinline__ void add_contacts(const contact_view &contacts
             force[j] += point.lambda[j];
         }
         add_cross(arm, point.lambda, sign, sums + 3);
-        sums[WORK] += fmax(0.0, -point.error) * push;
+        sums[WORK] += max_of(0.0, -point.error) * push;
         sums[DRIVE] -= point.error * push;
     });
 #pragma unroll
@@ -74,7 +74,7 @@ static __device__ __forceinline__ struct limit_energies energies_of(const double
 static __device__ __forceinline__ double factor_of(const struct limit_energies &energies, double along, bool bounces)
 {
     const double allowed = limit_factor(&energies, SOLVER_EPSILON);
-    return bounces ? fmin(allowed, limit_bounce_factor(&energies, along, SOLVER_EPSILON)) : allowed;
+    return bounces ? min_of(allowed, limit_bounce_factor(&energies, along, SOLVER_EPSILON)) : allowed;
 }
 
 /* What follows from their sums over an island that is held; !slows: it is counted, no more. One thread of it. */

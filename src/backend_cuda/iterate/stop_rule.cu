@@ -58,7 +58,7 @@ static __device__ double natural_map(const model_view &model, const body_view &b
             }
         }
         const vec3 impulse = m3_mul(frame, point_impulse(contacts, p, k)), x = m3_mul(frame, velocity);
-        const double w = fmax(weight[0], fmax(weight[1], weight[2])),
+        const double w = max_of(weight[0], max_of(weight[1], weight[2])),
                      e = BOUNCES ? sadmm_contact_e(&raw.system, &settings, pair, &raw.points[pair->first], k)
                                  : sadmm_contact_e_plain(&raw.system, &settings, point),
                      lambda[3] = {impulse.x, impulse.y, impulse.z}, u[3] = {x.x + e, x.y, x.z};
@@ -86,7 +86,7 @@ static __device__ double natural_map_of_rows(const body_view &bodies, const row_
     }
     if (constraint.cone) {
         const double u[3] = {x[0] + row[0].bias, x[1] + row[1].bias, x[2] + row[2].bias},
-                     w = constraint.friction > 0 ? fmax(weight[0], fmax(weight[1], weight[2])) : weight[0];
+                     w = constraint.friction > 0 ? max_of(weight[0], max_of(weight[1], weight[2])) : weight[0];
         return map_of_contact(lambda, u, constraint.friction, w);
     }
     for (int r = 0; r < constraint.count; ++r)
@@ -123,7 +123,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     term[0] = largest_of_lanes(map);
     term[1] = largest_of_lanes(fabs(momentum - row.b - g));
     term[2] = largest_of_lanes(keep_max(fabs(g), keep_max(fabs(momentum), fabs(row.b))));
-    term[2] = fmax(term[2], t.live ? mass_of(v.bodies, t.body) * v.model.settings->certificate_tolerance : 0);
+    term[2] = max_of(term[2], t.live ? mass_of(v.bodies, t.body) * v.model.settings->certificate_tolerance : 0);
     if (!add_up_island<largest_term>(v.graph, v.islands, t, t.live, own_number(term, t.lane), largest) ||
         t.lane != 0)
         return;

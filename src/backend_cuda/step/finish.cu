@@ -189,7 +189,7 @@ static __device__ __forceinline__ bool store_impulses(const contact_view &contac
         /* one record after the other: stores to both in turn would not be joined to wider ones */
         for (int j = 0; j < 3; ++j) start[j] = before.impulse[j];
         for (int j = 0; j < 3; ++j) point->impulse[j] = impulse[j];
-        *depth = fmax(*depth, -before.gap);
+        *depth = max_of(*depth, -before.gap);
     }
     return finite;
 }
@@ -229,7 +229,7 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
     if (v.step.limits && v.push.bits && !v.push.planned) {
         double deepest_of_pair = depth;
         for (int o = 1; o < v.contacts.lanes; o *= 2)
-            deepest_of_pair = fmax(deepest_of_pair, __shfl_xor_sync((unsigned)ALL_LANES, deepest_of_pair, o));
+            deepest_of_pair = max_of(deepest_of_pair, __shfl_xor_sync((unsigned)ALL_LANES, deepest_of_pair, o));
         tell_push(v, live && lane == 0 ? p : -1, -deepest_of_pair);
     }
     /* -0 is no depth; a larger one may be there already */

@@ -223,7 +223,7 @@ static __device__ __forceinline__ double most_missing(const joined_view &p, unsi
     double own = 0;
     if (threadIdx.x == 0) *shared_most = 0;
     __syncthreads();
-    each(p.s.places * JOINED_ROWS, [&](int32_t r) { own = fmax(own, joined_misses(&p, r)); });
+    each(p.s.places * JOINED_ROWS, [&](int32_t r) { own = max_of(own, joined_misses(&p, r)); });
     /* numbers that are not negative are in the order of their bits */
     if (own > 0) atomicMax(shared_most, (unsigned long long)__double_as_longlong(own));
     __syncthreads();

@@ -29,7 +29,7 @@ static __global__ void push_tell_kernel(const __grid_constant__ cuda_view v, con
     const bool live = p < live_pairs(v.model);
     double gap = 0;
     for (int32_t k = 0; live && k < v.raw.pairs[p].count; ++k)
-        gap = fmin(gap, v.raw.points[v.raw.pairs[p].first + k].gap);
+        gap = min_of(gap, v.raw.points[v.raw.pairs[p].first + k].gap);
     tell_push(v, live ? p : -1, gap);
 }
 

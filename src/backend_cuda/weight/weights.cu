@@ -78,7 +78,7 @@ static __global__ void respond_rows_kernel(const __grid_constant__ cuda_view v, 
         inverse_mass += 1 / mass_of(v.bodies, (size_t)joined[side]);
         load_jacobian(rows_of(v.rows, k)[r], side, J);
         w += packed_form(v.bodies.A_inverse + (size_t)joined[side] * PACKED, J);
-        push = fmax(push, length3(J));
+        push = max_of(push, length3(J));
     }
     const row_response out = {w, weight_row_scale(push, w, inverse_mass)};
     v.rows.responses[slot] = out;

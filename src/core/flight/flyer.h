@@ -82,7 +82,7 @@ SADMM_INLINE double flyer_sway(vec3 inertia, struct rigid_spin halfway, double d
                share = v3((inertia.y - inertia.z) / inertia.x, (inertia.z - inertia.x) / inertia.y,
                           (inertia.x - inertia.y) / inertia.z);
     const double rate2 = rigid_rate2(inertia, w);
-    return fmin(dt / 2 * v3_max_abs(share) * rate2, 2 * sqrt(rate2));
+    return min_of(dt / 2 * v3_max_abs(share) * rate2, 2 * sqrt(rate2));
 }
 
 /* Of others: as the step turns it about the middle (core/model/spin.h). */
@@ -197,8 +197,8 @@ SADMM_INLINE void flyer_box(const struct sadmm_shape *shape, const struct sadmm_
     int k;
     for (k = 0; k < 3; ++k) {
         const double rounding = 8 * DBL_EPSILON * (fabs(from->position[k]) + fabs(to->position[k]) + reach);
-        box->lo[k] = fmin(from->position[k], to->position[k]) - reach - rounding;
-        box->hi[k] = fmax(from->position[k], to->position[k]) + reach + rounding;
+        box->lo[k] = min_of(from->position[k], to->position[k]) - reach - rounding;
+        box->hi[k] = max_of(from->position[k], to->position[k]) + reach + rounding;
     }
 }
 
@@ -247,9 +247,9 @@ SADMM_INLINE double flyers_overlap_of_held(const struct sadmm_flight *a, const s
     for (k = 0; k < hit->count; ++k) {
         const vec3 at_a = v3_add(linear[0], v3_cross(spin[0], hit->arm[0][k])),
                    at_b = v3_add(linear[1], v3_cross(spin[1], hit->arm[1][k]));
-        parts = fmin(parts, v3_dot(hit->frame.r[0], v3_sub(at_b, at_a)));
+        parts = min_of(parts, v3_dot(hit->frame.r[0], v3_sub(at_b, at_a)));
     }
-    return falls > 0 && parts < falls * left ? fmax(parts, 0.0) * time + falls * time * time / 2 : 0;
+    return falls > 0 && parts < falls * left ? max_of(parts, 0.0) * time + falls * time * time / 2 : 0;
 }
 
 /* Both go on from the hit, which is solved. */

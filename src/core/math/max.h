@@ -1,4 +1,5 @@
-/* fmax and fmin, which host compilers make calls of: double in every precision, a NaN is no number. */
+/* The larger and the smaller of two: double in every precision, a NaN is no number. Not fmax and fmin, which host compilers
+ * make calls of, and which take another zero on a device. */
 #ifndef SADMM_MATH_MAX_H
 #define SADMM_MATH_MAX_H
 
@@ -6,10 +7,6 @@
 
 #include "core/base/inline.h"
 
-#ifdef __CUDA_ARCH__
-SADMM_INLINE double max_of(double a, double b) { return fmax(a, b); }
-SADMM_INLINE double min_of(double a, double b) { return fmin(a, b); }
-#else
 SADMM_INLINE double max_of(double a, double b)
 {
     const double larger = a > b ? a : b; /* one instruction each, and no jump */
@@ -20,6 +17,5 @@ SADMM_INLINE double min_of(double a, double b)
     const double smaller = a < b ? a : b;
     return b != b ? a : smaller;
 }
-#endif
 
 #endif

@@ -41,8 +41,8 @@ SADMM_INLINE double push_pull(const struct sadmm_rigid *rigid, const struct sadm
                               bool paper)
 {
     double scale = INFINITY;
-    if (pair->body_a >= 0) scale = fmin(scale, rigid[pair->body_a].gravity_scale);
-    if (pair->body_b >= 0) scale = fmin(scale, rigid[pair->body_b].gravity_scale);
+    if (pair->body_a >= 0) scale = min_of(scale, rigid[pair->body_a].gravity_scale);
+    if (pair->body_b >= 0) scale = min_of(scale, rigid[pair->body_b].gravity_scale);
     return scale * gravity * (paper ? PUSH_PAPER_SHARE : 1);
 }
 
@@ -71,7 +71,7 @@ SADMM_INLINE struct push_share push_share_of(const struct sadmm_contact_pair *pa
     if (speed > 0) {
         const double takes = contact_push_takes(speed, baumgarte, pull);
         share.bits |= takes > 1 ? PUSH_SOME | PUSH_MORE : PUSH_SOME;
-        share.units += (int64_t)(fmin(takes, 1.0) * PUSH_GRAVITY);
+        share.units += (int64_t)(min_of(takes, 1.0) * PUSH_GRAVITY);
     }
     return share;
 }

@@ -257,8 +257,8 @@ SADMM_RARE double sadmm_impact_e(const struct sadmm_system *system, const struct
         for (int side = 0; side < 2; ++side) middle[side] = v3_scale(middle[side], 1 / hits);
         restitution = sadmm_impact_restitution(body, pair, middle);
     }
-    if (contact_hits(points[at].gap, approach, dt, threshold)) return fmin(e, restitution * approach - ahead);
-    return approach > 0 ? fmax(e, restitution * approach - ahead) : e;
+    if (contact_hits(points[at].gap, approach, dt, threshold)) return min_of(e, restitution * approach - ahead);
+    return approach > 0 ? max_of(e, restitution * approach - ahead) : e;
 }
 
 /* e of a point along the normal, m/s, of a pair without restitution. */

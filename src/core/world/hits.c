@@ -440,7 +440,7 @@ static bool is_followed(const sadmm_world *world, const struct sadmm_contact_pai
 
 static double thinner_of(const sadmm_world *world, const struct sadmm_contact_pair *pair)
 {
-    return fmin(geometry_thickness(&world->geometries[world->shapes[pair->shape_a].geometry]),
+    return min_of(geometry_thickness(&world->geometries[world->shapes[pair->shape_a].geometry]),
                 geometry_thickness(&world->geometries[world->shapes[pair->shape_b].geometry]));
 }
 
