@@ -348,14 +348,10 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
 {
     const enum cuda_limit limit = limit_by_iterations(c);
     switch (stage->kind) {
-    case SADMM_STAGE_GATHER:
-        TRY(CUDA(launch_start)(c, error));
-        return takes_hits(c) ? SADMM_OK : record_bodies(c, error);
+    case SADMM_STAGE_GATHER: return CUDA(launch_start)(c, error);
+    case SADMM_STAGE_HITS: return CUDA(enqueue_hits)(c, c->view.step.substep, error);
     case SADMM_STAGE_FIND:
-        if (takes_hits(c)) { /* first, since bodies start from where they leave them */
-            TRY(CUDA(enqueue_hits)(c, c->view.step.substep, error));
-            TRY(record_bodies(c, error));
-        }
+        TRY(record_bodies(c, error)); /* beside it */
         return CUDA(enqueue_find)(c, c->view.step.substep, error);
     case SADMM_STAGE_PLAN: return record_plan(c, error);
     case SADMM_STAGE_PENALTY:
@@ -375,17 +371,35 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
         TRY(CUDA(launch_turn)(c, error));
         view_substep(c, c->view.step.substep + 1);
         *residuals = false;
-        return takes_hits(c) ? SADMM_OK : record_bodies(c, error);
+        return SADMM_OK;
     case SADMM_STAGE_COMMIT: return CUDA(launch_commit)(c, error);
-    case SADMM_STAGE_BODIES:   /* beside FIND */
-    case SADMM_STAGE_CONTACTS: /* beside PLAN */
-    case SADMM_STAGE_SOLUTION: /* INTEGRATE reads it where it is, */
-    case SADMM_STAGE_WRENCHES: /* and adds up wrenches */
-    case SADMM_STAGE_CERTIFY:  /* by the host, afterwards */
-    case SADMM_STAGE_ROWS:     /* beside PLAN */
-    case SADMM_STAGE_PREDICT:  /* worlds are not loaded before their first step */
-    default: return SADMM_OK;
+    /* record_bodies, beside FIND */
+    case SADMM_STAGE_JOINT_ROWS:
+    case SADMM_STAGE_BODIES:
+    /* record_plan */
+    case SADMM_STAGE_PUSH_CHOICE:
+    case SADMM_STAGE_BLOCK_SOLVE:
+    case SADMM_STAGE_CONTACTS:
+    case SADMM_STAGE_ROWS:
+    /* record_finish, which reads the solution where it is */
+    case SADMM_STAGE_SOLUTION:
+    case SADMM_STAGE_BLOCK_SOLVE_AGAIN:
+    case SADMM_STAGE_REACTIONS:
+    case SADMM_STAGE_KINEMATIC:
+    case SADMM_STAGE_JOINT_MOTION:
+    case SADMM_STAGE_WRENCHES:
+    /* record_push */
+    case SADMM_STAGE_PUSH_SOLVE:
+    case SADMM_STAGE_PUSH_MOTION:
+    /* launch_turn and launch_commit */
+    case SADMM_STAGE_KEEP: return SADMM_OK;
+    /* by the host: loads before a world is loaded, certificates of what it reads; no world with dense solves resides */
+    case SADMM_STAGE_PREDICT:
+    case SADMM_STAGE_CERTIFY:
+    case SADMM_STAGE_NCP_SOLVE:
+    case SADMM_STAGE_COUNT: return SADMM_OK;
     }
+    return SADMM_OK;
 }
 
 static sadmm_status enqueue_step(struct sadmm_context *c, bool edited, struct sadmm_error *error)

@@ -66,10 +66,22 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
     const struct sadmm_plan *plan = s->plan;
     switch (kind) {
     case SADMM_STAGE_GATHER:
+    case SADMM_STAGE_HITS:
     case SADMM_STAGE_FIND:
+    case SADMM_STAGE_JOINT_ROWS:
     case SADMM_STAGE_PLAN:
     case SADMM_STAGE_INTEGRATE:
+    case SADMM_STAGE_KINEMATIC:
+    case SADMM_STAGE_KEEP:
     case SADMM_STAGE_COMMIT: return s->world;
+    case SADMM_STAGE_PUSH_CHOICE:
+    case SADMM_STAGE_PUSH_SOLVE:
+    case SADMM_STAGE_PUSH_MOTION: return s->world && plan->points > 0;
+    case SADMM_STAGE_BLOCK_SOLVE: return s->world && plan->row_constraints > 0 && plan->warm_start;
+    case SADMM_STAGE_BLOCK_SOLVE_AGAIN:
+    case SADMM_STAGE_REACTIONS:
+    case SADMM_STAGE_JOINT_MOTION: return s->world && plan->row_constraints > 0;
+    case SADMM_STAGE_NCP_SOLVE: return s->world && plan->row_constraints > 0 && s->settings->direct_points > 0;
     case SADMM_STAGE_TURN: return !sadmm_stages_in_last_substep(s);
     case SADMM_STAGE_WRENCHES: return s->world && plan->wrenches;
     case SADMM_STAGE_CERTIFY: return s->world && plan->certificate;
@@ -88,9 +100,9 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
 enum sadmm_phase sadmm_stage_phase(enum sadmm_stage_kind kind)
 {
     if (kind <= SADMM_STAGE_FIND || kind == SADMM_STAGE_TURN) return SADMM_PHASE_COLLIDE;
-    if (kind == SADMM_STAGE_PLAN || kind == SADMM_STAGE_COMMIT) return SADMM_PHASE_OTHER;
+    if (kind <= SADMM_STAGE_BLOCK_SOLVE || kind == SADMM_STAGE_COMMIT) return SADMM_PHASE_OTHER;
     if (kind <= SADMM_STAGE_PENALTY) return SADMM_PHASE_ASSEMBLE;
-    if (kind <= SADMM_STAGE_SOLUTION) return SADMM_PHASE_SOLVE;
+    if (kind <= SADMM_STAGE_PUSH_SOLVE) return SADMM_PHASE_SOLVE;
     return kind == SADMM_STAGE_CERTIFY ? SADMM_PHASE_CERTIFY : SADMM_PHASE_FINISH;
 }
 
@@ -100,7 +112,7 @@ static void begin_substep(struct sadmm_stages *s)
     const int substep = s->substep + 1;
     *s = begun;
     s->substep = substep;
-    s->next = SADMM_STAGE_FIND;
+    s->next = SADMM_STAGE_HITS;
 }
 
 bool sadmm_stages_next(struct sadmm_stages *s, struct sadmm_stage *stage)

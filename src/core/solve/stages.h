@@ -1,7 +1,8 @@
 /* The schedule of a step: the paper's Fig. 4 as a list of stages, in order. It exists once.
  *
  *     step = GATHER  sub-step { TURN sub-step } *  CERTIFY COMMIT           (world level)
- *     sub-step = FIND PLAN  solve  INTEGRATE WRENCHES
+ *     sub-step = HITS FIND JOINT_ROWS PLAN PUSH_CHOICE BLOCK_SOLVE  solve  PUSH_SOLVE INTEGRATE BLOCK_SOLVE_AGAIN NCP_SOLVE
+ *                REACTIONS KINEMATIC JOINT_MOTION PUSH_MOTION KEEP WRENCHES
  *     solve = PREDICT BODIES CONTACTS ROWS PENALTY  iterations  LIMIT SOLUTION
  *     iterations = { ITERATE RESIDUALS CHECK REWEIGH BALANCE } until the budget is spent or a check is met
  *
@@ -19,27 +20,38 @@ extern "C" {
 #endif
 
 enum sadmm_stage_kind {
-    SADMM_STAGE_GATHER,    /* -    bodies and start values of the step */
-    SADMM_STAGE_FIND,      /* -    contacts */
-    SADMM_STAGE_PLAN,      /* -    what this step needs, found from its contacts */
-    SADMM_STAGE_PREDICT,   /* -    FAST: loads to start from (loads.h) */
-    SADMM_STAGE_BODIES,    /* A    A_i, b_i */
-    SADMM_STAGE_CONTACTS,  /* B    contacts in the solver's form */
-    SADMM_STAGE_ROWS,      /* C, D constraints given by rows */
-    SADMM_STAGE_PENALTY,   /* E-H  C_i, beta_i (FAST: weights) and the factors of A_i + beta_i C_i */
-    SADMM_STAGE_ITERATE,   /* I-O  Steps 1-4, `count` times */
-    SADMM_STAGE_RESIDUALS, /* N    eqs. (16), (17) of the last iteration */
-    SADMM_STAGE_CHECK,     /* -    convergence: where the stop rule is met, no iteration follows */
-    SADMM_STAGE_REWEIGH,   /* -    FAST: weights from the multipliers found so far; factors */
-    SADMM_STAGE_BALANCE,   /* P    eq. (15), and where it changes the penalty factors */
-    SADMM_STAGE_LIMIT,     /* -    momentum that no contact may change (math/momentum.h); FAST: islands with more energy
-                              than they may have (math/limit.h) */
-    SADMM_STAGE_SOLUTION,  /* -    velocities and multipliers to where the caller reads them */
-    SADMM_STAGE_INTEGRATE, /* Q    states after dt */
-    SADMM_STAGE_WRENCHES,  /* R    eq. (12) */
-    SADMM_STAGE_TURN,      /* -    the next sub-step starts from where this one has ended */
-    SADMM_STAGE_CERTIFY,   /* -    the true error, from the raw data */
-    SADMM_STAGE_COMMIT,    /* -    the step is made; nothing before changes the world */
+    SADMM_STAGE_GATHER,             /* -    bodies and start values of the step */
+    SADMM_STAGE_HITS,               /* -    bodies in flight hit each other at their moments (core/world/hits.c) */
+    SADMM_STAGE_FIND,               /* -    contacts */
+    SADMM_STAGE_JOINT_ROWS,         /* -    rows of joints, gears and couplings */
+    SADMM_STAGE_PLAN,               /* -    what this sub-step needs, found from its contacts and rows */
+    SADMM_STAGE_PUSH_CHOICE,        /* -    islands that are pushed apart without a velocity (push.h) */
+    SADMM_STAGE_BLOCK_SOLVE,        /* -    bodies with joints, directly (joined.h), and what stiffens them */
+    SADMM_STAGE_PREDICT,            /* -    FAST: loads to start from (loads.h) */
+    SADMM_STAGE_BODIES,             /* A    A_i, b_i */
+    SADMM_STAGE_CONTACTS,           /* B    contacts in the solver's form */
+    SADMM_STAGE_ROWS,               /* C, D constraints given by rows */
+    SADMM_STAGE_PENALTY,            /* E-H  C_i, beta_i (FAST: weights) and the factors of A_i + beta_i C_i */
+    SADMM_STAGE_ITERATE,            /* I-O  Steps 1-4, `count` times */
+    SADMM_STAGE_RESIDUALS,          /* N    eqs. (16), (17) of the last iteration */
+    SADMM_STAGE_CHECK,              /* -    convergence: where the stop rule is met, no iteration follows */
+    SADMM_STAGE_REWEIGH,            /* -    FAST: weights from the multipliers found so far; factors */
+    SADMM_STAGE_BALANCE,            /* P    eq. (15), and where it changes the penalty factors */
+    SADMM_STAGE_LIMIT,              /* -    momentum that no contact may change (math/momentum.h); FAST: energy (math/limit.h) */
+    SADMM_STAGE_SOLUTION,           /* -    velocities and multipliers to where the caller reads them */
+    SADMM_STAGE_PUSH_SOLVE,         /* -    the second problem: velocities that push apart */
+    SADMM_STAGE_INTEGRATE,          /* Q    states after dt, each body's position correction included (math/lead.h) */
+    SADMM_STAGE_BLOCK_SOLVE_AGAIN,  /* -    bodies with joints, beside the contact impulses found */
+    SADMM_STAGE_NCP_SOLVE,          /* -    contacts of small islands with joints, exactly (direct.h) */
+    SADMM_STAGE_REACTIONS,          /* -    what joints keep and report */
+    SADMM_STAGE_KINEMATIC,          /* -    kinematic bodies and the targets of couplings go on */
+    SADMM_STAGE_JOINT_MOTION,       /* -    states of bodies with joints after dt: correction, closing, momentum */
+    SADMM_STAGE_PUSH_MOTION,        /* -    pushed bodies move by the second problem's velocities */
+    SADMM_STAGE_KEEP,               /* -    what goes along into the next (sub-)step; is it finite? */
+    SADMM_STAGE_WRENCHES,           /* R    eq. (12) */
+    SADMM_STAGE_TURN,               /* -    the next sub-step starts from where this one has ended */
+    SADMM_STAGE_CERTIFY,            /* -    the true error, from the raw data */
+    SADMM_STAGE_COMMIT,             /* -    the step is made; nothing before changes the world */
     SADMM_STAGE_COUNT
 };
 

@@ -152,7 +152,8 @@ struct host_step {
     struct sadmm_stages stages;
     bool found;   /* the contacts have been replaced */
     /* Of the sub-steps made so far. */
-    double depth;          /* deepest penetration, m */
+    double depth;          /* deepest penetration, m; */
+    double depth_now;      /* that of this sub-step */
     double joint_drift;    /* of the last one */
     int iterations;        /* of all of them */
     bool unconverged;      /* one of them has not met a stop rule */
@@ -167,7 +168,6 @@ struct host_step {
 static sadmm_status solve_joined(struct host_step *step, const uint8_t *stiffened, bool after)
 {
     sadmm_world *world = step->world;
-    if (!step->system.rows) return SADMM_OK;
     if (!world->joined) world->joined = sadmm_joined_create();
     if (!world->joined) return sadmm_fail_memory(&world->error, "joined bodies");
     return sadmm_joined_solve(world->joined, &step->system, world->joint_constraints, world->joint_constraint_count,
@@ -188,8 +188,6 @@ static sadmm_status begin_joined(struct host_step *step)
 static sadmm_status solve_direct(struct host_step *step)
 {
     sadmm_world *world = step->world;
-    step->direct = 0;
-    if (step->settings.direct_points == 0 || !step->system.rows) return SADMM_OK;
     if (!world->direct) world->direct = sadmm_direct_create();
     if (!world->direct) return sadmm_fail_memory(&world->error, "islands that are solved directly");
     return sadmm_direct_solve(world->direct, world->joined, &step->system, world->joint_constraints, &step->settings,
@@ -197,11 +195,10 @@ static sadmm_status solve_direct(struct host_step *step)
 }
 
 /* Which islands are pushed apart without a velocity (core/solve/push.h). */
-static sadmm_status choose_pushes(struct host_step *step, double depth)
+static sadmm_status choose_pushes(struct host_step *step)
 {
     sadmm_world *world = step->world;
-    step->pushed = 0;
-    if (depth <= step->settings.slop || !push_is_apart(world->kernels->backend == SADMM_BACKEND_CUDA,
+    if (step->depth_now <= step->settings.slop || !push_is_apart(world->kernels->backend == SADMM_BACKEND_CUDA,
                                                        step->system.body_count, step->system.driven_count))
         return SADMM_OK;
     if (!world->push) world->push = sadmm_push_create();
@@ -219,22 +216,27 @@ static sadmm_status solve_pushes(struct host_step *step)
                             world->plan.contact_rows, &step->settings, &world->error);
 }
 
+static sadmm_status find(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    TRY(find_contacts(world, step->stages.substep));
+    sadmm_world_open_gaps(world);
+    step->found = true;
+    return SADMM_OK;
+}
+
 static sadmm_status make_plan(struct host_step *step)
 {
     sadmm_world *world = step->world;
-    double depth = 0;
-    step->found = true;
-    TRY(sadmm_world_make_rows(world, &step->settings));
     step->system = sadmm_world_system(world);
     step->system.first = step->system.first && step->stages.substep == 0;
     TRY(sadmm_world_carry(world, &step->system));
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
-    TRY(keep_start(world, &depth));
-    TRY(choose_pushes(step, depth));
+    step->direct = step->pushed = 0;
     if (world->joined) sadmm_joined_begin(world->joined);
-    if (world->plan.warm_start) TRY(begin_joined(step));
-    step->depth = depth > step->depth ? depth : step->depth;
+    TRY(keep_start(world, &step->depth_now));
+    step->depth = step->depth_now > step->depth ? step->depth_now : step->depth;
     return SADMM_OK;
 }
 
@@ -249,55 +251,6 @@ static void add_substep(struct host_step *step)
     if (!sadmm_stages_in_last_substep(&step->stages) && above > step->islands_above) step->islands_above = above;
 }
 
-/* A contact that rolls, to what a body takes along into the next step. */
-static void keep_rolling(sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t k, double dt)
-{
-    const struct sadmm_contact_point *point = &world->contacts.points[k];
-    const struct sadmm_contact_migration *migration = &world->contacts.migrations[k];
-    const struct rolling_halfway at = rolling_halfway_of(pair->normal, point, migration);
-    const double push = sadmm_normal_impulse(pair, point);
-    const int32_t body[2] = {pair->body_a, pair->body_b};
-    for (int s = 0; s < 2; ++s) {
-        if (body[s] < 0) continue;
-        struct sadmm_rigid *next = &world->next[body[s]];
-        const double *arm = s ? point->arm_b : point->arm_a;
-        rolling_begin(next);
-        if (point->migrates >= MIGRATES_SOON) next->rolls |= ROLLING_TURNS_ON; /* on a round surface */
-        rolling_owe(pair->normal, arm, at.normal, s ? at.arm_b : at.arm_a, point->impulse, s ? 1 : -1, next->owed);
-        rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->gap), migration->radius, push, dt,
-                        next->stiffness);
-    }
-}
-
-/* Between bodies of an island whose momentum has been restored: it has what such a contact owes already, in sum. */
-static bool is_restored(const sadmm_world *world, const struct sadmm_contact_pair *pair)
-{
-    return world->start.rows.constraint_count > 0 && pair->body_a >= 0 && pair->body_b >= 0 &&
-           joint_island_is_loose(world->joint_touch[world->joint_labels[pair->body_a]]);
-}
-
-static bool is_joined(const sadmm_world *world, int32_t body)
-{
-    return world->start.rows.constraint_count > 0 &&
-           world->joint_touch[world->joint_labels[body]] & ISLAND_JOINED;
-}
-
-static void keep_rolling_contacts(sadmm_world *world, double dt)
-{
-    const struct sadmm_contact_set *contacts = &world->contacts;
-    if (contacts->migrating == 0) return;
-    for (size_t p = 0; p < contacts->pair_count; ++p)
-        for (int32_t k = contacts->pairs[p].first; k < contacts->pairs[p].first + contacts->pairs[p].count; ++k)
-            if (contacts->points[k].migrates && !is_restored(world, &contacts->pairs[p]))
-                keep_rolling(world, &contacts->pairs[p], k, dt);
-    for (int32_t i = 0; i < world->dynamic_count; ++i) {
-        struct sadmm_rigid *next = &world->next[i];
-        if (next->rolls)
-            rolling_keep(next, world->start.rigid[i].position, dt, is_joined(world, i) || !rolling_turns_on(next),
-                         next->owed, next->stiffness);
-    }
-}
-
 static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage *stage)
 {
     sadmm_status status = sadmm_solve_stage(&step->solve, &step->stages, stage);
@@ -308,19 +261,26 @@ static sadmm_status integrate(struct host_step *step)
 {
     sadmm_world *world = step->world;
     sadmm_world_put_down(world, &step->system);
-    TRY(world->kernels->integrate(world->context, world->next, &world->error));
-    if (step->system.rows) {
-        TRY(solve_joined(step, NULL, true));
-        TRY(solve_direct(step));
-        sadmm_world_keep_rows(world, &step->settings);
-    }
-    TRY(sadmm_world_move_driven(world, &step->settings));
-    sadmm_world_move_targets(world, step->settings.dt);
-    if (step->system.rows) TRY(sadmm_world_move_joined(world, &step->settings, &step->joint_drift));
-    if (step->pushed > 0) sadmm_push_move(world->push, step->settings.dt, world->next);
-    keep_rolling_contacts(world, step->settings.dt);
+    return world->kernels->integrate(world->context, world->next, &world->error);
+}
+
+static sadmm_status move_kinematic(struct host_step *step)
+{
+    TRY(sadmm_world_move_driven(step->world, &step->settings));
+    sadmm_world_move_targets(step->world, step->settings.dt);
+    return SADMM_OK;
+}
+
+static void move_pushed(struct host_step *step)
+{
+    if (step->pushed > 0) sadmm_push_move(step->world->push, step->settings.dt, step->world->next);
+}
+
+static sadmm_status keep(struct host_step *step)
+{
+    sadmm_world_keep_rolling(step->world, step->settings.dt);
     add_substep(step);
-    return check_next(world);
+    return check_next(step->world);
 }
 
 static sadmm_status find_wrenches(const struct host_step *step)
@@ -336,26 +296,39 @@ static sadmm_status find_wrenches(const struct host_step *step)
     return SADMM_OK;
 }
 
+static sadmm_status certify(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    step->system.carried = NULL;
+    world->certified_step = world->report.step + 1; /* what this step will be */
+    return sadmm_certify_with(&world->certificate_workspace, &step->system, &step->settings, &step->report.certificate,
+                              &world->error);
+}
+
 static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *stage)
 {
     sadmm_world *world = step->world;
+    const sadmm_settings *settings = &step->settings;
     switch (stage->kind) {
     case SADMM_STAGE_GATHER: return sadmm_world_gather(world);
-    case SADMM_STAGE_FIND:
-        TRY(sadmm_world_take_hits(world, step->stages.substep));
-        TRY(find_contacts(world, step->stages.substep));
-        sadmm_world_open_gaps(world);
-        return SADMM_OK;
+    case SADMM_STAGE_HITS: return sadmm_world_take_hits(world, step->stages.substep);
+    case SADMM_STAGE_FIND: return find(step);
+    case SADMM_STAGE_JOINT_ROWS: return sadmm_world_make_rows(world, settings);
     case SADMM_STAGE_PLAN: return make_plan(step);
-    case SADMM_STAGE_SOLUTION: TRY(solve_stage(step, stage)); return solve_pushes(step);
+    case SADMM_STAGE_PUSH_CHOICE: return choose_pushes(step);
+    case SADMM_STAGE_BLOCK_SOLVE: return begin_joined(step);
+    case SADMM_STAGE_PUSH_SOLVE: return solve_pushes(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
+    case SADMM_STAGE_BLOCK_SOLVE_AGAIN: return solve_joined(step, NULL, true);
+    case SADMM_STAGE_NCP_SOLVE: return solve_direct(step);
+    case SADMM_STAGE_REACTIONS: sadmm_world_keep_rows(world, settings); return SADMM_OK;
+    case SADMM_STAGE_KINEMATIC: return move_kinematic(step);
+    case SADMM_STAGE_JOINT_MOTION: return sadmm_world_move_joined(world, settings, &step->joint_drift);
+    case SADMM_STAGE_PUSH_MOTION: move_pushed(step); return SADMM_OK;
+    case SADMM_STAGE_KEEP: return keep(step);
     case SADMM_STAGE_WRENCHES: return find_wrenches(step);
     case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;
-    case SADMM_STAGE_CERTIFY:
-        step->system.carried = NULL;
-        world->certified_step = world->report.step + 1; /* what this step will be */
-        return sadmm_certify_with(&world->certificate_workspace, &step->system, &step->settings,
-                                  &step->report.certificate, &world->error);
+    case SADMM_STAGE_CERTIFY: return certify(step);
     case SADMM_STAGE_COMMIT: commit(world); return SADMM_OK;
     default: return solve_stage(step, stage);
     }
@@ -456,36 +429,5 @@ sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report)
     TRY(sadmm_check_given(report, "report", &world->error));
     TRY(sadmm_world_settle(world));
     *report = world->report;
-    return SADMM_OK;
-}
-
-/* FNV-1a over the bit patterns. */
-static uint64_t hash_doubles(uint64_t hash, const double *x, int count)
-{
-    for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, &x[k], sizeof bits);
-        for (int byte = 0; byte < 8; ++byte) {
-            hash ^= bits >> (8 * byte) & 0xff;
-            hash *= UINT64_C(0x100000001b3);
-        }
-    }
-    return hash;
-}
-
-sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *out)
-{
-    uint64_t hash = UINT64_C(0xcbf29ce484222325);
-    TRY(sadmm_check_given(world, "world", NULL));
-    TRY(sadmm_check_given(out, "hash", &world->error));
-    TRY(sadmm_world_pull_bodies(world));
-    for (size_t slot = 0; slot < world->body_slots; ++slot) {
-        const struct sadmm_world_body *body = &world->bodies[slot];
-        if (!body->alive) continue;
-        hash = hash_doubles(hash, body->rigid.position, 3);
-        hash = hash_doubles(hash, body->rigid.orientation, 4);
-        hash = hash_doubles(hash, body->rigid.velocity, 6);
-    }
-    *out = hash;
     return SADMM_OK;
 }

@@ -380,6 +380,9 @@ void sadmm_world_mark_held(const sadmm_world *world, unsigned char *bodies, unsi
 void sadmm_world_open_gaps(sadmm_world *world);
 /* What the (sub-)step's hits give bodies, beside its contacts. */
 void sadmm_world_add_hit_wrenches(sadmm_world *world, const sadmm_settings *settings);
+
+/* What contacts that roll leave their bodies for the next (sub-)step (rolling.c). */
+void sadmm_world_keep_rolling(sadmm_world *world, double dt);
 void sadmm_world_free_hits(sadmm_world *world);
 
 /* ---- coupling_step.c ---- */
