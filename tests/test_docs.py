@@ -66,6 +66,16 @@ def wrong_names(text, paths, sources):
                 yield f"`{name}`: no such option"
 
 
+def wrong_references(project, path, text):
+    """Documents that comments of a source name, and headings in them, do not exist: docs/PAGE.md, "Heading"."""
+    plain = re.sub(r"\n\s*(?:\*(?!/)|//|#)?\s*", " ", text)
+    for document, heading in re.findall(r'\b(docs/(?:[\w\-]+/)*[\w\-]+\.md)\b(?:, "([^"]+)")?', plain):
+        if not os.path.exists(os.path.join(project, document)):
+            yield f"{path}: {document}: no such document"
+        elif heading and not re.search(rf"^#+ +{re.escape(heading)}$", read(os.path.join(project, document)), re.M):
+            yield f"{path}: {document}: has no heading '{heading}'"
+
+
 def wrong_commands(text, sources):
     """Options of the project's commands, in back quotes and in blocks."""
     spans = re.findall(r"^```.*?^```", text, re.M | re.S) + re.findall(r"`([^`]+)`", text)
@@ -166,6 +176,11 @@ def main():
         for error in errors:
             print(f"{document}: {error}")
         failed = failed or bool(errors)
+    for path in paths:
+        if path.endswith(CODE) and not path.startswith("docs/") and path != "tests/test_docs.py":
+            for error in wrong_references(project, path, read(os.path.join(project, path))):
+                print(error)
+                failed = True
     print(f"{len(documents)} documents")
     sys.exit(failed)
 

@@ -125,8 +125,8 @@ typedef struct sadmm_closest_points {
  * Apart: distance to 1e-12, points and normal to 1e-10 of the size (of both shapes and what is between them).
  * Overlapping: distance is what parts the two along the normal, to 1e-12, and is the least for boxes, hulls, spheres
  * and capsules, up to where the expanding polytope ends with 40 points; with cylinders, cones and ellipsoids to 1e-3 of
- * the thinner body or 2 % of the depth; points to 1e-5 of the size (docs/shapes.md). What touches
- * along a line or a face has one of the pairs of points there.
+ * the thinner body or 2 % of the depth; points to 1e-5 of the size (docs/internals/contact-geometry.md, "What is
+ * exact"). What touches along a line or a face has one of the pairs of points there.
  *
  * A mesh is its surface, as contacts have it: what is behind all of it is apart from it. Of several triangles that a
  * shape is in, the one that it is deepest in counts; the way out of each is to its front, or past its sides.
