@@ -1,6 +1,6 @@
 /* subadmm-bench convergence: how many iterations, and how much time, each method takes to a tolerance on a set of cold
- * problems, and how far from the solution a scene's steps are when they do few. docs/convergence.md says how to read
- * it; bench/convergence.sh regenerates its tables, bench/plot_convergence.py draws the CSV. */
+ * problems, and how far from the solution a scene's steps are when they do few. docs/internals/accuracy.md says how to
+ * read it; bench/plot_convergence.py draws the CSV. */
 #include <stdlib.h>
 #include <string.h>
 

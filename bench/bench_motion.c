@@ -2,7 +2,7 @@
  * of it, a quarter, ... by numbers of iterations are compared with one at a 64th of the step and with many iterations,
  * at the same simulated times; heaps, whose trajectories part whatever one does, after a short time from states on one
  * run. Overlaps are measured apart from the library (overlap.h). Or motions whose answers are known (known_motions.h).
- * docs/motion.md. */
+ * docs/internals/accuracy.md. */
 #include <math.h>
 #include <string.h>
 

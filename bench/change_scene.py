@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Scene files changed for measurements of docs/shapes.md and docs/performance.md:
+"""Scene files changed for measurements:
 
     subadmm scenes pile:300 --json | bench/change_scene.py hulls > hulls.json
     subadmm scenes pile:200 --json | bench/change_scene.py floor > floor.json

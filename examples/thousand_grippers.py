@@ -4,9 +4,9 @@
     python thousand_grippers.py --count 20 --backend cpu
     python thousand_grippers.py --backend cuda --precision f32
 
-The world is that of the scene "grippers:1000" (docs/scenes.md): each gripper is a palm that a coupling leads, and two
-fingers on sliding joints, with a box, a ball or a capsule of 0.2 to 1 kg between them. The scene's own script is left
-out.
+The world is that of the scene "grippers:1000" (docs/guide/scenes.md): each gripper is a palm that a coupling leads, and
+two fingers on sliding joints, with a box, a ball or a capsule of 0.2 to 1 kg between them. The scene's own script is
+left out.
 """
 
 import argparse

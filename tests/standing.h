@@ -64,7 +64,7 @@ static inline void run_standing(const struct standing_case *about, sadmm_method 
     ck_assert_msg(top_speed(world) <= still, "%s: %g m/s at rest", what, top_speed(world));
     /* What two bodies move and turn by. */
     ck_assert_msg(certificate.ncp_max <= 4 * still, "%s: natural map %g m/s at rest", what, certificate.ncp_max);
-    /* The paper says little of how its bodies are arranged (docs/scenes.md, which promises this). */
+    /* The paper says little of how its bodies are arranged (docs/guide/scenes.md, which promises this). */
     if (about->table > 0)
         ck_assert_msg(fabs(sum / steps / about->table - 1) <= 0.15, "%s: %g contacts on average, Table I has %g", what,
                       sum / steps, about->table);

@@ -195,8 +195,9 @@ START_TEST(bodies_of_different_forces_stay_together)
 }
 END_TEST
 
-/* Bodies that touch in the air have gravity's share of a lead in common (docs/algorithm.md, section 9), unless gravity is
- * not what they have in common: weightless ones go by v t, damped ones by what damping leaves of it. */
+/* Bodies that touch in the air have gravity's share of a lead in common (docs/internals/algorithm.md, "Positions"),
+ * unless gravity is not what they have in common: weightless ones go by v t, damped ones by what damping leaves of
+ * it. */
 START_TEST(bodies_that_touch_in_the_air_go_their_way)
 {
     enum { STEPS = 40 };

@@ -273,7 +273,8 @@ START_TEST(meshes)
             if (to_ball >= 0) ck_assert_double_eq_tol(one.distance, to_ball, 1e-13);
             else ck_assert_double_le(one.distance, to_ball + 1e-13); /* as deep at least: it has one side */
         }
-        /* 1e-12 of 10 m; of smooth bodies deep in a triangle the way out is found as exactly as docs/shapes.md says */
+        /* 1e-12 of 10 m; of smooth bodies deep in a triangle the way out is found as exactly as
+         * docs/internals/contact-geometry.md says */
         const double tolerance = gap.distance < 0 && geometry_is_smooth(&t.g[0])
                                      ? 1e-3 * geometry_thickness(&t.g[0]) - 0.02 * gap.distance
                                      : 1e-11;

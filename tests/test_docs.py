@@ -3,11 +3,13 @@
 
     test_docs.py PROJECT
 
-In README.md, CONTRIBUTING.md, docs/*.md and docs/guide/*.md: links lead to files, and to headings where they name one;
-in back quotes, files and folders exist, and so do functions, structs, macros and options; a block of C or Python that
-names a program of examples in its first line is part of that program, which is compiled and run.
-docs/architecture.md names every folder of src. The user's guide, docs/guide, has no other block of C; its other blocks of
-Python compile (python/tests/test_guide.py runs them); its index leads to every page.
+In README.md, CONTRIBUTING.md, CHANGELOG.md, docs/*.md, docs/guide/*.md and docs/internals/*.md: links lead to files, and
+to headings where they name one; in back quotes, files and folders exist, and so do functions, structs, macros and
+options; a block of C or Python that names a program of examples in its first line is part of that program, which is
+compiled and run; places of generated figures have an end, and a name that no other place has.
+docs/internals/architecture.md names every folder of src. README.md leads to every page of docs/internals. The user's guide,
+docs/guide, has no other block of C; its other blocks of Python compile (python/tests/test_guide.py runs them); its index
+leads to every page.
 """
 import os
 import re
@@ -64,6 +66,16 @@ def wrong_names(text, paths, sources):
                 yield f"`{name}`: no such option"
 
 
+def wrong_references(project, path, text):
+    """Documents that comments of a source name, and headings in them, do not exist: docs/PAGE.md, "Heading"."""
+    plain = re.sub(r"\n\s*(?:\*(?!/)|//|#)?\s*", " ", text)
+    for document, heading in re.findall(r'\b(docs/(?:[\w\-]+/)*[\w\-]+\.md)\b(?:, "([^"]+)")?', plain):
+        if not os.path.exists(os.path.join(project, document)):
+            yield f"{path}: {document}: no such document"
+        elif heading and not re.search(rf"^#+ +{re.escape(heading)}$", read(os.path.join(project, document)), re.M):
+            yield f"{path}: {document}: has no heading '{heading}'"
+
+
 def wrong_commands(text, sources):
     """Options of the project's commands, in back quotes and in blocks."""
     spans = re.findall(r"^```.*?^```", text, re.M | re.S) + re.findall(r"`([^`]+)`", text)
@@ -81,6 +93,35 @@ def wrong_examples(project, text):
         path = os.path.join(project, name)
         if not os.path.exists(path) or code not in read(path):
             yield f"the block of {name} is not in that file"
+
+
+def wrong_reports(text, seen):
+    """Places of generated figures: <!-- report: NAME -->, what a generator writes, <!-- end -->. `seen`: their names."""
+    name = None
+    for begin, end in re.findall(r"^<!-- (?:report: ([\w-]+)|(end)) -->$", text, re.M):
+        if end:
+            if name is None:
+                yield "<!-- end --> without a report"
+            name = None
+            continue
+        if name is not None:
+            yield f"report {name}: no <!-- end -->"
+        name = begin
+        if name in seen:
+            yield f"report {name}: is in two places"
+        seen.add(name)
+    if name is not None:
+        yield f"report {name}: no <!-- end -->"
+    for line in re.findall(r"^.*<!--.*report.*$", text, re.M):
+        if not re.fullmatch(r"<!-- report: [\w-]+ -->", line):
+            yield f"{line!r}: is no begin of a report"
+
+
+def missing_links(text, documents, folder):
+    """Pages of a folder, written as a link has them, that a document does not lead to."""
+    for document in documents:
+        if document.startswith(folder) and f"]({document}" not in text:
+            yield f"leads to no {document}"
 
 
 def wrong_words(text, words):
@@ -113,13 +154,16 @@ def main():
                         if path.endswith(CODE) and not path.startswith("docs/"))
     words = set(re.findall(r"\w+", sources))
     failed = False
-    documents = ["README.md", "CONTRIBUTING.md"] + \
-        sorted(path for path in paths if re.fullmatch(r"docs/(guide/)?\w+\.md", path))
+    reports = set()
+    documents = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"] + \
+        sorted(path for path in paths if re.fullmatch(r"docs/((guide|internals)/)?[\w-]+\.md", path))
     for document in documents:
         text = read(os.path.join(project, document))
         errors = list(wrong_links(project, document, text)) + list(wrong_names(text, paths, sources)) + \
-            list(wrong_commands(text, sources)) + list(wrong_examples(project, text))
-        if document == "docs/architecture.md":
+            list(wrong_commands(text, sources)) + list(wrong_examples(project, text)) + list(wrong_reports(text, reports))
+        if document == "README.md":
+            errors += missing_links(text, documents, "docs/internals/")
+        if document == "docs/internals/architecture.md":
             for path in paths:
                 folder = path[:-1]
                 if path.startswith("src/") and path.endswith("/") and os.path.basename(folder) + "/" not in text:
@@ -132,6 +176,11 @@ def main():
         for error in errors:
             print(f"{document}: {error}")
         failed = failed or bool(errors)
+    for path in paths:
+        if path.endswith(CODE) and not path.startswith("docs/") and path != "tests/test_docs.py":
+            for error in wrong_references(project, path, read(os.path.join(project, path))):
+                print(error)
+                failed = True
     print(f"{len(documents)} documents")
     sys.exit(failed)
 

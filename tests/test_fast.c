@@ -1,7 +1,7 @@
 /* The method `fast`: every table's iterates are the plainly written ones of `ref`, whatever the threads; its weights
- * are what docs/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too few.
- * One file: weights, iterates and solutions are tested on the same problems (deep_stack, the scenes of table_runner.h)
- * and by the same runners.
+ * are what docs/internals/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too
+ * few. One file: weights, iterates and solutions are tested on the same problems (deep_stack, the scenes of
+ * table_runner.h) and by the same runners.
  */
 #include "backend_ref/literal.h"
 #include "core/solve/certificate.h"
@@ -543,8 +543,8 @@ static int cold_iterations(struct contact_problem *problem, sadmm_method method,
 }
 
 /* Over-relaxation is worth having; and to 1e-6 m/s fast takes a third of the iterations of paper, in the geometric
- * mean, as docs/convergence.md has it for problems whose loads are not predicted. `most` is a guard against regressions
- * and no more: what an over-relaxation of 1.2 takes. */
+ * mean, as docs/internals/accuracy.md has it for problems whose loads are not predicted. `most` is a guard against
+ * regressions and no more: what an over-relaxation of 1.2 takes. */
 START_TEST(cold_solves)
 {
     static struct contact_problem *(*const problems[])(int) = {stack, pyramid, plates};
@@ -725,8 +725,8 @@ static double fastest_body(sadmm_world *world)
 }
 
 /* Few iterations bring what can stand to rest: below 1e-8 of the energy of its free motion, in single precision 1e-6,
- * an island is no longer slowed down (docs/algorithm.md, section 7), so that motions as small as that have to die out
- * by themselves. Without what is done for few iterations stacks sway at 0.03 m/s for good. */
+ * an island is no longer slowed down (docs/internals/algorithm.md, "Energy limiter"), so that motions as small as that
+ * have to die out by themselves. Without what is done for few iterations stacks sway at 0.03 m/s for good. */
 START_TEST(few_iterations_come_to_rest)
 {
     struct sadmm_scene scene = open_scene(resting[_i % RESTING].spec);

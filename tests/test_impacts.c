@@ -151,7 +151,7 @@ START_TEST(two_that_spin_keep_their_energy)
 }
 END_TEST
 
-/* ---- the table of docs/motion.md ---- */
+/* ---- what rows of balls do ---- */
 
 /* Balls in a row along x, the first of them at `speed`; a solve that ends at rounding. */
 static sadmm_world *row_of_balls(int solver, int count, double speed, double gap, double restitution,

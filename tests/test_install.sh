@@ -33,7 +33,7 @@ link() {
     flags="-Wall -Wextra -Werror $(pkg-config --cflags subadmm)"
     link shared_c ${CC:-cc} $flags -std=c11 "$program" $(pkg-config --libs subadmm)
     link shared_c++ ${CXX:-c++} $flags -std=c++17 -x c++ "$program" -x none $(pkg-config --libs subadmm)
-    # As docs/building.md says, with both libraries in one folder.
+    # As docs/guide/install.md says, with both libraries in one folder.
     link static_c ${CC:-cc} $flags -std=c11 "$program" $(pkg-config --static --libs subadmm | sed 's/-lsubadmm/-l:libsubadmm.a/')
 }
 if ! readelf -d "$library/libsubadmm.so" | grep -q NODELETE; then

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Imports run one way (docs/architecture.md, "Layers").
+"""Imports run one way (docs/internals/architecture.md, "Folders and layers").
 
     test_layers.py PROJECT [ARCHIVE]...
 

@@ -194,8 +194,8 @@ END_TEST
 
 /* ---- rocking --------------------------------------------------------------------------------------------------- */
 
-/* A box of 1 kg rocks on a lying cylinder, from 0.2 rad. Energy is never gained, and little of it lost in 4 s (section 9
- * of docs/algorithm.md). */
+/* A box of 1 kg rocks on a lying cylinder, from 0.2 rad. Energy is never gained, and little of it lost in 4 s
+ * (docs/internals/algorithm.md, "Rolling contacts"). */
 START_TEST(rocking_gains_no_energy)
 {
     static const double cylinder[3] = {0.5, 1, 0}, half[3] = {0.2, 0.1, 0.05};

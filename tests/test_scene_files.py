@@ -4,8 +4,8 @@
     test_scene_files.py PROJECT COMMAND
 
 Files that differ from a good one in one place are refused by `subadmm run`, which names the place;
-docs/scene.schema.json refuses them too where a schema can. Exports of all scenes, and the example of docs/scenes.md,
-pass it. Without Python's jsonschema the schema itself is left out, which is said.
+docs/scene.schema.json refuses them too where a schema can. Exports of all scenes, and the example of
+docs/guide/scene-files.md, pass it. Without Python's jsonschema the schema itself is left out, which is said.
 """
 import copy
 import json
@@ -277,14 +277,14 @@ def check_exports(command, schema):
 
 
 def check_example(project, command, schema):
-    """The block of docs/scenes.md is the file of examples, and that runs."""
+    """The block of docs/guide/scene-files.md is the file of examples, and that runs."""
     path = os.path.join(project, "examples", "swing.json")
     with open(path, encoding="utf-8") as file:
         text = file.read()
-    with open(os.path.join(project, "docs", "scenes.md"), encoding="utf-8") as file:
+    with open(os.path.join(project, "docs", "guide", "scene-files.md"), encoding="utf-8") as file:
         blocks = re.findall(r"^```json\n(.*?)^```", file.read(), re.M | re.S)
     if text not in blocks:
-        fail("docs/scenes.md has another example than examples/swing.json")
+        fail("docs/guide/scene-files.md has another example than examples/swing.json")
     result = run(command, "run", path, "--quiet", "--json")
     ran = json.loads(result.stdout) if result.returncode == 0 else {}
     # The ball, which lies 0.45 m from where the plank begins, is kicked and rolls.

@@ -65,7 +65,7 @@ START_TEST(sliding_cubes)
         step_world(world, 1);
         sum += world_report(world).contacts;
     }
-    ck_assert_double_eq_tol(sum / steps / rows[row].contacts, 1.0, 0.15); /* as docs/scenes.md promises */
+    ck_assert_double_eq_tol(sum / steps / rows[row].contacts, 1.0, 0.15); /* as docs/guide/scenes.md promises */
     for (int32_t i = 1; i < sadmm_world_body_count(world); ++i) {
         /* 1 %: in the first steps a sliding contact's velocity lags behind the momentum balance (a factor of 0.963 an
          * iteration, beta = 6.5 kg and 4 contacts); once the change of velocity is steady it must not. */

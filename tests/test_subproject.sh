@@ -1,6 +1,6 @@
 #!/bin/sh
-# A parent project gets the smallest library by the lines of docs/building.md: they are taken from the page, and what they
-# disable is not there.
+# A parent project gets the smallest library by the lines of docs/guide/install.md: they are taken from the page, and
+# what they disable is not there.
 # usage: test_subproject.sh SOURCE_FOLDER
 set -eu
 
@@ -13,10 +13,10 @@ ln -s "$source" "$folder/subprojects/subadmm"
 cp "$source/tests/install_user.c" "$folder/main.c"
 {
     echo "project('parent', 'c')"
-    awk '/^```/ { inside = $0 == "```meson"; next } inside' "$source/docs/building.md"
+    awk '/^```/ { inside = $0 == "```meson"; next } inside' "$source/docs/guide/install.md"
     echo "executable('parent', 'main.c', dependencies: subadmm_dep)"
 } > "$folder/meson.build"
-grep -q default_options "$folder/meson.build" || { echo "docs/building.md has no lines for a subproject"; exit 1; }
+grep -q default_options "$folder/meson.build" || { echo "docs/guide/install.md has no lines for a subproject"; exit 1; }
 
 meson setup "$folder/build" "$folder" > "$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
 config=$folder/build/subprojects/subadmm/src/config.h

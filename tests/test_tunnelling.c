@@ -22,7 +22,7 @@ START_TEST(these_drops_stay_on_their_side)
         {SADMM_SHAPE_CONE, DROP_HEIGHTS, 0.005, SADMM_BACKEND_CPU, SADMM_F64, 5045},
         {SADMM_SHAPE_CONE, DROP_GRID, 0.01, SADMM_BACKEND_CPU, SADMM_F64, 5046},
     };
-    /* another rounding has another body of a world go through, by chance (docs/algorithm.md) */
+    /* another rounding has another body of a world go through, by chance (docs/guide/limits.md) */
     const struct drop_result r = drop_all(&cases[_i]);
     ck_assert_msg(r.through <= 1, "%d are through, the first is %d", r.through, (int)r.first);
 }
@@ -32,7 +32,7 @@ END_TEST
  * lever as long as their way. */
 START_TEST(shots_do_not_go_through)
 {
-    /* by another rounding one of a few hundred goes through, by chance (docs/algorithm.md) */
+    /* by another rounding one of a few hundred goes through, by chance (docs/guide/limits.md) */
     const int worlds = fewer(4), through = shots_all((uint64_t)(11 + 4 * _i), worlds);
     ck_assert_msg(through <= 1, "%d of %d are through", through, worlds * SHOT_PAIRS);
 }

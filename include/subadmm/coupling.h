@@ -9,7 +9,7 @@
  *     force = -linear_stiffness d - linear_damping v          torque = -angular_stiffness phi - angular_damping w
  *
  * They are part of the step's solve, implicit and together with all contacts and joints, so that any gains are stable
- * with any mass at any time step; and bounded, exactly. Method: docs/algorithm.md, section 10.
+ * with any mass at any time step; and bounded, exactly. Method: docs/internals/algorithm.md, "Gears and couplings".
  *
  * The target's pose is that at the present time of the world; it moves on by its velocity in every (sub-)step, until
  * it is set anew. The caller feels what the target transmits, sadmm_coupling_state.felt_*. On CUDA targets go along

@@ -13,7 +13,8 @@
  * that is common to both joints, nor two translations in the same direction; such a gear is refused, and one that comes
  * to be so rests until it is no more. (Two slides that face each other, on a hand that moves, take a wheel in between: a
  * body on a hinge, with two gears.) Angles count on beyond full turns, and errors of the
- * ratio do not add up: they are fed back as those of locked coordinates. Method: docs/algorithm.md, section 10.
+ * ratio do not add up: they are fed back as those of locked coordinates. Method: docs/internals/algorithm.md, "Gears
+ * and couplings".
  *
  * Threads and errors: as world.h says. Ids are values with a generation, as bodies' are. */
 #ifndef SUBADMM_GEAR_H

@@ -9,7 +9,7 @@
  * about an axis k + 1 of a's frame and an axis k + 2 of b's (cyclic; a universal joint's cross); these count on beyond
  * full turns. Where three are free they are the rotation vector from a's frame to b's, in a's frame. Rates of all of
  * them are components of the relative angular velocity along these axes. Formulas: src/core/math/joint.h; method:
- * docs/algorithm.md, section 10.
+ * docs/internals/algorithm.md, "Joints".
  *
  * Forces are along a coordinate, N for translations, N m for rotations; positive ones push b along the coordinate and a
  * against it.

@@ -3,7 +3,8 @@
  *
  * A mesh is a surface, solid behind: a triangle's corners run counter-clockwise seen from the side where bodies are.
  * Neighbouring triangles know each other. Where bodies slide from one to the next, the edges and corners between them
- * push in no direction that the surface does not (docs/shapes.md), so that flat ground is flat however it is divided.
+ * push in no direction that the surface does not (docs/internals/contact-geometry.md, "Meshes and heightfields"), so
+ * that flat ground is flat however it is divided.
  *
  * A mesh is made once and never changes. Any number of worlds and threads may use it at the same time; it lives until
  * its maker and every world with shapes of it have let go of it. Every world keeps a copy of its data beside its other

@@ -44,8 +44,8 @@ typedef enum sadmm_block_kind {
     SADMM_BLOCK_CONTACT = 0, /* 3 rows (normal, tangent, tangent), eq. (5) */
     SADMM_BLOCK_HARD,        /* 1..6 rows, eq. (4) */
     SADMM_BLOCK_SOFT,        /* 1..6 rows, eq. (3) with a gain and a damping a row */
-    SADMM_BLOCK_ROWS         /* 1..6 rows, each a law with bounds (docs/algorithm.md, section 1): limits, drives,
-                                dry friction:
+    SADMM_BLOCK_ROWS         /* 1..6 rows, each a law with bounds (docs/internals/algorithm.md, "The problem"): limits,
+                                drives, dry friction:
                                 gain x + error + compliance lambda = 0 where lower < lambda < upper, >= 0 at lower,
                                 <= 0 at upper */
 } sadmm_block_kind;

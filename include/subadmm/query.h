@@ -5,8 +5,8 @@
  * on them, nor on the order in which bodies came. Bodies beyond the range of their definition (|x| > 1e9 m) may be
  * missed.
  *
- * The first query after a step, or after anything has been added, removed or set, brings a tree of boxes up to date
- * (docs/queries.md has what that takes); those that follow use it as it is. Queries change no state and no contact. A
+ * The first query after a step, or after anything has been added, removed or set, brings a tree of boxes up to date;
+ * those that follow use it as it is. Queries change no state and no contact. A
  * world on a device (CUDA) is waited for and its bodies are read back first, as by sadmm_world_body_state; queries run
  * on the host. Worlds that are not asked pay nothing.
  *
@@ -125,8 +125,8 @@ typedef struct sadmm_closest_points {
  * Apart: distance to 1e-12, points and normal to 1e-10 of the size (of both shapes and what is between them).
  * Overlapping: distance is what parts the two along the normal, to 1e-12, and is the least for boxes, hulls, spheres
  * and capsules, up to where the expanding polytope ends with 40 points; with cylinders, cones and ellipsoids to 1e-3 of
- * the thinner body or 2 % of the depth; points to 1e-5 of the size (docs/shapes.md, docs/queries.md). What touches
- * along a line or a face has one of the pairs of points there.
+ * the thinner body or 2 % of the depth; points to 1e-5 of the size (docs/internals/contact-geometry.md, "What is
+ * exact"). What touches along a line or a face has one of the pairs of points there.
  *
  * A mesh is its surface, as contacts have it: what is behind all of it is apart from it. Of several triangles that a
  * shape is in, the one that it is deepest in counts; the way out of each is to its front, or past its sides.

@@ -24,7 +24,8 @@ typedef enum sadmm_backend {
     SADMM_BACKEND_COUNT
 } sadmm_backend;
 
-/* The iteration that solves the contact problem; both have the same solutions (docs/algorithm.md). Default: FAST. */
+/* The iteration that solves the contact problem; both have the same solutions (docs/internals/algorithm.md). Default:
+ * FAST. */
 typedef enum sadmm_method {
     SADMM_METHOD_PAPER = 0, /* one penalty weight a body, eqs. (13) to (15) */
     SADMM_METHOD_FAST,      /* one weight a constraint, from the load it carries, and over-relaxation */
@@ -54,31 +55,31 @@ enum { SADMM_MOST_HITS = 64 };
 
 /* Settings of a solve. Start from sadmm_settings_default(); a struct is validated when it is handed over.
  * Symbols are the paper's (Sec. III-D). "kg/s^2" values are the paper's time-scaled units; the solver works
- * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/algorithm.md). */
+ * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/internals/algorithm.md). */
 typedef struct sadmm_settings {
     double dt;                   /* time step, s, in [1e-6, 1]; default 0.005. It may change from step to step.
                                     Joints lose energy where they turn by more than 0.1 rad in one
-                                    (docs/algorithm.md, section 10) */
+                                    (docs/internals/algorithm.md, "Large turns") */
     int substeps;                /* of a world's step, in [1, SADMM_MOST_SUBSTEPS = 64], dt / substeps >= 1e-6 s;
                                     default 1. A step is made of so many sub-steps of dt / substeps with a share of
-                                    `iterations` each, so that bodies in motion overlap less (docs/motion.md). Pairs of
-                                    shapes that may touch are looked for once a step, all else is done in every
+                                    `iterations` each, so that bodies in motion overlap less (docs/guide/choose.md).
+                                    Pairs of shapes that may touch are looked for once a step, all else is done in every
                                     sub-step: states are those of `substeps` steps of dt / substeps, for less. External
                                     wrenches act through all of them. What is read of a step: world.h. Problems have
                                     none */
     double gravity[3];           /* m/s^2, world frame, finite, norm <= 1e6; default (0, 0, -9.81) */
 
     sadmm_method method;         /* default SADMM_METHOD_FAST: the same solutions in fewer iterations that cost the same
-                                    (docs/convergence.md). PAPER is the paper's own iteration, to compare with; it needs
-                                    more iterations, below, and takes the penalty_* settings */
+                                    (docs/internals/accuracy.md). PAPER is the paper's own iteration, to compare with;
+                                    it needs more iterations, below, and takes the penalty_* settings */
     int iterations;              /* iterations a step, in [1, 1000000]; sub-steps do iterations / substeps each, rounded
                                     up; default 20: enough for FAST in a world, where a
                                     step goes on from the one before. Bodies that meet in many places at once need more
                                     (the step report's `limited` says so), and so does a problem that is solved once:
                                     some 100 to 1000, or a tolerance below with a large number here.
                                     PAPER: 100 to 300 */
-    double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8 (docs/algorithm.md,
-                                    section 7) */
+    double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8
+                                    (docs/internals/algorithm.md, "Method fast") */
     int penalty_period;          /* PAPER, as all of penalty_*. m of eq. (15): iterations between penalty updates,
                                     0 = never; default 30 */
     double penalty_mass_factor;  /* M of eq. (13), dimensionless, in [0, 1e12]; default 16 */
@@ -86,18 +87,19 @@ typedef struct sadmm_settings {
     double penalty_ratio_limit;  /* alpha of eq. (15), in [1, 1e6]; default 4 */
     bool penalty_update_warm;    /* also update in steps that start warm (most constraints carry an impulse);
                                     default false: there (15) moves the weights of an iteration that has all but
-                                    converged and keeps it from coming to rest (docs/algorithm.md) */
+                                    converged and keeps it from coming to rest (docs/internals/algorithm.md) */
     bool warm_start;             /* start from the previous step's impulses and velocities; default true.
                                     false: impulses start at 0 and velocities at A^-1 b. FAST, either way: problems
-                                    without impulses and first steps start from predicted loads (docs/algorithm.md) */
+                                    without impulses and first steps start from predicted loads
+                                    (docs/internals/algorithm.md) */
 
     int direct_points;           /* worlds: islands with joints and at most so many contact points are solved directly
-                                    after the iterations (docs/algorithm.md, section 10), contacts and rows to rounding:
-                                    robots that stand, walk, grasp. In [0, SADMM_MOST_DIRECT_POINTS = 128]; 0: none;
-                                    default 0. It costs what the iterations leave to do: little where they leave less
-                                    than 1e-9 m/s, else 0.1 to 0.5 ms a robot of ten points on one core, and some 10 ms
-                                    an island that nothing solves (links deep in a table). On CUDA such steps go through
-                                    the host */
+                                    after the iterations (docs/internals/algorithm.md, "Dense contact solve (NCP)"),
+                                    contacts and rows to rounding: robots that stand, walk, grasp. In [0,
+                                    SADMM_MOST_DIRECT_POINTS = 128]; 0: none; default 0. It costs what the iterations
+                                    leave to do: little where they leave less than 1e-9 m/s, else 0.1 to 0.5 ms a robot
+                                    of ten points on one core, and some 10 ms an island that nothing solves (links deep
+                                    in a table). On CUDA such steps go through the host */
 
     double residual_tolerance;   /* stop when |r_primal|_inf (m/s) and |r_dual|_inf (N s) are both <= this;
                                     0 = never; finite, >= 0; default 0 */
@@ -112,9 +114,9 @@ typedef struct sadmm_settings {
     bool recover_wrenches;       /* compute the contact wrench of every body; default true */
 
     double baumgarte;            /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2. Bodies
-                                    are moved by it and get no velocity that stays (docs/algorithm.md, section 6), but
-                                    in islands with joints, and on CUDA in worlds of more than 8,192 dynamic bodies or
-                                    with kinematic ones */
+                                    are moved by it and get no velocity that stays (docs/internals/algorithm.md,
+                                    "Pushes"), but in islands with joints, and on CUDA in worlds of more than 8,192
+                                    dynamic bodies or with kinematic ones */
     double slop;                 /* penetration left alone, m, in [0, 1]; default 1e-5 */
     double correction_speed;     /* cap of the corrective speed of contacts along their normals, m/s, and of joints
                                     along each coordinate, m/s or rad/s; in [0, 1e3]; default 1 */
@@ -125,7 +127,8 @@ typedef struct sadmm_settings {
                                     their own thickness in a step, do so at the moment of their first touch within the
                                     (sub-)step, so many times each at most; one that would be hit more often is left to
                                     the solve, and so is what rests on something, has joints, or hits a mesh
-                                    (docs/algorithm.md, section 6; CUDA leaves more to it where there are very many). In
+                                    (docs/internals/algorithm.md, "Hits"; CUDA leaves more to it where there are very
+                                    many). In
                                     [0, SADMM_MOST_HITS = 64]; 0: all is; default 16 */
 
     int threads;                 /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have
@@ -143,7 +146,8 @@ typedef struct sadmm_residual {
     double dual;   /* N s (linear) and N m s (angular), |A v - b - J^T lambda| */
 } sadmm_residual;
 
-/* True error of (v, lambda), computed in double from raw data, the same for every backend (docs/algorithm.md). */
+/* True error of (v, lambda), computed in double from raw data, the same for every backend
+ * (docs/internals/algorithm.md). */
 typedef struct sadmm_certificate {
     double ncp_max;          /* natural map, largest over constraints, m/s */
     double ncp_mean;         /* the same, mean over constraints, m/s */

@@ -345,8 +345,9 @@ typedef struct sadmm_step_report {
 SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
 
 /* Contacts are found where the bodies are halfway through the step by their velocities at its start, or where what is
- * fast first touches; impulses, gaps and the certificate are those of that geometry (docs/algorithm.md, section 6).
- * With sub-steps: of the last one, and so are the length of the step and its start. */
+ * fast first touches; impulses, gaps and the certificate are those of that geometry
+ * (docs/internals/contact-geometry.md, "Midpoint and first touch"). With sub-steps: of the last one, and so are the
+ * length of the step and its start. */
 typedef struct sadmm_contact {
     sadmm_body_id body_a, body_b;
     sadmm_shape_id shape_a, shape_b;
@@ -374,9 +375,9 @@ SADMM_API int32_t sadmm_world_contact_count(sadmm_world *world);
 /* Copy contacts [first, first + count) of the last step. Hits taken at their moment (settings.hits) are the last ones, a
  * point each, with a gap of 0 and the impulse of the hit. Errors: INVALID_ARGUMENT (range), OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts);
-/* Of the same contacts the natural map, m/s (docs/algorithm.md, section 5): how far each is from its law. The largest
- * of them and of the joints' is the certificate's ncp_max. Errors: INVALID_ARGUMENT (range), UNAVAILABLE (the last step
- * was made without settings.certify, or the world was restored since), DEVICE. */
+/* Of the same contacts the natural map, m/s (docs/internals/algorithm.md, "Certificate and stop rules"): how far each
+ * is from its law. The largest of them and of the joints' is the certificate's ncp_max. Errors: INVALID_ARGUMENT
+ * (range), UNAVAILABLE (the last step was made without settings.certify, or the world was restored since), DEVICE. */
 SADMM_API sadmm_status sadmm_world_contact_errors(sadmm_world *world, int32_t first, int32_t count, double *errors);
 
 /* 64-bit hash of all live bodies' poses and velocities (bit patterns, in slot order). Nothing is written after an

@@ -235,10 +235,10 @@ def _events(self):
 
 
 def _to_json(self, name=None, description=None, duration=None):
-    """The world as it is now as the text of a scene file (docs/scenes.md), which `subadmm run FILE.json`, scene(path) and
-    scene_from_json(text) read; duration: how long it is meant to be run for, s. Of scenes all three are the scene's own where
-    they are not given, of other worlds 'world', nothing and 10 s. What steps leave for the next ones is not in it: see
-    save()."""
+    """The world as it is now as the text of a scene file (docs/guide/scene-files.md), which `subadmm run FILE.json`,
+    scene(path) and scene_from_json(text) read; duration: how long it is meant to be run for, s. Of scenes all three are
+    the scene's own where they are not given, of other worlds 'world', nothing and 10 s. What steps leave for the next
+    ones is not in it: see save()."""
     return self._to_json(name, description, None if duration is None else real("duration", duration, 0, 1e9))
 
 

@@ -1,4 +1,4 @@
-"""Robots and scenes as scene files, which the subadmm command and other programs read (docs/scenes.md)."""
+"""Robots and scenes as scene files, which the subadmm command and other programs read (docs/guide/scene-files.md)."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Load models and compare them with MuJoCo: a table, as in docs/import.md.
+"""Load models and compare them with MuJoCo: a table.
 
     python check_models.py FOLDER ...        # all MJCF and URDF files under them that MuJoCo compiles by themselves
     python check_models.py --list FOLDER ... # also what was not carried over, model by model

@@ -1,4 +1,4 @@
-"""Certificates of loaded models, as in docs/import.md: python measure_models.py [--precision f32] [NAME ...]
+"""Certificates of loaded models: python measure_models.py [--precision f32] [NAME ...]
 
 Two tables. One step by iterations: natural map (m/s) of the step 1 s after the start, made again from the same state
 with more and more iterations. Runs of 10 s: controls of servos go from one end of their range to the other and back

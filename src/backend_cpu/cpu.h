@@ -1,4 +1,4 @@
-/* The CPU backend: reduced form (docs/algorithm.md) on threads (core/base/parallel.h) and SIMD lanes.
+/* The CPU backend: reduced form (docs/internals/algorithm.md) on threads (core/base/parallel.h) and SIMD lanes.
  *
  * These sources are compiled once per precision (SADMM_REAL) and instruction set (SADMM_VARIANT, SADMM_VECTOR_BYTES);
  * cpu_find.c picks the best table the machine can run.
@@ -23,7 +23,7 @@
  *
  * The method `fast` has one weight B a constraint in place of beta: it comes in through inv_s and C_i (cpu_weights.c),
  * with beta = 1. Its sweeps pass on changes alone: wrench rows hold J^T d lambda, bodies keep their momentum residual b
- * - A v + J^T lambda up to date (docs/algorithm.md), and both go `relaxation` times as far.
+ * - A v + J^T lambda up to date (docs/internals/algorithm.md), and both go `relaxation` times as far.
  */
 #ifndef SADMM_CPU_H
 #define SADMM_CPU_H

@@ -1,6 +1,7 @@
-/* The method `fast` (docs/algorithm.md, section 7) written down plainly: a dense weight B a constraint, C_i = sum J^T B
- * J, and the relaxed iteration in (v, lambda). As the rest of this backend it takes nothing from the fast ones: rows
- * are those of the literal Jacobians, islands are found by passing labels on, inverses by dense factors.
+/* The method `fast` (docs/internals/algorithm.md, "Method fast") written down plainly: a dense weight B a constraint,
+ * C_i = sum J^T B J, and the relaxed iteration in (v, lambda). As the rest of this backend it takes nothing from the
+ * fast ones: rows are those of the literal Jacobians, islands are found by passing labels on, inverses by dense
+ * factors.
  *
  * u = -lambda is kept in the sides, where recover_wrenches reads it. */
 #include <string.h>

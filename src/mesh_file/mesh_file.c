@@ -1,8 +1,8 @@
 /* Mesh files: from bytes to what callers see of them.
  *
- * A reader of its own, since none of the libraries that distributions carry stood up to damaged files (docs/shapes.md
- * has the figures). Each format puts together vertices and faces (parts.h); all that follows is the same for all: faces
- * become triangles, equal vertices one, triangles without area and vertices without a triangle go.
+ * A reader of its own, since none of the libraries that distributions carry stood up to damaged files
+ * (docs/internals/decisions.md). Each format puts together vertices and faces (parts.h); all that follows is the same
+ * for all: faces become triangles, equal vertices one, triangles without area and vertices without a triangle go.
  */
 #include "subadmm/mesh_file.h"
 

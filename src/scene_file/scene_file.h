@@ -1,4 +1,4 @@
-/* Scene files: a world, as it is at its beginning, as JSON text. docs/scenes.md describes the format,
+/* Scene files: a world, as it is at its beginning, as JSON text. docs/guide/scene-files.md describes the format,
  * docs/scene.schema.json defines it.
  *
  * Both sides of the format are here: what the writer writes of a world the reader makes of it again, bit for bit, and

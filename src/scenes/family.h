@@ -6,7 +6,7 @@
 #include "scenes.h"
 
 struct sadmm_scene_family {
-    struct sadmm_scene_info info; /* why a scene takes more than the default iterations: docs/scenes.md */
+    struct sadmm_scene_info info;
     long n_default, n_min, n_max; /* the N of "name:N"; n_max = 0: the scene takes no size */
     long m_default, m_min, m_max; /* the M of "name:N:M"; m_max = 0: it takes no second number */
 

@@ -6,9 +6,9 @@
  * definition (backend, precision, dt, iterations, ...) before the world is built from it. A scene has a number of
  * iterations for each method, and sub-steps for `fast`: sadmm_scene_set_method sets all three.
  *
- * A scene may also come from a file (scene_file/scene_file.h, docs/scenes.md): the world that it is at its beginning,
- * without what a scene of the library does besides, a script and a measure of success. A spec that ends in .json or has
- * a / in it is the path of one.
+ * A scene may also come from a file (scene_file/scene_file.h, docs/guide/scene-files.md): the world that it is at its
+ * beginning, without what a scene of the library does besides, a script and a measure of success. A spec that ends in
+ * .json or has a / in it is the path of one.
  */
 #ifndef SADMM_SCENES_H
 #define SADMM_SCENES_H

@@ -5,7 +5,7 @@ USD, read by usd-core (the extra `usd`).
     robot.world.step(100)
     print(robot.joints["elbow"].position, robot.report)
 
-docs/import.md says what is carried over, and how. What is not is in `report`, element by element.
+docs/guide/importing.md says what is carried over, and how. What is not is in `report`, element by element.
 """
 
 import os

@@ -1,4 +1,5 @@
-/* The CUDA backend: reduced form (docs/algorithm.md), one source for both precisions (SADMM_REAL, SADMM_VARIANT).
+/* The CUDA backend: reduced form (docs/internals/algorithm.md), one source for both precisions (SADMM_REAL,
+ * SADMM_VARIANT).
  *
  * Units of work
  *   - Points of a contact pair share normal, friction and bodies. With r_a, r_b = r_a + (x_a - x_b) a point's relative
@@ -28,8 +29,8 @@
  * The method `fast` has a weight B of its own for each constraint (weight/weights.cu) in place of beta, which is 1
  * then. Its iteration is Steps 2-4 and then Step 1, relaxed (math/relax.h), by instances of its own of the same
  * kernels; slots are by island in every tier, since weights rest on sums over islands. It passes on changes alone:
- * records are J^T d lambda, and bodies keep their momentum residual b - A v + J^T lambda (docs/algorithm.md). It begins
- * with the multipliers: records are not kept.
+ * records are J^T d lambda, and bodies keep their momentum residual b - A v + J^T lambda (docs/internals/algorithm.md).
+ * It begins with the multipliers: records are not kept.
  *
  * Launch sizes follow from what the host knows (capacities, tier); kernels read the true counts from `live`, and do
  * nothing once it says abort_code.

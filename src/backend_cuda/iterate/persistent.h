@@ -171,8 +171,8 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
 
 /* ---- instances ------------------------------------------------------------------------------------------------- */
 
-/* Is there such an instance? Each takes long to compile, and is there for what steps take longer without it
- * (docs/performance.md). Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
+/* Is there such an instance? Each takes long to compile, and is there for what steps take longer without it.
+ * Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
 template <int POINTS, int MODE, int SIZE, bool FAST> constexpr bool exists(void)
 {
     const bool in_double = sizeof(solver_real) == sizeof(double);

@@ -1,4 +1,4 @@
-/* Joints of a world on the device (docs/algorithm.md, section 10): the host's formulas (core/model/joint_law.h,
+/* Joints of a world on the device (docs/internals/algorithm.md, "Joints"): the host's formulas (core/model/joint_law.h,
  * joint_lead.h), in double.
  *
  *   rows      eight lanes a joint, one a coordinate: its laws as raw rows, as the host would make them. A joint has a

@@ -1,4 +1,4 @@
-/* Where joints let bodies go, and what joints remember of it (docs/algorithm.md, section 10). */
+/* Where joints let bodies go, and what joints remember of it (docs/internals/algorithm.md, "Time stepping of rows"). */
 #ifndef SADMM_CUDA_STEP_MOVE_JOINED_H
 #define SADMM_CUDA_STEP_MOVE_JOINED_H
 

@@ -1,4 +1,4 @@
-/* How much restitution an impact may have (docs/algorithm.md, section 6).
+/* How much restitution an impact may have (docs/internals/algorithm.md, "Restitution").
  *
  * Newton's law gives every contact of a pair that hits x_n+ = -epsilon x_n-, with x- the velocity that the step would
  * end with but for contacts and forces. An impact changes the kinetic energy by

@@ -5,8 +5,8 @@
  *
  * is exact for constant forces: gravity, friction that slides, rolling down a slope. But contacts bound v so that gaps
  * are right after x + dt v. Where taking leads back would close a contact of an island beyond that, all of its bodies
- * keep theirs, since those that hold on to each other would slip else; but for bodies that fly (docs/algorithm.md,
- * section 9). Double in every precision. */
+ * keep theirs, since those that hold on to each other would slip else; but for bodies that fly
+ * (docs/internals/algorithm.md, "Positions"). Double in every precision. */
 #ifndef SADMM_MATH_LEAD_H
 #define SADMM_MATH_LEAD_H
 

@@ -1,4 +1,4 @@
-/* The weight of a constraint in the method `fast` (docs/algorithm.md, section 7): the mass it carries.
+/* The weight of a constraint in the method `fast` (docs/internals/algorithm.md, "Method fast"): the mass it carries.
  *
  *     B = min(load / V, m) + phi / w          V^2 = sum g . A^-1 g / m,   g = J^T lambda, over the bodies of an island
  *

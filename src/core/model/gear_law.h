@@ -1,5 +1,5 @@
-/* A gear in a (sub-)step: one hard row, the sum of two coordinates' rows (docs/algorithm.md, section 10), for a host
- * that makes steps and a device that does. In double.
+/* A gear in a (sub-)step: one hard row, the sum of two coordinates' rows (docs/internals/algorithm.md, "Gears and
+ * couplings"), for a host that makes steps and a device that does. In double.
  *
  * Where a dynamic body carries the axles of both joints, that sum is a row on three bodies, and rows are on two. But
  * the joints' locked rows may be added to it, each as often as one likes: they hold anyway, and so does their sum with it.

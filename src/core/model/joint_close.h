@@ -1,6 +1,7 @@
-/* What is locked, closed at the end of a step (docs/algorithm.md, section 10): the errors that turning bodies leave joints
- * with are of third order in the step, and where bodies turn by much of a radian in one they are a good part of a link.
- * Bodies are then moved by the least displacement, weighed by the step's inertia, that takes the errors away. In double. */
+/* What is locked, closed at the end of a step (docs/internals/algorithm.md, "Closing"): the errors that turning bodies
+ * leave joints with are of third order in the step, and where bodies turn by much of a radian in one they are a good
+ * part of a link. Bodies are then moved by the least displacement, weighed by the step's inertia, that takes the errors
+ * away. In double. */
 #ifndef SADMM_CORE_MODEL_JOINT_CLOSE_H
 #define SADMM_CORE_MODEL_JOINT_CLOSE_H
 

@@ -1,6 +1,7 @@
-/* A joint's laws in a step: its definition and its bodies as scalar rows (math/row.h; docs/algorithm.md, section 10).
- * Jacobians where the bodies are halfway through the step by their velocities at its start, laws from the errors at its
- * start. Coordinates are independent of each other, so that a lane of a device may take one. In double. */
+/* A joint's laws in a step: its definition and its bodies as scalar rows (math/row.h; docs/internals/algorithm.md,
+ * "Joints"). Jacobians where the bodies are halfway through the step by their velocities at its start, laws from the
+ * errors at its start. Coordinates are independent of each other, so that a lane of a device may take one. In
+ * double. */
 #ifndef SADMM_CORE_MODEL_JOINT_LAW_H
 #define SADMM_CORE_MODEL_JOINT_LAW_H
 
@@ -277,7 +278,7 @@ SADMM_INLINE void joint_add_law(struct joint_laws *laws, const struct joint_movi
 
 /* Half a step resolves turning by up to this many rad. Beyond it positions that move by means of velocities gain energy:
  * what turns by an angle t in half a step, with a share s of its speed in points that are off its axis, gains as
- * (s t^2)^2 (docs/algorithm.md, section 10). */
+ * (s t^2)^2 (docs/internals/algorithm.md, "Large turns"). */
 #define JOINT_MOST_TURN 0.05
 /* What rounding makes of speeds is no turning. */
 #define JOINT_NO_TURN 1e-9

@@ -1,6 +1,6 @@
-/* Where joints let bodies go (docs/algorithm.md, section 10): all bodies of an island with joints move by the mean of
- * their velocities before and after the step, or all by those after it (math/lead.h), or they would come apart. In
- * double. */
+/* Where joints let bodies go (docs/internals/algorithm.md, "Time stepping of rows"): all bodies of an island with
+ * joints move by the mean of their velocities before and after the step, or all by those after it (math/lead.h), or
+ * they would come apart. In double. */
 #ifndef SADMM_CORE_MODEL_JOINT_LEAD_H
 #define SADMM_CORE_MODEL_JOINT_LEAD_H
 

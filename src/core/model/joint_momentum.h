@@ -1,11 +1,12 @@
-/* Momentum and energy of islands with joints (docs/algorithm.md, section 8). Iterations that are cut short miss some of
- * the momentum, weights of the direct solve hold on to more, and bodies that keep their leads go other ways than impulses
- * between them were made for. So it is restored once all of that is known: velocities at the end of the step change by a
- * rigid motion of the whole island about where its bodies are then, which no joint feels and no contact between them.
- * What it should be follows from b, what bodies are halfway, and the impulses' places there: of static contacts, and of
- * rows of joints with what does not move by itself. Where leads stay, an island in the air is moved as a whole to where
- * its centre of mass gets to by the mean of its velocities: a weight halfway would turn it about any other point. And
- * where rows turn by more than a step resolves it is left with no more energy than in free motion. In double. */
+/* Momentum and energy of islands with joints (docs/internals/algorithm.md, "Momentum"). Iterations that are cut short
+ * miss some of the momentum, weights of the direct solve hold on to more, and bodies that keep their leads go other
+ * ways than impulses between them were made for. So it is restored once all of that is known: velocities at the end of
+ * the step change by a rigid motion of the whole island about where its bodies are then, which no joint feels and no
+ * contact between them. What it should be follows from b, what bodies are halfway, and the impulses' places there: of
+ * static contacts, and of rows of joints with what does not move by itself. Where leads stay, an island in the air is
+ * moved as a whole to where its centre of mass gets to by the mean of its velocities: a weight halfway would turn it
+ * about any other point. And where rows turn by more than a step resolves it is left with no more energy than in free
+ * motion. In double. */
 #ifndef SADMM_CORE_MODEL_JOINT_MOMENTUM_H
 #define SADMM_CORE_MODEL_JOINT_MOMENTUM_H
 

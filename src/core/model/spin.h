@@ -1,8 +1,8 @@
-/* How a step turns a body (docs/algorithm.md, sections 6 and 9): half a step of motion without torque, then everything
- * that acts on it, then half a step without torque again. A and b of eq. (1), rows of joints and the solution are those
- * of the orientation halfway: torques change the angular momentum in space by dt times themselves, what is between keeps
- * it, and no gyroscopic term is left. Where all principal moments are equal, spin and A do not depend on the orientation,
- * and it is turned at the end, by one velocity. In double. */
+/* How a step turns a body (docs/internals/algorithm.md, "Turning"): half a step of motion without torque, then
+ * everything that acts on it, then half a step without torque again. A and b of eq. (1), rows of joints and the
+ * solution are those of the orientation halfway: torques change the angular momentum in space by dt times themselves,
+ * what is between keeps it, and no gyroscopic term is left. Where all principal moments are equal, spin and A do not
+ * depend on the orientation, and it is turned at the end, by one velocity. In double. */
 #ifndef SADMM_CORE_MODEL_SPIN_H
 #define SADMM_CORE_MODEL_SPIN_H
 

@@ -1,5 +1,6 @@
-/* Geometric stiffness of jointed bodies (docs/algorithm.md, section 10): a force F that a joint gives a body at the arm r
- * makes the torque r x F, which changes as the body turns: by -K d for a turn d, with the symmetric
+/* Geometric stiffness of jointed bodies (docs/internals/algorithm.md, "Geometric stiffness"): a force F that a joint
+ * gives a body at the arm r makes the torque r x F, which changes as the body turns: by -K d for a turn d, with the
+ * symmetric
  *
  *     K = (F . r) (1 - r r^T / |r|^2)
  *

@@ -168,7 +168,7 @@ static void find_impulses(const struct solving *s)
 /* ---- before and after the iterations ----------------------------------------------------------------------------- */
 
 /* What the momentum misses is the contacts' to mend in the paper's method: its velocity is not the one that goes with
- * the impulses (docs/algorithm.md, section 6), and rows alone would have to carry the difference. */
+ * the impulses (docs/internals/algorithm.md, "Positions"), and rows alone would have to carry the difference. */
 static void leave_to_contacts(const struct joined_view *v)
 {
     memset(v->missing, 0, 6 * (size_t)v->s.bodies * sizeof *v->missing);

@@ -3,8 +3,8 @@
  * Core owns the schedule (schedule.c) and never knows which backend runs. A context holds everything a backend
  * keeps; there is no global state. Every entry returns a status and leaves its message in `error`.
  *
- * State of the iteration (docs/algorithm.md): v per body, lambda per constraint, and what the next Step 1 needs.
- * Between init_penalty and read_solution the schedule is
+ * State of the iteration (docs/internals/algorithm.md): v per body, lambda per constraint, and what the next Step 1
+ * needs. Between init_penalty and read_solution the schedule is
  *
  *     repeat: update_velocity; update_constraints(measure)      or, fused: iterate(count, measure)
  *     after a measured iteration: measure_residuals; then update_penalty(ratio); factorize

@@ -54,8 +54,7 @@ sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info
     return SADMM_OK;
 }
 
-/* From this many contacts on a step on the GPU is the shorter one (docs/performance.md: 484 contacts, 0.12 against 0.17
- * ms). */
+/* From this many contacts on a step on the GPU is the shorter one. */
 enum { AUTO_CUDA_CONTACTS = 500 };
 
 sadmm_status sadmm_backend_choose(sadmm_backend wanted, sadmm_precision precision, int64_t expected_contacts,

@@ -1,5 +1,5 @@
-/* Joints as constraint rows (docs/algorithm.md, section 10): their laws (core/model/joint_law.h) into the step's rows,
- * multipliers from the forces of the last step, and the solution's back into what joints keep. */
+/* Joints as constraint rows (docs/internals/algorithm.md, "Joints"): their laws (core/model/joint_law.h) into the
+ * step's rows, multipliers from the forces of the last step, and the solution's back into what joints keep. */
 #include <string.h>
 
 #include "core/base/memory.h"

@@ -1,4 +1,4 @@
-"""USD stages with UsdPhysics schemas as worlds, read by usd-core. docs/import.md says what is carried over."""
+"""USD stages with UsdPhysics schemas as worlds, read by usd-core. docs/guide/importing.md says what is carried over."""
 
 from .bodies import add_bodies
 from .filters import Filters
