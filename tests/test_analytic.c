@@ -1,8 +1,8 @@
 /* Motions with a known answer, by both methods, in double and in single precision: on every CPU backend here, on CUDA
  * in test_cuda_analytic.c (ANALYTIC_ON_CUDA), which includes this file.
  *
- * Under a constant acceleration velocities and positions are exact (core/math/lead.h): only rounding and the solver's
- * error remain. What happens within a step (a stop, a landing) is known to the length of the step.
+ * Under a constant acceleration velocities and positions are exact (core/math/trapezoid.h): only rounding and the
+ * solver's error remain. What happens within a step (a stop, a landing) is known to the length of the step.
  *
  * One file: the tests share `solvers` and their worlds, and test_cuda_analytic.c includes them as a whole.
  */
@@ -289,8 +289,9 @@ END_TEST
 /* ---- where contacts end a motion: positions keep to the gap ---------------------------------------------------- */
 
 /* Thrown up at a ceiling, then down on a floor, within a step and with every phase of it: never deeper than the share
- * of the slop that taking back a lead may close (math/lead.h) and what single precision rounds a speed of 3 m/s by. */
-START_TEST(what_flies_does_not_overlap_what_it_hits)
+ * of the slop that the trapezoid correction may close (math/trapezoid.h) and what single precision rounds a speed of 3
+ * m/s by. */
+START_TEST(airborne_bodies_do_not_overlap_what_they_hit)
 {
     const double dt = 0.005, none[3] = {0};
     for (int phase = 0; phase < 8; ++phase) {
@@ -633,7 +634,7 @@ int main(void)
     tcase_add_loop_test(slope, a_block_stops_where_coulomb_says, 0, end);
     tcase_add_loop_test(flight, free_fall, 0, end);
     tcase_add_loop_test(flight, constant_force_and_torque, 0, end);
-    tcase_add_loop_test(flight, what_flies_does_not_overlap_what_it_hits, 0, end);
+    tcase_add_loop_test(flight, airborne_bodies_do_not_overlap_what_they_hit, 0, end);
     tcase_add_loop_test(flight, a_stack_slides_as_one, 0, end);
 #ifndef ANALYTIC_ON_CUDA
     tcase_add_loop_test(flight, a_plate_at_a_thousand_rad_s_keeps_energy_and_momentum, 0, SOLVERS);

@@ -195,7 +195,7 @@ START_TEST(bodies_of_different_forces_stay_together)
 }
 END_TEST
 
-/* Bodies that touch in the air have gravity's share of a lead in common (docs/internals/algorithm.md, "Positions"),
+/* Airborne bodies that touch have gravity's trapezoid correction in common (docs/internals/algorithm.md, "Positions"),
  * unless gravity is not what they have in common: weightless ones go by v t, damped ones by what damping leaves of
  * it. */
 START_TEST(bodies_that_touch_in_the_air_go_their_way)
@@ -218,7 +218,7 @@ START_TEST(bodies_that_touch_in_the_air_go_their_way)
     for (int k = 0; k < 4; ++k) {
         const double z = body_state(world, id[k]).position[2] - (k % 2 ? 0.2 : 0);
         if (k < 2) expect_near(z, v * t, rounding(_i, STEPS, v) + 1e-9, "weightless");
-        else expect_near(z, -v * expm1(-c * t) / c, c * dt * v * t, "damped"); /* leads stay: of first order */
+        else expect_near(z, -v * expm1(-c * t) / c, c * dt * v * t, "damped"); /* no correction: of first order */
     }
     sadmm_world_destroy(world);
 }

@@ -1,6 +1,6 @@
 /* Chains whose links a step does not resolve, on the device (core/model/stiffening.h, joint_close.h): steps that it makes
  * alone against the same kernels driven by the host, to the last bit on the emulated device; and against the CPU. */
-#include "core/model/joint_lead.h"
+#include "core/model/joint_trapezoid.h"
 #include "cuda_worlds.h"
 #include "fewer.h"
 

@@ -286,8 +286,9 @@ START_TEST(many_shapes)
 }
 END_TEST
 
-/* A heap that tumbles: islands in the air, on edges and on the floor, whose bodies keep their leads or do not, in more
- * blocks than one. Against the host's steps, and, on the emulated device, in either order of blocks and threads. */
+/* A heap that tumbles: islands in the air, on edges and on the floor, whose bodies take the trapezoid correction or do
+ * not, in more blocks than one. Against the host's steps, and, on the emulated device, in either order of blocks and
+ * threads. */
 START_TEST(heaps_equal_those_by_host)
 {
     enum { BODIES = 64, WORLDS = EMULATED ? 3 : 2 };

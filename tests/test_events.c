@@ -316,20 +316,20 @@ START_TEST(who_is_seen)
     sadmm_world *world = bodies_world(&def, _i);
     const sadmm_body_id still = add_still(world, SADMM_BODY_STATIC, 0, 0, 0),
                         wall = add_still(world, SADMM_BODY_STATIC, 0, 0, 0),
-                        driven = add_still(world, SADMM_BODY_KINEMATIC, 0, 0, 0),
+                        kinematic = add_still(world, SADMM_BODY_KINEMATIC, 0, 0, 0),
                         a = add_still(world, SADMM_BODY_DYNAMIC, 0, 0, 0), b = add_still(world, SADMM_BODY_DYNAMIC, 0, 0, 0);
     const sadmm_shape_id eye = give(world, still, SADMM_SHAPE_SPHERE, 1, true),
                          moving_eye = give(world, a, SADMM_SHAPE_BOX, 1, true);
     const sadmm_shape_id of_still = give(world, still, SADMM_SHAPE_SPHERE, 1, false),
                          of_wall = give(world, wall, SADMM_SHAPE_SPHERE, 1, false),
-                         of_driven = give(world, driven, SADMM_SHAPE_SPHERE, 1, false),
+                         of_kinematic = give(world, kinematic, SADMM_SHAPE_SPHERE, 1, false),
                          of_a = give(world, a, SADMM_SHAPE_SPHERE, 1, false),
                          of_b = give(world, b, SADMM_SHAPE_SPHERE, 1, false);
     sadmm_shape_id s[8];
     ck_assert_int_eq(seen_by(world, eye, s), 3); /* what moves */
-    ck_assert(s[0].slot == of_driven.slot && s[1].slot == of_a.slot && s[2].slot == of_b.slot);
+    ck_assert(s[0].slot == of_kinematic.slot && s[1].slot == of_a.slot && s[2].slot == of_b.slot);
     ck_assert_int_eq(seen_by(world, moving_eye, s), 4); /* all but its own */
-    ck_assert(s[0].slot == of_still.slot && s[1].slot == of_wall.slot && s[2].slot == of_driven.slot &&
+    ck_assert(s[0].slot == of_still.slot && s[1].slot == of_wall.slot && s[2].slot == of_kinematic.slot &&
               s[3].slot == of_b.slot);
     /* Bodies that do not meet. */
     MUST(world, sadmm_world_set_body_pair_contact(world, still, a, false));

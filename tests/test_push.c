@@ -205,8 +205,9 @@ static void come_up(int solver, sadmm_method method, double depth, double dt, bo
         step_world(world, 1);
         const double ground = lift ? body_state(world, floor).position[2] + 1 : 0,
                      below = half + ground - body_state(world, id).position[2];
-        /* At the rate of the settings, to 1 % of the overlap, since iterations end; where velocities have it, half of
-         * what they change by from step to step is taken back (math/lead.h), and it may be a little faster. */
+        /* At the rate of the settings, to 1 % of the overlap, since iterations end; where velocities have it, the
+         * trapezoid correction takes back half of what they change by from step to step (math/trapezoid.h), and it may
+         * be a little faster. */
         const double left = left_after(depth, k + 1, dt), within = 0.01 * depth + slop;
         ck_assert_msg(below < left + within && below > 0.9 * left_after(depth, k + 2, dt) - within,
                       "%g m deep after %d steps, wanted %g", below, k + 1, left);

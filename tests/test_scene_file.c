@@ -298,14 +298,14 @@ static sadmm_world *world_with_everything(struct sadmm_scene *scene)
     for (int k = 11; k >= 0; --k) shapes[k] = add_shape(world, balls[k], types[k % 6], 0.2, &state);
     add_shape(world, balls[5], SADMM_SHAPE_BOX, 0.1, &state);
     add_hulls(world, balls[3], &state);
-    sadmm_body_def driven = sadmm_body_def_default();
-    driven.type = SADMM_BODY_KINEMATIC;
-    driven.angular_velocity[1] = 0.3;
-    driven.position[1] = 20;
+    sadmm_body_def kinematic = sadmm_body_def_default();
+    kinematic.type = SADMM_BODY_KINEMATIC;
+    kinematic.angular_velocity[1] = 0.3;
+    kinematic.position[1] = 20;
     sadmm_body_id belt;
-    MUST(world, sadmm_world_add_body(world, &driven, &belt)); /* in the first slot */
-    any_turn(&state, driven.orientation);
-    MUST(world, sadmm_world_move_body(world, belt, force, driven.orientation));
+    MUST(world, sadmm_world_add_body(world, &kinematic, &belt)); /* in the first slot */
+    any_turn(&state, kinematic.orientation);
+    MUST(world, sadmm_world_move_body(world, belt, force, kinematic.orientation));
     add_shape(world, belt, SADMM_SHAPE_BOX, 0.4, &state);
     MUST(world, sadmm_world_set_body_wrench(world, balls[1], force, torque));
     MUST(world, sadmm_world_set_body_gravity_scale(world, balls[2], -0.5));

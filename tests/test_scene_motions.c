@@ -1,5 +1,5 @@
 /* Scenes whose motion has a known answer are held to it, at their own settings or with shorter steps. Constant
- * accelerations move bodies exactly (core/math/lead.h). */
+ * accelerations move bodies exactly (core/math/trapezoid.h). */
 #include "core/math/rigid.h"
 #include "run_suite.h"
 #include "scene_tools.h"

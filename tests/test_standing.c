@@ -25,8 +25,8 @@ START_TEST(stands)
 END_TEST
 
 /* Five iterations of `paper` leave contacts that are springs, and bodies sway on them. They come to rest, since what
- * rests keeps its lead (core/math/lead.h): with leads taken back they sway at 5e-3 m/s, a tenth of g dt, for good. The
- * limit is a 500th of that, and 200 times what is left after these 2 s. */
+ * rests takes no trapezoid correction (core/math/trapezoid.h): with it they sway at 5e-3 m/s, a tenth of g dt, for
+ * good. The limit is a 500th of that, and 200 times what is left after these 2 s. */
 START_TEST(what_sways_comes_to_rest)
 {
     struct sadmm_scene scene = open_scene("oblique_stacks:1");

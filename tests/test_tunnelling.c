@@ -12,8 +12,8 @@ static const int forms[] = {
 START_TEST(drops_stay_on_their_side) { drop_worlds(forms[_i], 1, 1); }
 END_TEST
 
-/* What single drops ask for: leads of bodies that nothing presses on (core/math/lead.h), the middle of a cone whose tip
- * is behind a surface, the ball in one that rocks. */
+/* What single drops ask for: trapezoid corrections of bodies that nothing presses on (core/math/trapezoid.h), the
+ * middle of a cone whose tip is behind a surface, the ball in one that rocks. */
 START_TEST(these_drops_stay_on_their_side)
 {
     static const struct drop_case cases[] = {

@@ -289,12 +289,12 @@ START_TEST(what_was_set_is_told)
     const double force[3] = {1, -2, 1.0 / 3}, torque[3] = {0, 0, 7}, there[3] = {0, 3, 1}, turned[4] = {0.6, 0, 0.8, 0};
     sadmm_body_id ground, ball, belt, a, b;
     sadmm_world *world = ground_and_ball(SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
-    sadmm_body_def driven = sadmm_body_def_default();
+    sadmm_body_def kinematic = sadmm_body_def_default();
     sadmm_shape_id shapes[2], first, second;
     double x[3], y[4], friction;
     bool pending;
-    driven.type = SADMM_BODY_KINEMATIC;
-    MUST(world, sadmm_world_add_body(world, &driven, &belt));
+    kinematic.type = SADMM_BODY_KINEMATIC;
+    MUST(world, sadmm_world_add_body(world, &kinematic, &belt));
     MUST(world, sadmm_world_set_body_wrench(world, ball, force, torque));
     MUST(world, sadmm_world_add_body_force_at(world, ball, force, body_def(world, ball).position));
     MUST(world, sadmm_world_body_wrench(world, ball, x, y));

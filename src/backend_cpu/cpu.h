@@ -135,15 +135,15 @@ struct sadmm_context {
     struct sadmm_barrier barrier;
 
     /* Bodies; index `bodies` is the static world: state and 1/beta 0, never written. Rows are padded to whole
-     * blocks. Where there are driven bodies a row a pair record follows, from `driven_row` on: the driven body's motion
-     * about the centre of mass of the other one, whose arms the pair has (sadmm_driven_motion). */
+     * blocks. Where there are kinematic bodies a row a pair record follows, from `kinematic_row` on: the kinematic
+     * body's motion about the centre of mass of the other one, whose arms the pair has (sadmm_kinematic_motion). */
     int32_t bodies;
-    size_t body_block_count, driven_row;
-    real *state;                     /* rows: v, w, 1/beta, 0 */
-    double *A, *C;                   /* bodies x PACKED6 */
-    double *beta;                    /* bodies, kg */
-    struct sadmm_lead *leads;        /* of bodies with a state, at the end of a step; the static world's is 0 */
-    struct body_block *body_blocks;  /* unless all bodies are general */
+    size_t body_block_count, kinematic_row;
+    real *state;                        /* rows: v, w, 1/beta, 0 */
+    double *A, *C;                      /* bodies x PACKED6 */
+    double *beta;                       /* bodies, kg */
+    struct sadmm_trapezoid *trapezoids; /* of bodies with a state, at the end of a step; the static world's is 0 */
+    struct body_block *body_blocks;     /* unless all bodies are general */
     /* Of each body its index among the general ones or -1; the general ones, ascending. Of each body block which lanes
      * are general (bits); where there are some, those behind the last body, too. */
     size_t general_count;
@@ -152,7 +152,7 @@ struct sadmm_context {
     real *b, *A_columns, *H_columns; /* of general bodies: rows; 6 rows (columns of A, of (A + beta C)^-1) a body */
     real *momentum_residuals;                   /* and rows, fast */
     size_t general_of_capacity, general_body_capacity, general_lane_capacity;
-    size_t state_capacity, A_capacity, C_capacity, beta_capacity, lead_capacity, body_block_capacity, b_capacity,
+    size_t state_capacity, A_capacity, C_capacity, beta_capacity, trapezoid_capacity, body_block_capacity, b_capacity,
         A_column_capacity, H_column_capacity, momentum_residual_capacity;
 
     /* Geometric contacts */
@@ -185,7 +185,7 @@ struct sadmm_context {
 
     /* Islands; without constraints and limits of worlds in the method `paper`: none */
     int32_t *label;             /* bodies: the smallest body of its island */
-    _Atomic int32_t *touch;     /* bodies: bits (math/lead.h), of the body and, at labels, of the island */
+    _Atomic int32_t *touch;     /* bodies: bits (math/trapezoid.h), of the body and, at labels, of the island */
     int32_t *loose_of;          /* bodies, used at labels: index in `loose`, negative: held */
     struct cpu_loose *loose;
     int32_t *loose_bodies, *loose_pairs; /* by island, ascending; of pairs the static ones */

@@ -81,7 +81,7 @@ static void assemble_body_share(void *context, int thread, int threads)
     for (size_t first = begin; first < end; first += LANES) {
         const size_t count = end - first < (size_t)LANES ? end - first : (size_t)LANES;
         double b[6 * LANES], *A = &c->A[first * PACKED6];
-        sadmm_body_terms(c->system, &c->settings, first, count, A, b, c->leads);
+        sadmm_body_terms(c->system, &c->settings, first, count, A, b, c->trapezoids);
         for (size_t l = 0; l < count; ++l) assemble_body(c, first + l, A + PACKED6 * l, b + 6 * l);
     }
 }
@@ -100,10 +100,10 @@ static const real EMPTY_ERROR = (real)1e9;
 /* Row of a pair's body in `state`; `at`: the pair's record. */
 static int32_t row_of(struct sadmm_context *c, const struct sadmm_contact_pair *pair, int32_t body, size_t at)
 {
-    const size_t row = c->driven_row + at;
+    const size_t row = c->kinematic_row + at;
     double motion[6];
-    if (!sadmm_body_is_driven(body)) return cpu_body(c, body);
-    sadmm_driven_motion(c->system, pair, motion);
+    if (!sadmm_body_is_kinematic(body)) return cpu_body(c, body);
+    sadmm_kinematic_motion(c->system, pair, motion);
     for (int k = 0; k < ROW; ++k) c->state[row * ROW + (size_t)k] = k < 6 ? (real)motion[k] : 0;
     return (int32_t)row;
 }

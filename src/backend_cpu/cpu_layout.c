@@ -104,13 +104,14 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
     c->body_block_count = (n + LANES - 1) / LANES;
     if (!CPU(find_forms)(c)) return sadmm_fail_memory(error, "the cpu backend's bodies");
     size_t rows = c->body_block_count * (size_t)LANES + 1, general = c->general_count;
-    c->driven_row = rows;
-    if (system->driven_count > 0) rows += c->pair_block_count * (size_t)LANES;
+    c->kinematic_row = rows;
+    if (system->kinematic_count > 0) rows += c->pair_block_count * (size_t)LANES;
     bool ok = sadmm_grow_empty(&c->state, &c->state_capacity, rows * ROW, sizeof(real)) &&
               sadmm_grow_empty(&c->A, &c->A_capacity, n * PACKED6, sizeof(double)) &&
               sadmm_grow_empty(&c->C, &c->C_capacity, n * PACKED6, sizeof(double)) &&
               sadmm_grow_empty(&c->beta, &c->beta_capacity, n, sizeof(double)) &&
-              sadmm_grow_empty(&c->leads, &c->lead_capacity, plan->rigid ? n + 1 : 0, sizeof *c->leads) &&
+              sadmm_grow_empty(&c->trapezoids, &c->trapezoid_capacity, plan->rigid ? n + 1 : 0,
+                               sizeof *c->trapezoids) &&
               sadmm_grow_empty(&c->body_blocks, &c->body_block_capacity, general < n ? c->body_block_count : 0,
                    sizeof *c->body_blocks) &&
               sadmm_grow_empty(&c->b, &c->b_capacity, general * ROW, sizeof(real)) &&

@@ -75,13 +75,13 @@ static bool any_suspect(struct sadmm_context *c, bool bounces)
         struct cpu_island *island = &c->islands[c->label[c->loose_bodies[c->loose[k].first_body]]];
         limit_take_rigid(&island->limit, &island->along, &rigid);
     }
-    for (size_t p = 0; c->system->driven_count > 0 && p < c->system->contacts->pair_count; ++p) {
+    for (size_t p = 0; c->system->kinematic_count > 0 && p < c->system->contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[p];
-        if (sadmm_pair_gives_energy(c->system, pair)) cpu_island_of(c, pair->body_a, pair->body_b)->limit.driven = 1;
+        if (sadmm_pair_gives_energy(c->system, pair)) cpu_island_of(c, pair->body_a, pair->body_b)->limit.kinematic = 1;
     }
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[i];
-        if (c->label[i] != i || island->rows || island->limit.driven) continue;
+        if (c->label[i] != i || island->rows || island->limit.kinematic) continue;
         if (limit_is_rounding(&island->limit, (double)SADMM_EPSILON)) continue;
         any = any || limit_suspects(island->limit.now, island->limit.free) ||
               (bounces &&

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "core/math/array3.h"
-#include "core/math/lead.h"
+#include "core/math/trapezoid.h"
 #include "core/model/rolling.h"
 #include "core/model/system_terms.h"
 #include "cpu_rows.h"
@@ -69,38 +69,41 @@ static void add_bits(_Atomic int32_t *to, int bits, bool alone)
 /* Bits of a body so far; what becomes of the static world is of no interest. */
 static int bits_of_body(const struct sadmm_context *c, int32_t body)
 {
-    return body >= 0 ? atomic_load_explicit(&c->touch[body], memory_order_relaxed) : TOUCH_CARRIED | TOUCH_MOVED;
+    return body >= 0 ? atomic_load_explicit(&c->touch[body], memory_order_relaxed) : TOUCH_SUPPORTED | TOUCH_MOVED;
 }
 
-/* Nothing more can be learned of leads. */
-static bool way_is_known(const struct lead_touch *touch)
+/* All is known that decides on the trapezoid correction. */
+static bool way_is_known(const struct trapezoid_touch *touch)
 {
-    return touch->island & TOUCH_JOLT && touch->body[0] & touch->body[1] & TOUCH_CARRIED;
+    return touch->island & TOUCH_PENETRATES && touch->body[0] & touch->body[1] & TOUCH_SUPPORTED;
 }
 
-/* What a pair's points touch (math/lead.h), and what other pairs have found of that so far: bits that are known are not
- * looked for again. */
-static struct lead_touch touch_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int32_t label)
+/* What a pair's points touch (math/trapezoid.h), and what other pairs have found of that so far: bits that are known
+ * are not looked for again. */
+static struct trapezoid_touch touch_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair,
+                                       int32_t label)
 {
     static const double still[6];
     const double dt = c->settings.dt, slop = c->settings.slop, *n = pair->normal;
-    const struct sadmm_lead *a = &c->leads[cpu_body(c, pair->body_a)], *b = &c->leads[cpu_body(c, pair->body_b)];
+    const struct sadmm_trapezoid *a = &c->trapezoids[cpu_body(c, pair->body_a)],
+                                 *b = &c->trapezoids[cpu_body(c, pair->body_b)];
     const double rest[2] = {a->rest, b->rest};
-    struct lead_touch touch = {atomic_load_explicit(&c->touch[label], memory_order_relaxed),
-                               {bits_of_body(c, pair->body_a), bits_of_body(c, pair->body_b)}};
+    struct trapezoid_touch touch = {atomic_load_explicit(&c->touch[label], memory_order_relaxed),
+                                    {bits_of_body(c, pair->body_a), bits_of_body(c, pair->body_b)}};
     touch.island |= pair->body_a >= 0 && pair->body_b >= 0 ? TOUCH_INNER
                     : pair->friction > 0                   ? TOUCH_FRICTION
                                                            : TOUCH_SMOOTH;
     touch.island |= a->touch | b->touch;
-    if (sadmm_pair_is_driven(c->system, pair)) touch.island |= TOUCH_JOLT;
+    if (sadmm_pair_is_kinematic(c->system, pair)) touch.island |= TOUCH_PENETRATES;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[k];
         const double *arm_a = point->arm_a, *arm_b = point->arm_b;
-        const double size[2] = {lead_size_at(a->linear, a->angular, arm_a), lead_size_at(b->linear, b->angular, arm_b)};
-        const double moves[2] = {lead_size_at(a->moves_linear, a->moves_angular, arm_a),
-                                 lead_size_at(b->moves_linear, b->moves_angular, arm_b)};
-        lead_add_push(&touch, dot3(n, point->impulse), moves, rest);
-        if (lead_is_still(size, dt, slop)) continue;
+        const double size[2] = {trapezoid_size_at(a->linear, a->angular, arm_a),
+                                trapezoid_size_at(b->linear, b->angular, arm_b)};
+        const double moves[2] = {trapezoid_size_at(a->moves_linear, a->moves_angular, arm_a),
+                                 trapezoid_size_at(b->moves_linear, b->moves_angular, arm_b)};
+        trapezoid_add_push(&touch, dot3(n, point->impulse), moves, rest);
+        if (trapezoid_is_still(size, dt, slop)) continue;
         if (way_is_known(&touch)) {
             if (touch.body[0] & touch.body[1] & TOUCH_MOVED) break;
             continue;
@@ -109,10 +112,11 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
                      *v_b = pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still;
         const struct rolling_halfway at = rolling_halfway_of(
             n, point, sadmm_migration_of(c->system->contacts->points, c->system->contacts->migrations, k));
-        const double leads[2] = {-lead_along(at.normal, a->lead, at.arm_a), lead_along(at.normal, b->lead, at.arm_b)};
-        const double speed = lead_along(at.normal, v_b, at.arm_b) - lead_along(at.normal, v_a, at.arm_a);
-        const struct lead_gap gap = {point->gap, speed, {size3(arm_a), size3(arm_b)}, point->migrates};
-        lead_add_way(&touch, gap, leads, size, dt, slop);
+        const double corrections[2] = {-trapezoid_along(at.normal, a->correction, at.arm_a),
+                                       trapezoid_along(at.normal, b->correction, at.arm_b)};
+        const double speed = trapezoid_along(at.normal, v_b, at.arm_b) - trapezoid_along(at.normal, v_a, at.arm_a);
+        const struct trapezoid_gap gap = {point->gap, speed, {size3(arm_a), size3(arm_b)}, point->migrates};
+        trapezoid_add_way(&touch, gap, corrections, size, dt, slop);
     }
     return touch;
 }
@@ -121,21 +125,21 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
 static void touch_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair, bool alone)
 {
     const int32_t label = c->label[pair->body_a >= 0 ? pair->body_a : pair->body_b];
-    const struct lead_touch touch = touch_of(c, pair, label);
+    const struct trapezoid_touch touch = touch_of(c, pair, label);
     add_bits(&c->touch[label], touch.island, alone);
     if (pair->body_a >= 0) add_bits(&c->touch[pair->body_a], touch.body[0], alone);
     if (pair->body_b >= 0) add_bits(&c->touch[pair->body_b], touch.body[1], alone);
 }
 
-/* In place of a body's lead what it takes back. */
-static void choose_lead(const struct sadmm_context *c, size_t i, struct sadmm_lead *lead)
+/* The correction that the body takes, in place of its own. */
+static void choose_trapezoid(const struct sadmm_context *c, size_t i, struct sadmm_trapezoid *trapezoid)
 {
-    lead->kind = lead_kind_of(atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
-                              atomic_load_explicit(&c->touch[i], memory_order_relaxed));
-    switch (lead->kind) {
-    case LEAD_STAYS: memset(lead->lead, 0, sizeof lead->lead); break;
-    case LEAD_SHARED: lead_shared(c->settings.gravity, c->settings.dt, lead->lead); break;
-    case LEAD_OWN: break;
+    trapezoid->kind = trapezoid_kind_of(atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
+                                        atomic_load_explicit(&c->touch[i], memory_order_relaxed));
+    switch (trapezoid->kind) {
+    case TRAPEZOID_OFF: memset(trapezoid->correction, 0, sizeof trapezoid->correction); break;
+    case TRAPEZOID_SHARED: trapezoid_shared(c->settings.gravity, c->settings.dt, trapezoid->correction); break;
+    case TRAPEZOID_OWN: break;
     }
 }
 
@@ -152,23 +156,23 @@ static void integrate_share(void *argument, int thread, int threads)
     const double *velocity = c->system->velocity;
     size_t first, past, begin, end;
     cpu_share_bodies(c, thread, threads, &first, &past);
-    sadmm_find_leads(past - first, bodies + first, velocity + 6 * first, &c->settings, c->leads + first);
+    sadmm_find_trapezoids(past - first, bodies + first, velocity + 6 * first, &c->settings, c->trapezoids + first);
     if (c->plan.momentum) {
         for (size_t i = first; i < past; ++i) atomic_store_explicit(&c->touch[i], 0, memory_order_relaxed);
         sadmm_barrier_wait(&c->barrier, threads);
         sadmm_share(c->system->contacts->pair_count, thread, threads, &begin, &end);
         for (size_t p = begin; p < end; ++p) touch_pair(c, &c->system->contacts->pairs[p], threads == 1);
         sadmm_barrier_wait(&c->barrier, threads);
-        for (size_t i = first; i < past; ++i) choose_lead(c, i, &c->leads[i]);
+        for (size_t i = first; i < past; ++i) choose_trapezoid(c, i, &c->trapezoids[i]);
     }
-    sadmm_advance(past - first, bodies + first, velocity + 6 * first, c->leads + first, c->settings.dt,
+    sadmm_advance(past - first, bodies + first, velocity + 6 * first, c->trapezoids + first, c->settings.dt,
                   in->next + first);
 }
 
 sadmm_status CPU(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
 {
     (void)error;
-    memset(&c->leads[c->bodies], 0, sizeof *c->leads);
+    memset(&c->trapezoids[c->bodies], 0, sizeof *c->trapezoids);
     cpu_parallel(c, integrate_share, &(struct integration){c, next});
     return SADMM_OK;
 }

@@ -84,8 +84,8 @@ sadmm_status sadmm_ref_assemble_contacts(struct sadmm_context *c, struct sadmm_e
             constraint->mu = pair->friction;
             constraint->e[0] = sadmm_contact_e(c->system, c->settings, pair, &contacts->points[pair->first],
                                                k - pair->first);
-            const vec3 driven = m3_mul(frame, sadmm_driven_part(c->system, pair, point));
-            v3_store(driven, constraint->driven);
+            const vec3 kinematic = m3_mul(frame, sadmm_kinematic_part(c->system, pair, point));
+            v3_store(kinematic, constraint->kinematic);
             for (int r = 0; r < constraint->rows; ++r) {
                 if (pair->body_a >= 0)
                     sadmm_contact_row(frame.r[r], point->arm_a, -1, constraint->side[0].J + 6 * r);

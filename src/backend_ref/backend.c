@@ -72,31 +72,31 @@ static void touch_point(struct sadmm_context *c, const struct sadmm_contact_pair
     const struct sadmm_contact_set *contacts = c->system->contacts;
     const struct ref_constraint *constraint = &c->constraints[k];
     const bool inner = constraint->side[0].body >= 0 && constraint->side[1].body >= 0;
-    struct lead_touch touch = {inner ? TOUCH_INNER : constraint->mu > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH, {0, 0}};
+    struct trapezoid_touch touch = {inner ? TOUCH_INNER : constraint->mu > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH, {0, 0}};
     const struct rolling_halfway at =
         rolling_halfway_of(
         pair->normal, &contacts->points[k], sadmm_migration_of(contacts->points, contacts->migrations, k));
-    double speed = 0, lead[2] = {0, 0}, size[2] = {0, 0}, moves[2] = {0, 0}, rest[2] = {0, 0};
+    double speed = 0, correction[2] = {0, 0}, size[2] = {0, 0}, moves[2] = {0, 0}, rest[2] = {0, 0};
     for (int s = 0; s < 2; ++s) {
         const struct ref_side *side = &constraint->side[s];
         if (side->body < 0) continue;
         const double sign = s ? 1 : -1, *arm_halfway = s ? at.arm_b : at.arm_a;
-        speed += sign * lead_along(at.normal, c->bodies[side->body].v, arm_halfway);
-        lead[s] = sign * lead_along(at.normal, c->bodies[side->body].lead, arm_halfway);
+        speed += sign * trapezoid_along(at.normal, c->bodies[side->body].v, arm_halfway);
+        correction[s] = sign * trapezoid_along(at.normal, c->bodies[side->body].correction, arm_halfway);
         const double *arm = s ? contacts->points[k].arm_b : contacts->points[k].arm_a;
-        size[s] = lead_size(c->bodies[side->body].lead, arm);
-        moves[s] = lead_speed(c->system->rigid[side->body].velocity, c->bodies[side->body].v, arm);
+        size[s] = trapezoid_size(c->bodies[side->body].correction, arm);
+        moves[s] = trapezoid_speed(c->system->rigid[side->body].velocity, c->bodies[side->body].v, arm);
         const struct sadmm_rigid *rigid = &c->system->rigid[side->body];
-        rest[s] = lead_rest_speed(c->settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
-                                  c->settings->dt);
+        rest[s] = trapezoid_rest_speed(c->settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
+                                       c->settings->dt);
         touch.island |= forces_touch(rigid);
     }
     const struct sadmm_contact_point *point = &contacts->points[k];
-    const struct lead_gap gap = {
+    const struct trapezoid_gap gap = {
         point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
-    lead_add_point(&touch, gap,
-                   constraint->lambda[0], lead, size, moves, rest,
-                   c->settings->dt, c->settings->slop);
+    trapezoid_add_point(&touch, gap,
+                        constraint->lambda[0], correction, size, moves, rest,
+                        c->settings->dt, c->settings->slop);
     for (int s = 0; s < 2; ++s) {
         if (constraint->side[s].body < 0) continue;
         struct ref_body *body = &c->bodies[constraint->side[s].body];
@@ -105,7 +105,7 @@ static void touch_point(struct sadmm_context *c, const struct sadmm_contact_pair
     }
 }
 
-/* Of bodies and islands, what their contacts say of leads. */
+/* Of bodies and islands, what their contacts say of the trapezoid correction. */
 static void touch(struct sadmm_context *c)
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
@@ -114,40 +114,42 @@ static void touch(struct sadmm_context *c)
         double before[6];
         body->touch = body->island_touch = 0;
         spin_before(&c->system->rigid[i], c->settings->dt, before);
-        lead_own(before, body->v, body->lead);
+        trapezoid_own(before, body->v, body->correction);
     }
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
-        if (sadmm_pair_is_driven(c->system, pair))
-            c->bodies[c->bodies[pair->body_a >= 0 ? pair->body_a : pair->body_b].label].island_touch |= TOUCH_JOLT;
+        if (!sadmm_pair_is_kinematic(c->system, pair)) continue;
+        const int32_t body = pair->body_a >= 0 ? pair->body_a : pair->body_b;
+        c->bodies[c->bodies[body].label].island_touch |= TOUCH_PENETRATES;
     }
     for (size_t p = 0; p < contacts->pair_count; ++p)
         for (int32_t k = 0; k < contacts->pairs[p].count; ++k)
             touch_point(c, &contacts->pairs[p], contacts->pairs[p].first + k);
 }
 
-/* Q: the primal iterate v, less its lead. */
+/* Q: the primal iterate v, less its trapezoid correction. */
 static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
 {
     double dt = c->settings->dt;
     if (!c->system->rigid)
         return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "integrate: the system gives A and b, not rigid bodies");
-    for (int32_t i = 0; i < c->system->body_count && c->system->carried; ++i)
-        for (int k = 0; k < 6; ++k) c->bodies[i].v[k] += c->system->carried[6 * (size_t)i + (size_t)k];
+    for (int32_t i = 0; i < c->system->body_count && c->system->support_motion; ++i)
+        for (int k = 0; k < 6; ++k) c->bodies[i].v[k] += c->system->support_motion[6 * (size_t)i + (size_t)k];
     sadmm_ref_label_islands(c);
     touch(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         const struct ref_body *from = &c->bodies[i];
-        const enum lead_kind kind = lead_kind_of(c->bodies[from->label].island_touch, from->touch);
+        const enum trapezoid_kind kind = trapezoid_kind_of(c->bodies[from->label].island_touch, from->touch);
         const struct sadmm_rigid *start = &c->system->rigid[i];
-        double lead[6] = {0}, mean[6];
-        if (kind == LEAD_SHARED) lead_shared(c->settings->gravity, dt, lead);
-        if (kind == LEAD_OWN) memcpy(lead, from->lead, sizeof lead);
-        for (int k = 0; k < 6; ++k) mean[k] = from->v[k] - lead[k];
+        double correction[6] = {0}, mean[6];
+        if (kind == TRAPEZOID_SHARED) trapezoid_shared(c->settings->gravity, dt, correction);
+        if (kind == TRAPEZOID_OWN) memcpy(correction, from->correction, sizeof correction);
+        for (int k = 0; k < 6; ++k) mean[k] = from->v[k] - correction[k];
         next[i] = *start;
-        spin_move(start, from->v, mean, kind != LEAD_OWN, dt, next[i].position, next[i].orientation, next[i].velocity);
+        spin_move(start, from->v, mean, kind != TRAPEZOID_OWN, dt, next[i].position, next[i].orientation,
+                  next[i].velocity);
         rolling_forget(&next[i]);
-        next[i].mean = kind == LEAD_OWN;
+        next[i].mean = kind == TRAPEZOID_OWN;
     }
     return SADMM_OK;
 }

@@ -153,7 +153,7 @@ static void momentum_residual(struct sadmm_context *c, bool seen)
 /* x + e of every row. */
 static void slip(const struct sadmm_context *c, const struct ref_constraint *constraint, double u[6])
 {
-    for (int r = 0; r < constraint->rows; ++r) u[r] = constraint->e[r] + (r < 3 ? constraint->driven[r] : 0);
+    for (int r = 0; r < constraint->rows; ++r) u[r] = constraint->e[r] + (r < 3 ? constraint->kinematic[r] : 0);
     for (int s = 0; s < 2; ++s) {
         const struct ref_side *side = &constraint->side[s];
         if (side->body < 0) continue;
@@ -352,7 +352,7 @@ static void solve_multiplier(const struct sadmm_context *c, const struct ref_con
         double candidate[3] = {0, 0, 0}, projected[3];
         for (int r = 0; r < constraint->rows; ++r)
             candidate[r] = constraint->lambda[r] -
-                           constraint->B[7 * r] * (x[r] + constraint->driven[r] + constraint->e[r]) / n;
+                           constraint->B[7 * r] * (x[r] + constraint->kinematic[r] + constraint->e[r]) / n;
         contact_project_rows(candidate, constraint->mu, projected);
         memcpy(out, projected, (size_t)constraint->rows * sizeof *out);
         return;

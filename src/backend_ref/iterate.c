@@ -85,7 +85,8 @@ static void solve_lambda(struct ref_constraint *constraint, const double sum[6],
     double *lambda = constraint->lambda;
     if (constraint->cone) {
         double candidate[3] = {0, 0, 0}, projected[3];
-        for (int r = 0; r < constraint->rows; ++r) candidate[r] = -(constraint->e[r] + constraint->driven[r] + sum[r]) / s;
+        for (int r = 0; r < constraint->rows; ++r)
+            candidate[r] = -(constraint->e[r] + constraint->kinematic[r] + sum[r]) / s;
         contact_project_rows(candidate, constraint->mu, projected);
         for (int r = 0; r < constraint->rows; ++r) lambda[r] = projected[r];
         return;

@@ -48,7 +48,7 @@ static void add_up_energies(struct sadmm_context *c)
     for (size_t p = 0; p < c->system->contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[p];
         if (sadmm_pair_gives_energy(c->system, pair))
-            c->bodies[c->bodies[pair->body_a >= 0 ? pair->body_a : pair->body_b].label].limit.driven = 1;
+            c->bodies[c->bodies[pair->body_a >= 0 ? pair->body_a : pair->body_b].label].limit.kinematic = 1;
     }
 }
 

@@ -13,7 +13,7 @@
 #define SADMM_BACKEND_REF_LITERAL_H
 
 #include "core/solve/kernels.h"
-#include "core/math/lead.h"
+#include "core/math/trapezoid.h"
 #include "core/math/limit.h"
 
 /* One side of a constraint: the paper's subscript (i,k) or (j,k). */
@@ -29,7 +29,7 @@ struct ref_constraint {
     int rows;
     struct ref_side side[2];
     double e[6];                     /* contact; of other rows the bias */
-    double driven[3];                /* contact: what a driven body adds to x, which has no side */
+    double kinematic[3];             /* contact: what a kinematic body adds to x, which has no side */
     double mu;                       /* contact */
     double gain[6], compliance[6], lo[6], hi[6];
     bool coupled[6];                 /* fast: may share a dense weight with other rows (core/model/rows.h) */
@@ -59,7 +59,7 @@ struct ref_body {
     bool loose;                      /* it has contacts, and none is known to hold it */
     double slow_down;                /* the factor of its velocities, but for those motions */
     double impulse[6];               /* sums over the body's constraints */
-    double lead[6];                  /* its own (math/lead.h) */
+    double correction[6];            /* its own correction (math/trapezoid.h) */
     int touch, island_touch;         /* bits: of the body; of the island that it names */
 };
 

@@ -12,9 +12,9 @@
 #include "config.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
-#include "flyers.h"
 #include "kernels.h"
 #include "pipeline.h"
+#include "swept_bodies.h"
 
 /* Fewer candidates a thread than this are not worth waking it. */
 enum { PAIRS_PER_THREAD = 256 };

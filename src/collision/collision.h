@@ -34,7 +34,7 @@ struct sadmm_geometry {
 };
 
 /* How a body moves: not at all, as the caller says, by its dynamics. */
-enum sadmm_motion { SADMM_MOTION_NONE, SADMM_MOTION_DRIVEN, SADMM_MOTION_DYNAMIC };
+enum sadmm_motion { SADMM_MOTION_NONE, SADMM_MOTION_KINEMATIC, SADMM_MOTION_DYNAMIC };
 
 /* May a shape be of this geometry, on such a body? Else INVALID_ARGUMENT; `name`: what the message calls the geometry,
  * as "def->". Sizes are not checked. */
@@ -60,7 +60,7 @@ struct sadmm_collision_body {
     double acceleration[2]; /* sizes of what its own force and torque give it, m/s^2, rad/s^2; 0 unless it is dynamic */
     double inertia;       /* largest principal moment, kg m^2; 0: not dynamic, or all alike */
     uint32_t placed;      /* changes whenever its pose is set: pairs forget the axis they remember (contact_match.h) */
-    int32_t system_body;  /* index among dynamic bodies; -1: static; below: driven, core/base/contact_set.h */
+    int32_t system_body;  /* index among dynamic bodies; -1: static; below: kinematic, core/base/contact_set.h */
     int32_t environment;  /* -1: meets all */
     int32_t mean;         /* what touches it may roll (contact_migrate.h); not 0 of what is not dynamic */
 };

@@ -198,7 +198,8 @@ struct migration_pair {
     double change[3];                        /* of the normal */
 };
 
-/* What turns by less than this in a step, rad, has a normal that leads close by less than they may (math/lead.h). */
+/* A contact whose normal turns by less than this in a step, rad, is closed by trapezoid corrections by less than they
+ * may (math/trapezoid.h). */
 #define MIGRATION_LEAST 1e-3
 
 /* normal: halfway. ratio: step_ratio. */

@@ -1,5 +1,5 @@
-/* Which pairs of shapes may hit each other within a step (flyers.h), by their velocities and sizes alone. For the host and
- * devices. */
+/* Which pairs of shapes may hit each other within a step (swept_bodies.h), by their velocities and sizes alone. For the
+ * host and devices. */
 #ifndef SADMM_COLLISION_FAST_PAIR_H
 #define SADMM_COLLISION_FAST_PAIR_H
 

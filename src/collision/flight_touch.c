@@ -6,7 +6,7 @@ void sadmm_flight_at(const struct sadmm_flight *flight, double t, struct sadmm_f
     flight_at(flight, t, pose);
 }
 
-bool sadmm_flight_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_flight_touch *touch)
+bool sadmm_flight_touch(struct sadmm_swept_pair *pair, double from, double to, struct sadmm_flight_touch *touch)
 {
-    return flying_touch(pair, from, to, touch);
+    return swept_touch(pair, from, to, touch);
 }

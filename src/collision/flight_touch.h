@@ -34,16 +34,16 @@ struct sadmm_flight_pose {
 /* Of the body, t s after the step's start. */
 void sadmm_flight_at(const struct sadmm_flight *flight, double t, struct sadmm_flight_pose *pose);
 
-/* A shape on a body that flies. */
-struct sadmm_flying_shape {
+/* A shape of a swept body. */
+struct sadmm_swept_shape {
     const struct sadmm_shape *shape;
     const struct sadmm_geometry *geometry;
     const struct sadmm_flight *flight;
 };
 
 /* Two of them, in the order of pairs (geometry_rank); child: of the pair. */
-struct sadmm_flying_pair {
-    struct sadmm_flying_shape a, b;
+struct sadmm_swept_pair {
+    struct sadmm_swept_shape a, b;
     const double *hulls;
     uint32_t child;
     double threshold; /* points that approach slower than this are left out, m/s */
@@ -61,7 +61,7 @@ struct sadmm_flight_touch {
 
 /* False: no point of the pair, none of which is a mesh, touches in [from, to] that approaches fast enough. Points of the
  * result: all that touch then; `child`: of which of its children, the first one that touches. */
-bool sadmm_flight_touch(struct sadmm_flying_pair *pair, double from, double to, struct sadmm_flight_touch *touch);
+bool sadmm_flight_touch(struct sadmm_swept_pair *pair, double from, double to, struct sadmm_flight_touch *touch);
 
 #ifdef __cplusplus
 }

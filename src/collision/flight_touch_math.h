@@ -58,7 +58,7 @@ struct placed_shape {
     double reach; /* farthest that a rotation of the body moves a point of the shape by, m / rad */
 };
 
-SADMM_INLINE void touch_place(const struct sadmm_flying_shape *s, double t, struct placed_shape *out)
+SADMM_INLINE void touch_place(const struct sadmm_swept_shape *s, double t, struct placed_shape *out)
 {
     flight_at(s->flight, t, &out->body);
     const quat body = q_load(out->body.orientation);
@@ -80,7 +80,7 @@ struct touch_moment {
     double manifold_normal[3];
 };
 
-SADMM_CALLED void touch_look(const struct sadmm_flying_pair *p, double t, struct touch_moment *at)
+SADMM_CALLED void touch_look(const struct sadmm_swept_pair *p, double t, struct touch_moment *at)
 {
     vec3 n;
     touch_place(&p->a, t, &at->a);
@@ -91,7 +91,7 @@ SADMM_CALLED void touch_look(const struct sadmm_flying_pair *p, double t, struct
 }
 
 /* By the points that come near. */
-SADMM_CALLED void touch_look_closely(const struct sadmm_flying_pair *p, struct touch_moment *at)
+SADMM_CALLED void touch_look_closely(const struct sadmm_swept_pair *p, struct touch_moment *at)
 {
     at->m.count = 0;
     at->m.cache = 0;
@@ -129,7 +129,7 @@ SADMM_INLINE double touch_turning(const struct placed_shape *s, const struct sad
 }
 
 /* The most that the pair closes along the normal until `to`, m/s. */
-SADMM_INLINE double touch_closing(const struct sadmm_flying_pair *p, const struct touch_moment *at, double left)
+SADMM_INLINE double touch_closing(const struct sadmm_swept_pair *p, const struct touch_moment *at, double left)
 {
     const vec3 n = v3_load(at->normal), v = v3_sub(v3_load(at->b.body.velocity), v3_load(at->a.body.velocity)),
                acceleration = v3_sub(v3_load(p->b.flight->acceleration), v3_load(p->a.flight->acceleration));
@@ -138,13 +138,13 @@ SADMM_INLINE double touch_closing(const struct sadmm_flying_pair *p, const struc
            touch_turning(&at->b, p->b.flight, n);
 }
 
-SADMM_INLINE double touch_thinner(const struct sadmm_flying_pair *p)
+SADMM_INLINE double touch_thinner(const struct sadmm_swept_pair *p)
 {
     return smaller_of(geometry_thickness(p->a.geometry), geometry_thickness(p->b.geometry));
 }
 
 /* Among points that approach fast enough the one that gets there first: by when, s; HUGE_VAL: there is none. */
-SADMM_INLINE double touch_first_point(const struct sadmm_flying_pair *p, const struct touch_moment *at,
+SADMM_INLINE double touch_first_point(const struct sadmm_swept_pair *p, const struct touch_moment *at,
                                       double *separation)
 {
     double first = HUGE_VAL;
@@ -170,7 +170,7 @@ SADMM_INLINE void touch_keep(const struct touch_moment *at, double t, double tog
 }
 
 /* How long the pair may go unseen where it is near, s. */
-SADMM_INLINE double touch_passed_at_once(const struct sadmm_flying_pair *p, double whole)
+SADMM_INLINE double touch_passed_at_once(const struct sadmm_swept_pair *p, double whole)
 {
     const double rate = v3_norm(v3_load(p->a.flight->turn)) + p->a.flight->sway + v3_norm(v3_load(p->b.flight->turn)) +
                         p->b.flight->sway;
@@ -178,7 +178,7 @@ SADMM_INLINE double touch_passed_at_once(const struct sadmm_flying_pair *p, doub
 }
 
 /* Do balls around the two, about their centres of mass, meet within the time? Accelerations bend ways by `sags` at most. */
-SADMM_INLINE bool touch_balls_meet(const struct sadmm_flying_pair *p, double from, double to)
+SADMM_INLINE bool touch_balls_meet(const struct sadmm_swept_pair *p, double from, double to)
 {
     const struct sadmm_flight *a = p->a.flight, *b = p->b.flight;
     const double left = to - from, reach = v3_norm(v3_load(p->a.shape->position)) + geometry_radius(p->a.geometry) +
@@ -200,7 +200,7 @@ SADMM_INLINE bool touch_balls_meet(const struct sadmm_flying_pair *p, double fro
 }
 
 /* Of one child. */
-SADMM_RARE bool flying_touch_of(struct sadmm_flying_pair *p, double from, double to, struct sadmm_flight_touch *touch)
+SADMM_RARE bool swept_touch_of(struct sadmm_swept_pair *p, double from, double to, struct sadmm_flight_touch *touch)
 {
     const double thin = touch_thinner(p), passed = touch_passed_at_once(p, to - from);
     struct touch_moment at;
@@ -237,14 +237,14 @@ SADMM_RARE bool flying_touch_of(struct sadmm_flying_pair *p, double from, double
 }
 
 /* The earlier of the two. */
-SADMM_INLINE bool touch_is_earlier(struct sadmm_flying_pair *pair, double from, double to, bool found,
+SADMM_INLINE bool touch_is_earlier(struct sadmm_swept_pair *pair, double from, double to, bool found,
                                   const struct sadmm_flight_touch *best, struct sadmm_flight_touch *touch)
 {
-    return flying_touch_of(pair, from, found ? best->time : to, touch) && (!found || touch->time < best->time);
+    return swept_touch_of(pair, from, found ? best->time : to, touch) && (!found || touch->time < best->time);
 }
 
-SADMM_INLINE bool flying_touch(struct sadmm_flying_pair *pair, double from, double to,
-                               struct sadmm_flight_touch *touch)
+SADMM_INLINE bool swept_touch(struct sadmm_swept_pair *pair, double from, double to,
+                              struct sadmm_flight_touch *touch)
 {
     const uint32_t children = pair_children(pair->a.geometry, pair->b.geometry);
     struct sadmm_flight_touch own;

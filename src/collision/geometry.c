@@ -9,7 +9,7 @@
 /* Bodies that the caller moves meet dynamic ones alone; but a plane has no box that could be moved. */
 static bool needs_every_pair(const struct sadmm_geometry *geometry, enum sadmm_motion motion)
 {
-    return motion == SADMM_MOTION_DYNAMIC || (motion == SADMM_MOTION_DRIVEN && geometry->type == SADMM_SHAPE_PLANE);
+    return motion == SADMM_MOTION_DYNAMIC || (motion == SADMM_MOTION_KINEMATIC && geometry->type == SADMM_SHAPE_PLANE);
 }
 
 sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, enum sadmm_motion motion, const char *name,
@@ -45,9 +45,9 @@ sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *inp
     const struct sadmm_geometry *geometry = &input->geometries[shape->geometry];
     const int32_t body = input->bodies[shape->body].system_body;
     TRY(sadmm_geometry_check(geometry,
-                             body >= 0                     ? SADMM_MOTION_DYNAMIC
-                             : sadmm_body_is_driven(body) ? SADMM_MOTION_DRIVEN
-                                                          : SADMM_MOTION_NONE,
+                             body >= 0                       ? SADMM_MOTION_DYNAMIC
+                             : sadmm_body_is_kinematic(body) ? SADMM_MOTION_KINEMATIC
+                                                             : SADMM_MOTION_NONE,
                              name, error));
     const size_t hull_doubles = input->hulls ? input->hull_doubles : 0;
     const bool of_block = geometry->type == SADMM_SHAPE_HULL || geometry->type == SADMM_SHAPE_MESH;

@@ -79,11 +79,11 @@ extern "C" sadmm_status CUDA(assemble_bodies)(struct sadmm_context *c, struct sa
     }
     TRY(
         CUDA(upload)(c, v->raw.system.velocity, PINNED_BODIES, at, system->velocity, 6 * n * sizeof(double), error));
-    const size_t driven = 6 * (size_t)system->driven_count * sizeof(double);
+    const size_t kinematic = 6 * (size_t)system->kinematic_count * sizeof(double);
     at += 6 * n * sizeof(double);
-    TRY(CUDA(upload)(c, (void *)v->raw.system.driven, PINNED_BODIES, at, system->driven, driven, error));
-    if (system->carried)
-        TRY(CUDA(upload)(c, (void *)v->raw.system.carried, PINNED_BODIES, at + driven, system->carried,
+    TRY(CUDA(upload)(c, (void *)v->raw.system.kinematic, PINNED_BODIES, at, system->kinematic, kinematic, error));
+    if (system->support_motion)
+        TRY(CUDA(upload)(c, (void *)v->raw.system.support_motion, PINNED_BODIES, at + kinematic, system->support_motion,
                          6 * n * sizeof(double), error));
     return launch_bodies(c, error);
 }
@@ -96,14 +96,15 @@ static __device__ real4 pack(vec3 a, double w)
     return out;
 }
 
-/* Row of a pair's driven body in the states: its motion about the other one's centre of mass, whose arms the pair
+/* Row of a pair's kinematic body in the states: its motion about the other one's centre of mass, whose arms the pair
  * has. */
-static __device__ __noinline__ int32_t store_driven(const cuda_view &v, const struct sadmm_contact_pair *pair, int32_t p)
+static __device__ __noinline__ int32_t store_kinematic(const cuda_view &v, const struct sadmm_contact_pair *pair,
+                                                       int32_t p)
 {
     const int32_t row = v.model.bodies + 1 + p;
     solver_real *state = v.bodies.state + (size_t)row * ROW;
     double motion[6];
-    sadmm_driven_about_other(&v.raw.system, pair, v.raw.points + pair->first, motion);
+    sadmm_kinematic_about_other(&v.raw.system, pair, v.raw.points + pair->first, motion);
     for (int k = 0; k < ROW; ++k) state[k] = k < 6 ? (solver_real)motion[k] : (solver_real)0;
     return row;
 }
@@ -139,8 +140,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     if (a && b && count > 0 && (FAST || lane == 0))
         between = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
     pair_bodies joined = {a ? pair->body_a : v.model.bodies, b ? pair->body_b : v.model.bodies, -1, -1};
-    if (v.raw.system.driven_count > 0 && live && sadmm_body_is_driven(a ? pair->body_b : pair->body_a))
-        *(a ? &joined.body_b : &joined.body_a) = store_driven(v, pair, p);
+    if (v.raw.system.kinematic_count > 0 && live && sadmm_body_is_kinematic(a ? pair->body_b : pair->body_a))
+        *(a ? &joined.body_b : &joined.body_a) = store_kinematic(v, pair, p);
     const real4 about = pack(normal, live ? solver_friction(v.model, pair->friction) : 0),
                 difference = pack(between, count);
     if (live && lane == 0) {

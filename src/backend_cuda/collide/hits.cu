@@ -170,7 +170,7 @@ static sadmm_status reserve_bodies(struct sadmm_cuda_collision *c, struct sadmm_
     TRY(reserve(c, HIT_MARKS, slots, sizeof *h->marks, error));
     TRY(reserve(c, HIT_HELD, slots, sizeof *h->held, error));
     TRY(reserve(c, HIT_KINDS, slots, sizeof *h->kinds, error));
-    TRY(reserve(c, HIT_FLYERS, slots, sizeof(struct flyer), error));
+    TRY(reserve(c, HIT_SWEPT_BODIES, slots, sizeof(struct swept_body), error));
     TRY(reserve(c, HIT_SINCE, slots, sizeof *h->since, error));
     TRY(reserve(c, HIT_IMPULSES, 6 * slots, sizeof *h->impulse, error));
     TRY(reserve(c, HIT_BOXES, (size_t)c->view.leaf_count, sizeof *h->boxes, error));
@@ -178,7 +178,7 @@ static sadmm_status reserve_bodies(struct sadmm_cuda_collision *c, struct sadmm_
     h->marks = in<struct hit_marks>(c, HIT_MARKS);
     h->held = in<unsigned char>(c, HIT_HELD);
     h->kinds = in<unsigned char>(c, HIT_KINDS);
-    h->flyers = in<struct flyer>(c, HIT_FLYERS);
+    h->swept_bodies = in<struct swept_body>(c, HIT_SWEPT_BODIES);
     h->since = in<double>(c, HIT_SINCE);
     h->impulse = in<double>(c, HIT_IMPULSES);
     h->boxes = in<struct sadmm_box3>(c, HIT_BOXES);

@@ -2,18 +2,18 @@
  * a step and its contacts.
  *
  *   list      candidates that are fast; bodies that something presses on; the step's start is copied
- *   foresee   when each of these pairs of flyers first touches                     a thread a pair
+ *   foresee   when each of these pairs of swept bodies first touches               a thread a pair
  *   take      hits in the order of time, and what the two come near from then on   a block a group
  *   replace   shapes of what was hit, where they are now; the list of hits; the candidates are looked for again
  *   later     manifolds of what was hit, in what is left of the step               a thread a candidate, after `narrow`
- *   reopen    their points, and gaps of flyers                                     after `emit`
+ *   reopen    their points, and gaps of swept bodies                               after `emit`
  *
  * Steps have these kernels if they are planned to (CUDA(plan_hits)); where nothing is fast all of them return at once. Lists have no order, and results do not depend on it: the next hit is
  * that of the least (time, key), shapes of a body are taken in order, a list's length and what becomes of it are the same
  * in any order. Bodies of two
  * environments never meet: each environment is a group, whose hits a block takes by itself, unless a body that moves is in
  * none of them; then all are one group. What a group may take is limited, by the world and the group alone: beyond that
- * its bodies are left to the solve, for the (sub-)step. Formulas are the host's: core/flight/flyer.h, collision/
+ * its bodies are left to the solve, for the (sub-)step. Formulas are the host's: core/flight/swept_body.h, collision/
  * flight_touch_math.h, core/math/hit.h. */
 #ifndef SADMM_CUDA_COLLIDE_HITS_H
 #define SADMM_CUDA_COLLIDE_HITS_H
@@ -23,7 +23,7 @@
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
-#include "core/flight/flyer.h"
+#include "core/flight/swept_body.h"
 #pragma GCC diagnostic pop
 
 enum {
@@ -66,7 +66,7 @@ struct hit_group {
 /* What a group has done in the (sub-)step. */
 struct hit_progress {
     unsigned long long foreseen;
-    uint64_t followed;        /* the mark of its flyers; 0: there are none */
+    uint64_t followed;        /* the mark of its swept bodies; 0: there are none */
     int32_t records, earlier; /* of the (sub-)step; of those before it in the step */
 };
 
@@ -81,7 +81,7 @@ struct foreseen_hit {
 /* By body slot. */
 struct hit_marks {
     uint64_t pressed;                /* in which (sub-)step */
-    uint64_t followed, passes, lost; /* in which of its times (followed_mark): as the host's flyers */
+    uint64_t followed, passes, lost; /* in which of its times (followed_mark): as the host's swept bodies */
 };
 
 struct hits_view {
@@ -95,12 +95,12 @@ struct hits_view {
     const int32_t *shared_leaves;   /* of those */
     int32_t group_count, shared_leaf_count;
     struct hit_marks *marks;
-    const uint8_t *held;            /* by body slot: joints hold it */
-    unsigned char *kinds;           /* by body slot: enum sadmm_flyer */
-    struct flyer *flyers;           /* by body slot */
-    double *since;                  /* by body slot: of its last hit, s */
-    double *impulse;                /* by body slot x 6: what its hits gave it, N s, N m s */
-    int32_t *listed;                /* candidates; ~ of one that took too many looks to tell */
+    const uint8_t *held;             /* by body slot: joints hold it */
+    unsigned char *kinds;            /* by body slot: enum sadmm_swept_kind */
+    struct swept_body *swept_bodies; /* by body slot */
+    double *since;                   /* by body slot: of its last hit, s */
+    double *impulse;                 /* by body slot x 6: what its hits gave it, N s, N m s */
+    int32_t *listed;                 /* candidates; ~ of one that took too many looks to tell */
     struct foreseen_hit *foreseen;
     struct sadmm_box3 *boxes;       /* of leaves, as `present`: from the last hit on */
     uint64_t *near;                 /* keys */
@@ -119,7 +119,7 @@ struct hits_kernels {
     struct hits_launch list, foresee, take, replace, later, reopen, give;
 };
 
-/* Of flyers of the (sub-)step that were looked at the times + 1st time. */
+/* Of swept bodies of the (sub-)step that were looked at the times + 1st time. */
 static __device__ __forceinline__ uint64_t followed_mark(uint64_t epoch, int times)
 {
     return epoch * TAKE_TIMES + (uint64_t)times;
@@ -128,7 +128,7 @@ static __device__ __forceinline__ uint64_t followed_mark(uint64_t epoch, int tim
 /* Is the body followed no further? mark: followed_mark of the last time. */
 static __device__ __forceinline__ bool gives_up(const hits_view &v, int32_t slot, uint64_t mark)
 {
-    return v.flyers[slot].too_many || v.marks[slot].lost == mark;
+    return v.swept_bodies[slot].too_many || v.marks[slot].lost == mark;
 }
 
 void COLLISION(hits_take_kernels)(struct hits_kernels *kernels);

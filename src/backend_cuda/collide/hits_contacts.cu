@@ -5,8 +5,8 @@
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
-#include "collision/flyers.h"
 #include "collision/later.h"
+#include "collision/swept_bodies.h"
 #pragma GCC diagnostic pop
 
 /* ---- replace ----------------------------------------------------------------------------------------------------- */
@@ -16,7 +16,7 @@ static __device__ __forceinline__ void replace_leaf(const hits_view &v, const st
 {
     const uint32_t slot = v.c.present[i];
     const struct sadmm_shape &shape = v.c.shapes[slot];
-    if (v.flyers[shape.body].hits == 0) return;
+    if (v.swept_bodies[shape.body].hits == 0) return;
     const struct sadmm_collision_body body = load_wide(&v.c.bodies[shape.body]);
     const struct proxy_turn turn = proxy_turn_since(&shape, &body, v.since[shape.body], step.dt);
     struct collision_leaf leaf = v.c.placed[i];
@@ -188,7 +188,7 @@ static __device__ __forceinline__ bool is_followed(const hits_view &v, int32_t b
     const int32_t group = v.group_of[body];
     const uint64_t mark = v.marks[body].followed;
     if (group < 0) return mark >= followed_mark(v.state->epoch, 0); /* by any of them */
-    return mark != 0 && mark == v.progress[group].followed && v.kinds[body] != SADMM_FLYER_NONE &&
+    return mark != 0 && mark == v.progress[group].followed && v.kinds[body] != SADMM_SWEPT_NONE &&
            !(gives_up(v, body, mark) && v.marks[body].passes == mark);
 }
 
@@ -198,11 +198,11 @@ static __device__ __forceinline__ void open_gaps(const hits_view &v, const struc
 {
     const struct sadmm_proxy *a = &v.c.proxies[own.a], *b = &v.c.proxies[own.b];
     if (b->geometry.type == SADMM_SHAPE_MESH || !is_followed(v, a->body) || !is_followed(v, b->body)) return;
-    const struct flyer *of_a = &v.flyers[a->body], *of_b = &v.flyers[b->body];
+    const struct swept_body *of_a = &v.swept_bodies[a->body], *of_b = &v.swept_bodies[b->body];
     if (!(pair->restitution > 0 || of_a->hits > 0 || of_b->hits > 0)) return;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
-        flyers_open_gap(pair, &of_a->flight, &of_b->flight, min_of(a->thin, b->thin), v.step.settings,
-                        &v.c.after.points[k]);
+        swept_bodies_open_gap(pair, &of_a->flight, &of_b->flight, min_of(a->thin, b->thin), v.step.settings,
+                              &v.c.after.points[k]);
 }
 
 static __global__ void __launch_bounds__(HIT_THREADS) reopen_kernel(const __grid_constant__ hits_view v)
@@ -237,12 +237,12 @@ static __global__ void __launch_bounds__(HIT_THREADS) give_kernel(const __grid_c
     for (int64_t slot = thread; slot < v.c.body_count; slot += stride) {
         const int32_t system = v.c.bodies[slot].system_body;
         if (system == -1) continue;
-        const bool driven = sadmm_body_is_driven(system);
-        double *wrench = driven ? v.step.driven_wrench + 6 * (size_t)sadmm_driven(system)
-                                : v.step.wrench + 6 * (size_t)system;
+        const bool kinematic = sadmm_body_is_kinematic(system);
+        double *wrench = kinematic ? v.step.kinematic_wrench + 6 * (size_t)sadmm_kinematic(system)
+                                   : v.step.wrench + 6 * (size_t)system;
         for (int k = 0; k < 6; ++k) {
             const double impulse = v.impulse[6 * (size_t)slot + k];
-            if (impulse != 0) wrench[k] += (driven ? all : own) * impulse;
+            if (impulse != 0) wrench[k] += (kinematic ? all : own) * impulse;
         }
     }
 }

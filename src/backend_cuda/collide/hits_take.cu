@@ -6,7 +6,7 @@
 #pragma GCC diagnostic ignored "-Wextra"
 #include "collision/flight_touch_math.h"
 #include "collision/fast_pair.h"
-#include "collision/flyers.h"
+#include "collision/swept_bodies.h"
 #pragma GCC diagnostic pop
 
 /* ---- list -------------------------------------------------------------------------------------------------------- */
@@ -64,30 +64,30 @@ static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_c
     }
 }
 
-/* ---- flyers ------------------------------------------------------------------------------------------------------ */
+/* ---- swept bodies ------------------------------------------------------------------------------------------------ */
 
 static __device__ __forceinline__ unsigned char kind_of(const hits_view &v, int32_t slot, uint64_t epoch)
 {
     const int32_t system = v.c.bodies[slot].system_body;
-    if (system < 0) return SADMM_FLYER_FIXED;
+    if (system < 0) return SADMM_SWEPT_FIXED;
     return v.held[slot] || v.marks[slot].pressed == epoch ||
-                   flyer_is_damped(&v.step.before[system], v.step.settings->dt)
-               ? SADMM_FLYER_NONE
-               : SADMM_FLYER_DYNAMIC;
+                   swept_body_is_damped(&v.step.before[system], v.step.settings->dt)
+               ? SADMM_SWEPT_NONE
+               : SADMM_SWEPT_DYNAMIC;
 }
 
 static __device__ __forceinline__ bool kinds_hit(unsigned char a, unsigned char b)
 {
-    return a != SADMM_FLYER_NONE && b != SADMM_FLYER_NONE && (a == SADMM_FLYER_DYNAMIC || b == SADMM_FLYER_DYNAMIC);
+    return a != SADMM_SWEPT_NONE && b != SADMM_SWEPT_NONE && (a == SADMM_SWEPT_DYNAMIC || b == SADMM_SWEPT_DYNAMIC);
 }
 
-static __device__ __noinline__ void load_flyer(const hits_view &v, int32_t slot, struct flyer *f)
+static __device__ __noinline__ void load_swept_body(const hits_view &v, int32_t slot, struct swept_body *f)
 {
     const struct sadmm_collision_body &body = v.c.bodies[slot];
     memset(f, 0, sizeof *f);
     f->slot = slot;
     f->dynamic = body.system_body >= 0 ? body.system_body : -1;
-    f->driven = sadmm_body_is_driven(body.system_body) ? sadmm_driven(body.system_body) : -1;
+    f->kinematic = sadmm_body_is_kinematic(body.system_body) ? sadmm_kinematic(body.system_body) : -1;
     if (f->dynamic >= 0) {
         f->start = v.step.before[f->dynamic];
     } else {
@@ -95,11 +95,11 @@ static __device__ __noinline__ void load_flyer(const hits_view &v, int32_t slot,
         memcpy(f->start.orientation, body.orientation, sizeof body.orientation);
         memcpy(f->start.velocity, body.velocity, sizeof body.velocity);
     }
-    flyer_begin(f, v.step.settings);
+    swept_body_begin(f, v.step.settings);
 }
 
-static __device__ __forceinline__ struct sadmm_flying_shape flying(const hits_view &v, uint32_t slot,
-                                                                   const struct sadmm_flight *flight)
+static __device__ __forceinline__ struct sadmm_swept_shape swept_shape(const hits_view &v, uint32_t slot,
+                                                                       const struct sadmm_flight *flight)
 {
     const struct sadmm_shape *shape = &v.c.shapes[slot];
     return {shape, &v.c.geometries[shape->geometry], flight};
@@ -107,20 +107,20 @@ static __device__ __forceinline__ struct sadmm_flying_shape flying(const hits_vi
 
 /* When do two shapes of the group hit each other, from `from` on? Into its list; what does not fit is counted. False: it
  * took too many looks to tell. */
-static __device__ __noinline__ bool foresee(const hits_view &v, int32_t group, uint64_t key, const struct flyer *a,
-                                            const struct flyer *b, double from, uint64_t mark)
+static __device__ __noinline__ bool foresee(const hits_view &v, int32_t group, uint64_t key, const struct swept_body *a,
+                                            const struct swept_body *b, double from, uint64_t mark)
 {
     struct foreseen_hit hit;
-    struct sadmm_flying_pair pair = {flying(v, (uint32_t)(key >> 32), &a->flight),
-                                     flying(v, (uint32_t)key, &b->flight),
-                                     v.c.hulls,
-                                     0,
-                                     v.step.settings->restitution_threshold,
-                                     false};
+    struct sadmm_swept_pair pair = {swept_shape(v, (uint32_t)(key >> 32), &a->flight),
+                                    swept_shape(v, (uint32_t)key, &b->flight),
+                                    v.c.hulls,
+                                    0,
+                                    v.step.settings->restitution_threshold,
+                                    false};
     v.marks[a->slot].followed = v.marks[b->slot].followed = mark;
     if (pair.b.geometry->type == SADMM_SHAPE_MESH) return true; /* the solve's: what its triangles push along depends on
                                                                    others */
-    const bool found = flying_touch(&pair, from, v.step.settings->dt, &hit.touch);
+    const bool found = swept_touch(&pair, from, v.step.settings->dt, &hit.touch);
     if (pair.lost) v.marks[a->slot].lost = v.marks[b->slot].lost = mark;
     if (!found) return !pair.lost;
     hit.key = key;
@@ -142,12 +142,12 @@ static __device__ __forceinline__ int32_t group_of(const hits_view &v, int32_t a
 /* A body as the (sub-)step begins. */
 static __device__ __forceinline__ void begin_body(const hits_view &v, int32_t slot)
 {
-    load_flyer(v, slot, &v.flyers[slot]);
+    load_swept_body(v, slot, &v.swept_bodies[slot]);
     for (int k = 0; k < 6; ++k) v.impulse[6 * (size_t)slot + k] = 0;
     v.since[slot] = 0;
 }
 
-/* Both of a fast pair of flyers are followed, and may go through each other. */
+/* Both of a fast pair of swept bodies are followed, and may go through each other. */
 static __device__ __forceinline__ void follow(const hits_view &v, const struct collision_step &step,
                                               const struct sadmm_proxy &a, const struct sadmm_proxy &b, uint64_t mark)
 {
@@ -156,7 +156,7 @@ static __device__ __forceinline__ void follow(const hits_view &v, const struct c
         v.marks[a.body].passes = v.marks[b.body].passes = mark;
 }
 
-/* Pairs with a mesh are the solve's, but flyers that are fast enough are followed. kind: of a body. */
+/* Pairs with a mesh are the solve's, but swept bodies that are fast enough are followed. kind: of a body. */
 template <class Kind>
 static __device__ __forceinline__ void follow_on_meshes(const hits_view &v, int64_t thread, int64_t stride,
                                                         uint64_t mark, const Kind &kind)
@@ -180,7 +180,7 @@ static __device__ __forceinline__ struct candidate listed_pair(const hits_view &
     return candidate_of(v.c, v.c.candidates[at < 0 ? ~at : at]);
 }
 
-/* Beside it all flyers and boxes for `take`. */
+/* Beside it all swept bodies and boxes for `take`. */
 static __global__ void __launch_bounds__(FORESEE_THREADS) foresee_kernel(const __grid_constant__ hits_view v)
 {
     follow_if(v.c.early);
@@ -192,14 +192,14 @@ static __global__ void __launch_bounds__(FORESEE_THREADS) foresee_kernel(const _
     for (int64_t j = thread; j < count; j += stride) {
         const struct candidate own = listed_pair(v, j);
         const int32_t a = v.c.proxies[own.a].body, b = v.c.proxies[own.b].body;
-        struct flyer flyers[2];
+        struct swept_body swept_bodies[2];
         if (!kinds_hit(kind_of(v, a, epoch), kind_of(v, b, epoch))) continue;
-        load_flyer(v, a, &flyers[0]);
-        load_flyer(v, b, &flyers[1]);
+        load_swept_body(v, a, &swept_bodies[0]);
+        load_swept_body(v, b, &swept_bodies[1]);
         v.state->followed = 1;
         v.progress[group_of(v, a, b)].followed = mark;
         follow(v, step, v.c.proxies[own.a], v.c.proxies[own.b], mark);
-        if (!foresee(v, group_of(v, a, b), ordered_key(own.a, own.b), &flyers[0], &flyers[1], 0, mark))
+        if (!foresee(v, group_of(v, a, b), ordered_key(own.a, own.b), &swept_bodies[0], &swept_bodies[1], 0, mark))
             v.listed[j] = ~v.listed[j];
     }
     if (count > 0)
@@ -229,10 +229,11 @@ struct take_shared {
 static __device__ __forceinline__ bool holds(const hits_view &v, const struct foreseen_hit &hit)
 {
     const int32_t a = hit.body[0], b = hit.body[1];
-    return v.flyers[a].hits == hit.hits[0] && v.flyers[b].hits == hit.hits[1] && kinds_hit(v.kinds[a], v.kinds[b]);
+    return v.swept_bodies[a].hits == hit.hits[0] && v.swept_bodies[b].hits == hit.hits[1] &&
+           kinds_hit(v.kinds[a], v.kinds[b]);
 }
 
-/* The group's flyers, boxes and sums as the (sub-)step begins, once more. Every thread. */
+/* The group's swept bodies, boxes and sums as the (sub-)step begins, once more. Every thread. */
 static __device__ void begin_again(const hits_view &v, const struct hit_group &own)
 {
     for (int32_t j = (int32_t)threadIdx.x; j < own.body_count; j += TAKE_THREADS)
@@ -244,7 +245,7 @@ static __device__ void begin_again(const hits_view &v, const struct hit_group &o
     __syncthreads();
 }
 
-/* Flyers of the group's fast pairs, once some bodies take part no more. Every thread. */
+/* Swept bodies of the group's fast pairs, once some bodies take part no more. Every thread. */
 static __device__ void follow_listed(const hits_view &v, int32_t group, uint64_t mark)
 {
     const struct collision_step step = step_of(v.c);
@@ -256,7 +257,7 @@ static __device__ void follow_listed(const hits_view &v, int32_t group, uint64_t
         if (v.listed[j] < 0) v.marks[a.body].lost = v.marks[b.body].lost = mark;
     }
     follow_on_meshes(v, (int64_t)threadIdx.x, TAKE_THREADS, mark, [&v, group](int32_t body) {
-        return v.group_of[body] < 0 || v.group_of[body] == group ? v.kinds[body] : (unsigned char)SADMM_FLYER_NONE;
+        return v.group_of[body] < 0 || v.group_of[body] == group ? v.kinds[body] : (unsigned char)SADMM_SWEPT_NONE;
     });
     if (threadIdx.x == 0) v.progress[group].followed = mark;
     __syncthreads();
@@ -313,11 +314,11 @@ static __device__ bool record(const hits_view &v, const struct foreseen_hit &ite
         memcpy(out->normal, item.touch.normal, sizeof out->normal);
         v3_store(hit_impulse(hit, k, 1), out->impulse);
         for (int side = 0; side < 2; ++side) {
-            const struct flyer &f = v.flyers[item.body[side]];
+            const struct swept_body &f = v.swept_bodies[item.body[side]];
             double *sum = v.impulse + 6 * (size_t)item.body[side];
             v3_store(hit->arm[side][k], out->arm[side]);
             out->dynamic[side] = f.dynamic;
-            out->driven[side] = f.driven;
+            out->kinematic[side] = f.kinematic;
             if (v.group_of[item.body[side]] < 0) continue; /* it does not move, and other groups meet it */
             for (int j = 0; j < 3; ++j) sum[j] += (side ? 1 : -1) * out->impulse[j];
             add_cross(out->arm[side], out->impulse, side ? 1 : -1, sum + 3);
@@ -332,8 +333,8 @@ static __device__ bool record(const hits_view &v, const struct foreseen_hit &ite
 static __device__ __noinline__ void take_hit(const hits_view &v, struct take_shared *shared)
 {
     const struct foreseen_hit &item = shared->next;
-    struct flyer *const f[2] = {&v.flyers[item.body[0]], &v.flyers[item.body[1]]};
-    const struct flyer *const of[2] = {f[0], f[1]};
+    struct swept_body *const f[2] = {&v.swept_bodies[item.body[0]], &v.swept_bodies[item.body[1]]};
+    const struct swept_body *const of[2] = {f[0], f[1]};
     struct sadmm_flight_pose pose[2];
     struct hit hit;
     bool may = true;
@@ -354,13 +355,13 @@ static __device__ __noinline__ void take_hit(const hits_view &v, struct take_sha
     hit.friction = contact_friction(v.c.friction_pairs, v.c.friction_values, v.c.friction_count,
                                     (uint32_t)(item.key >> 32), (uint32_t)item.key, &a, &b);
     hit.restitution = larger_of(a.restitution, b.restitution);
-    flyers_hit(of, &item.touch, v.step.settings->restitution_threshold, pose, &hit);
+    swept_bodies_hit(of, &item.touch, v.step.settings->restitution_threshold, pose, &hit);
     hit_solve(&hit);
     if (!record(v, item, &hit, shared)) {
         shared->fails = true;
         return;
     }
-    flyers_part(f, v.step.settings, item.touch.time, pose, &hit);
+    swept_bodies_part(f, v.step.settings, item.touch.time, pose, &hit);
     shared->taken = 1;
     ++shared->hit_count;
 }
@@ -369,7 +370,7 @@ static __device__ __noinline__ void take_hit(const hits_view &v, struct take_sha
  * comes near depends on those before it. Every thread. */
 static __device__ void list_shapes(const hits_view &v, int32_t body, struct take_shared *shared)
 {
-    const struct flyer &f = v.flyers[body];
+    const struct swept_body &f = v.swept_bodies[body];
     if (threadIdx.x == 0) shared->shapes = shared->near = 0;
     __syncthreads();
     for (int32_t j = (int32_t)threadIdx.x; j < shared->own.leaf_count; j += TAKE_THREADS) {
@@ -381,7 +382,8 @@ static __device__ void list_shapes(const hits_view &v, int32_t body, struct take
         struct sadmm_flight_pose from, to;
         flight_at(&f.flight, f.flight.since, &from);
         flight_at(&f.flight, v.step.settings->dt, &to);
-        flyer_box(shape, &v.c.geometries[shape->geometry], &f.flight, v.step.settings->dt, &from, &to, &v.boxes[i]);
+        swept_body_box(shape, &v.c.geometries[shape->geometry], &f.flight, v.step.settings->dt, &from, &to,
+                       &v.boxes[i]);
         shared->listed[at] = i;
     }
     __syncthreads();
@@ -485,8 +487,9 @@ static __device__ void foresee_body(const hits_view &v, int32_t body, int32_t ex
         if (shared->fails) break;
         for (int64_t j = (int64_t)threadIdx.x; j < near; j += TAKE_THREADS) {
             const uint64_t key = v.near[shared->own.near_first + j];
-            foresee(v, shared->group, key, &v.flyers[v.c.proxies[key >> 32].body],
-                    &v.flyers[v.c.proxies[key & UINT32_MAX].body], v.flyers[body].flight.since, marks.followed);
+            foresee(v, shared->group, key, &v.swept_bodies[v.c.proxies[key >> 32].body],
+                    &v.swept_bodies[v.c.proxies[key & UINT32_MAX].body], v.swept_bodies[body].flight.since,
+                    marks.followed);
         }
         __syncthreads();
         if (threadIdx.x == 0) {
@@ -511,7 +514,7 @@ static __device__ void take_all(const hits_view &v, const struct taking_marks &m
         __syncthreads();
         if (!shared->taken || shared->fails) continue;
         const int32_t a = shared->next.body[0], b = shared->next.body[1];
-        const bool moves_a = v.flyers[a].dynamic >= 0, moves_b = v.flyers[b].dynamic >= 0;
+        const bool moves_a = v.swept_bodies[a].dynamic >= 0, moves_b = v.swept_bodies[b].dynamic >= 0;
         if (moves_a) foresee_body(v, a, -1, marks, shared);
         if (moves_b && !shared->fails) foresee_body(v, b, moves_a ? a : -1, marks, shared);
     }
@@ -524,11 +527,11 @@ static __device__ bool leave_out(const hits_view &v, uint64_t mark, struct take_
     __syncthreads();
     for (int32_t j = (int32_t)threadIdx.x; j < shared->own.body_count; j += TAKE_THREADS) {
         const int32_t slot = v.group_bodies[shared->own.body_first + j];
-        const struct flyer &f = v.flyers[slot];
-        if (f.dynamic < 0 || v.kinds[slot] == SADMM_FLYER_NONE || !gives_up(v, slot, mark) ||
+        const struct swept_body &f = v.swept_bodies[slot];
+        if (f.dynamic < 0 || v.kinds[slot] == SADMM_SWEPT_NONE || !gives_up(v, slot, mark) ||
             v.marks[slot].passes == mark)
             continue;
-        v.kinds[slot] = SADMM_FLYER_NONE;
+        v.kinds[slot] = SADMM_SWEPT_NONE;
         shared->found = 1;
     }
     __syncthreads();
@@ -538,13 +541,13 @@ static __device__ bool leave_out(const hits_view &v, uint64_t mark, struct take_
 /* What was hit begins the (sub-)step where it would have. */
 static __device__ __forceinline__ void write_back(const hits_view &v, int32_t slot)
 {
-    const struct flyer &f = v.flyers[slot];
+    const struct swept_body &f = v.swept_bodies[slot];
     if (f.hits == 0) return;
     struct sadmm_collision_body *out = &v.step.bodies[slot];
     double *velocity = v.step.velocity + 6 * (size_t)f.dynamic;
     struct sadmm_flight_pose pose;
     v.step.start[f.dynamic] = f.start;
-    for (int k = 0; k < 3; ++k) { /* it flies on: what contacts do not change is right from the start */
+    for (int k = 0; k < 3; ++k) { /* it stays airborne: what contacts do not change is right from the start */
         velocity[k] = f.start.velocity[k] + v.step.settings->dt * f.flight.acceleration[k];
         velocity[3 + k] = f.flight.spin[k];
     }
@@ -600,7 +603,7 @@ static __device__ void take_group(const hits_view &v, int32_t group, uint64_t ep
         if (any) write_back(v, slot);
         if (done) continue;
         begin_body(v, slot); /* none is taken, and none was foreseen */
-        v.kinds[slot] = SADMM_FLYER_NONE;
+        v.kinds[slot] = SADMM_SWEPT_NONE;
     }
     if (!leads || !any) return;
     v.progress[group].records = shared->record_count;

@@ -52,7 +52,7 @@ struct sadmm_cuda_hits {
     int32_t most;                         /* a body may have (settings.hits) */
     int32_t into;                         /* step that ends there, 0 or 1: whose hits are kept */
     int32_t substep, substeps;
-    double *wrench, *driven_wrench;       /* bodies x 6, driven bodies x 6: contacts' */
+    double *wrench, *kinematic_wrench;    /* bodies x 6, kinematic bodies x 6: contacts' */
 };
 
 /* For tests and measurements; 0: the default. */

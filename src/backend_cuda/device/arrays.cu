@@ -1,8 +1,8 @@
 /* The arrays that a solve works on, by the view's counts, the plan and the partition. */
 #include "context.h"
 
-/* What restores the momentum of islands, and says where leads stay. In `paper` their energies, too: the method `fast`
- * has these elsewhere. */
+/* What restores the momentum of islands, and says where the trapezoid correction is off. In `paper` their energies,
+ * too: the method `fast` has these elsewhere. */
 static sadmm_status reserve_motions(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
@@ -76,7 +76,7 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
     v->contacts.point_slots = c->statistics.point_slots;
     size_t out = (14 * n + 3 * points + 6 * (size_t)v->rows.count + 2) * sizeof(double);
     const cuda_capacity wanted[] = {
-        {BUFFER_STATE, (n + 1 + (v->raw.system.driven_count > 0 ? pairs : 0)) * ROW * real_size},
+        {BUFFER_STATE, (n + 1 + (v->raw.system.kinematic_count > 0 ? pairs : 0)) * ROW * real_size},
         {BUFFER_B, (c->fast ? 2 : 1) * n * ROW * real_size},
         {BUFFER_LINES, n * (size_t)v->bodies.line * real_size},
         {BUFFER_HALFWAY, v->bodies.rigid ? HALFWAY * n * sizeof(double) : 0},

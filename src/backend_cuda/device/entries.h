@@ -52,8 +52,8 @@ sadmm_status CUDA(step_world)(struct sadmm_context *, const struct sadmm_setting
 sadmm_status CUDA(wait_world)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);
 sadmm_status CUDA(read_bodies)(struct sadmm_context *, struct sadmm_rigid *, struct sadmm_steady *, double *wrench,
                                struct sadmm_error *);
-sadmm_status CUDA(read_driven)(struct sadmm_context *, struct sadmm_driven_body *, double *wrench, double *velocity,
-                               struct sadmm_error *);
+sadmm_status CUDA(read_kinematic)(struct sadmm_context *, struct sadmm_kinematic_body *, double *wrench,
+                                  double *velocity, struct sadmm_error *);
 sadmm_status CUDA(read_contacts)(struct sadmm_context *, struct sadmm_contact_set *, struct sadmm_error *);
 sadmm_status CUDA(read_hits)(struct sadmm_context *, struct sadmm_world_hit *, size_t capacity, size_t *count,
                              size_t *first, struct sadmm_error *);

@@ -3,7 +3,7 @@
  *     edit        states, wrenches, targets and settings' numbers set since the last step (where there are any)
  *     start       where a solve starts from; bodies as collision sees them
  *     find        contacts, from one set into the other (collide/view.h); beside it A, b of the bodies, rows of joints
- *                 (where there are driven bodies A and b wait for the layout: step/driven.cu)
+ *                 (where there are kinematic bodies A and b wait for the layout: step/kinematic.cu)
  *     admit       do they fit? Then they are this step's (cuda_live)
  *     statistics  of the constraint graph; islands (graph/layout.cu)
  *     layout      slots, sides, parts; beside it contacts in the solver's form (fast: behind joined bodies)
@@ -79,7 +79,7 @@ struct cuda_joint_counts {
 struct cuda_step_report {
     int64_t sequence; /* steps enqueued before this one, failed ones included */
     int32_t abort_code;     /* enum cuda_abort */
-    int32_t offending_body;  /* a body that is not finite; INT32_MAX: none; INT32_MIN + k: driven body k */
+    int32_t offending_body;  /* a body that is not finite; INT32_MAX: none; INT32_MIN + k: kinematic body k */
     int32_t substep; /* the last one that found contacts: that of `counts` and `statistics` */
     struct sadmm_cuda_contact_counts counts;
     struct cuda_graph_statistics statistics;

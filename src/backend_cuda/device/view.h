@@ -88,7 +88,7 @@ struct cuda_island {
     double slow_down;    /* math/limit.h: the factor of its velocities */
     int32_t held;        /* not loose (math/momentum.h): some pair holds it, nothing touches it, or there are rows */
     int32_t rows;        /* there are constraints given by rows: the weight scale stays 1, energies have no limit; and,
-                            once iterations have ended, a driven body pushes */
+                            once iterations have ended, a kinematic body pushes */
     int32_t stopped;     /* iterations after which a check found the tolerances met; 0: not yet */
 };
 
@@ -112,7 +112,7 @@ enum { SIDE_ARMS = 10, SIDE_LOAD = SIDE_ARMS, SIDE_RESPONSE, SIDE_NUMBERS };
 
 /* What a pair joins. */
 struct alignas(16) pair_bodies {
-    int32_t body_a, body_b; /* raw; the static world: `bodies`; above: a row of a driven one */
+    int32_t body_a, body_b; /* raw; the static world: `bodies`; above: a row of a kinematic one */
     int32_t side_a, side_b; /* places of its sides in `incident`, and of their records; of the static world: -1.
                                For the stepwise kernels alone (streamed.cu) */
 };
@@ -146,7 +146,7 @@ enum { HALFWAY = 8, HALFWAY_ANGULAR = 4 }; /* orientation, angular velocity, 0 *
 /* Bodies in the solver's form. */
 struct body_view {
     solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0. Where there
-                           are driven bodies a row a pair follows (assemble/assemble.cu); tier STREAM reads these */
+                           are kinematic bodies a row a pair follows (assemble/assemble.cu); tier STREAM reads these */
     solver_real *b;     /* bodies x ROW */
     solver_real *momentum_residual; /* fast: bodies x ROW: b - A v + J^T lambda, two zeros; RESIDUAL_STAYS */
     solver_real *lines; /* bodies x line: A and H (device/line.h) */
@@ -206,16 +206,16 @@ struct island_view {
     double *terms;                /* slots x TERMS: of bodies, then added up in place (weight/island_sums.h) */
     unsigned long long *arrivals; /* slots: of terms at places they are added up at; 0 between kernels */
     int32_t *limited;             /* islands slowed down */
-    int32_t *touch;               /* worlds with contacts: bodies: bits (math/lead.h), of the body and, at labels, of
-                                     the island; else NULL */
+    int32_t *touch;               /* worlds with contacts: bodies: bits (math/trapezoid.h), of the body and, at labels,
+                                     of the island; else NULL */
     int32_t *again;               /* worlds: whether bodies have to be moved again; enum cuda_again */
     int32_t *suspects;            /* not 0: some island that is held may have to be */
     int32_t *loose;               /* fast: not 0: there are islands that are not held */
     cuda_stop *stop;
 };
 
-/* Why bodies may have to be moved again (step/move.h): an island is not as it is as a rule; some body's lead closes a
- * contact, and nothing presses on some body, which may be that one. */
+/* Why bodies may have to be moved again (step/move.h): an island is not as it is as a rule; some body's trapezoid
+ * correction closes a contact, and nothing presses on some body, which may be that one. */
 enum cuda_again { AGAIN, AGAIN_CLOSED, AGAIN_UNPRESSED, AGAIN_ROLLS, AGAIN_WHYS };
 
 /* What passes from sweep to sweep, and what was measured of them. */
@@ -312,23 +312,25 @@ struct joint_view {
     struct cuda_stiffening *stiffening; /* bodies: in the (sub-)step at hand */
     const int32_t *closing;         /* constraints: the joint whose locks are closed by its rows; -1: none */
     struct cuda_closed_body *closed; /* bodies: of islands that have been closed in this (sub-)step */
-    int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_lead.h) */
+    int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_trapezoid.h) */
     struct joint_momentum *momentum; /* bodies; at labels then of islands, and what restores it (joint_momentum.h) */
 };
 
-/* Driven bodies of a world (step/driven.cu), and what islands ride on them. What the solve sees of both is in
+/* Kinematic bodies of a world (step/kinematic.cu), and what islands they support. What the solve sees of both is in
  * raw_view.system. */
-struct driven_view {
+struct kinematic_view {
     int32_t count;
-    const struct sadmm_driven_body *before; /* as the step began; */
-    struct sadmm_driven_body *after;        /* as it ends */
-    struct sadmm_rigid *moving;             /* as the sub-step at hand begins, with the velocities of the step */
-    double *wrench;                         /* x 6: what contacts give them, the mean over the step */
-    double *velocity;                       /* bodies x 6: where the solve starts, less what they are carried by */
-    int32_t *support;                       /* bodies: at labels of islands the first pair with what does not feel it; */
-    int32_t *several;                       /* not 0: there is something else that holds the island */
-    int32_t *moves;                         /* not 0: a driven body of a pair is in motion; */
-    int32_t *carries;                       /* and some island rides on one */
+    const struct sadmm_kinematic_body *before; /* as the step began; */
+    struct sadmm_kinematic_body *after;        /* as it ends */
+    struct sadmm_rigid *moving;                /* as the sub-step at hand begins, with the velocities of the step */
+    double *wrench;                            /* x 6: what contacts give them, the mean over the step */
+    double *velocity;                          /* bodies x 6: where the solve starts, less the motion of their
+                                                  support */
+    int32_t *support;                          /* bodies: at labels of islands the first pair with what does not feel
+                                                  it; */
+    int32_t *several;                          /* not 0: there is something else that holds the island */
+    int32_t *moves;                            /* not 0: a kinematic body of a pair is in motion; */
+    int32_t *supports;                         /* and one supports some island */
 };
 
 /* Islands that are pushed apart without a velocity (core/solve/push.h, step/push.h). In worlds alone. */
@@ -340,7 +342,7 @@ struct push_view {
     /* where it is planned: */
     uint8_t *points;           /* pairs: points of those that are pushed, else 0; */
     uint64_t *places;          /* such pairs and their points before it (size_of in device/parallel.h) */
-    double *start;             /* bodies x 6: v_0, where the second problem begins, less what they are carried by */
+    double *start;             /* bodies x 6: v_0, where the second problem begins, less the motion of their support */
     double *way;               /* bodies x 6: v_1 - v_0 */
     struct cuda_live *live;    /* the second problem's: aborted where there is none; */
     struct sadmm_contact_pair *pairs; /* and its contacts */
@@ -357,10 +359,10 @@ struct cuda_view {
     struct island_view islands;
     struct iteration_view iteration;
     struct raw_view raw;
-    struct cuda_step_view step; /* whole steps alone; */
-    struct joint_view joints;   /* likewise; */
-    struct driven_view driven;  /* likewise; */
-    struct push_view push;      /* likewise */
+    struct cuda_step_view step;      /* whole steps alone; */
+    struct joint_view joints;        /* likewise; */
+    struct kinematic_view kinematic; /* likewise; */
+    struct push_view push;           /* likewise */
 };
 
 /* In pinned memory: the edits of step `sequence`; and them, one after the other. */
@@ -375,8 +377,11 @@ static __host__ __device__ inline const struct sadmm_resident_edit *first_edit(c
     return (const struct sadmm_resident_edit *)(edits + 1);
 }
 
-/* In a whole step: is what the solve gives to be added to the motion that bodies are carried by? */
-static __device__ __forceinline__ bool is_carried(const cuda_view &v) { return v.driven.count > 0 && *v.driven.carries; }
+/* In a whole step: is what the solve gives relative to the motion of the bodies' support? */
+static __device__ __forceinline__ bool is_supported(const cuda_view &v)
+{
+    return v.kinematic.count > 0 && *v.kinematic.supports;
+}
 
 /* Where the data of point k of pair p is. */
 template <int LANES_A_PAIR>

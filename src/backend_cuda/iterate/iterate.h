@@ -19,7 +19,7 @@ sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadm
 sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *, int done, struct sadmm_error *error);
 /* fast: by what islands are to be slowed down (slow.h), and how many, in *view.islands.limited. `suspected`: the
  * iterations have found out whether any is. */
-/* Before the limit: islands that driven bodies push are left alone, if there are any. */
+/* Before the limit: islands that kinematic bodies push are left alone, if there are any. */
 sadmm_status CUDA(enqueue_pushed)(struct sadmm_context *, struct sadmm_error *error);
 /* motions: once it is known what is held; before the limit. */
 sadmm_status CUDA(enqueue_motions)(struct sadmm_context *, struct sadmm_error *error);

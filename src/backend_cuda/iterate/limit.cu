@@ -98,8 +98,8 @@ static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __
     for (int k = 0; k < 6; ++k) state[k] = velocity[k];
 }
 
-/* Islands that driven bodies push are left alone, as those with rows are. A thread a pair. */
-static __global__ void driven_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* Islands that kinematic bodies push are left alone, as those with rows are. A thread a pair. */
+static __global__ void kinematic_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     wait_for_stream();
     let_next_begin(v.model.bodies);
@@ -135,8 +135,9 @@ sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct
 sadmm_status CUDA(enqueue_pushed)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = {};
-    if (c->view.raw.system.driven_count == 0) return SADMM_OK;
-    return CUDA(launch)(c, driven_kernel, "driven islands", blocks_for(c->view.contacts.pair_capacity), &args, error);
+    if (c->view.raw.system.kinematic_count == 0) return SADMM_OK;
+    return CUDA(launch)(c, kinematic_kernel, "kinematic islands", blocks_for(c->view.contacts.pair_capacity), &args,
+                        error);
 }
 
 /* ---- entries ----------------------------------------------------------------------------------------------------- */

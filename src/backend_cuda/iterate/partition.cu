@@ -311,8 +311,8 @@ sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_g
 {
     cudaError_t code = cudaSuccess;
     struct choice choice;
-    /* Motions of driven bodies are in memory, a row a pair: the other tiers have no place for them on the chip. */
-    switch (c->view.raw.system.driven_count > 0 ? SADMM_CUDA_TIER_STREAM : c->wanted) {
+    /* Motions of kinematic bodies are in memory, a row a pair: the other tiers have no place for them on the chip. */
+    switch (c->view.raw.system.kinematic_count > 0 ? SADMM_CUDA_TIER_STREAM : c->wanted) {
     case SADMM_CUDA_TIER_BLOCK: choice = choose_block(c, statistics); break;
     case SADMM_CUDA_TIER_CLUSTER: choice = choose_cluster(c, statistics, &code); break;
     case SADMM_CUDA_TIER_GRID: choice = choose_grid(c, statistics, &code); break;
@@ -322,7 +322,7 @@ sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_g
     if (code != cudaSuccess) return CUDA(fail)(c, code, "looking for blocks that run side by side", error);
     if (choice.why) return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "the cuda tier asked for: %s", choice.why);
     *partition = choice.partition;
-    partition->islands = c->fast || c->plan.momentum || c->view.joints.count > 0 || c->view.driven.count > 0;
+    partition->islands = c->fast || c->plan.momentum || c->view.joints.count > 0 || c->view.kinematic.count > 0;
     return SADMM_OK;
 }
 

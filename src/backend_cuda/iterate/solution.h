@@ -4,7 +4,7 @@
 
 #include "backend_cuda/device/double.h"
 #include "backend_cuda/device/wide.h"
-#include "core/math/lead.h"
+#include "core/math/trapezoid.h"
 #include "core/model/spin.h"
 
 /* Multiplier of a point as a world vector on b. */
@@ -19,18 +19,20 @@ static __device__ __forceinline__ const double *halfway_of(const cuda_view &v, i
     return row_at(v.bodies.halfway, (size_t)i);
 }
 
-/* Q: where a body for which `velocity` is solved gets to by that less its lead (math/lead.h): position, orientation, and
- * velocity at the end. halfway: its orientation then (spin.h); dt: the settings', fetched early. */
+/* Q: where a body for which `velocity` is solved gets to by that less its trapezoid correction (math/trapezoid.h):
+ * position, orientation, and velocity at the end. halfway: its orientation then (spin.h); dt: the settings', fetched
+ * early. */
 enum { PLACE = 13 };
 static __device__ __forceinline__ void move_body(const struct sadmm_rigid *body, const double halfway[4],
                                                  const double velocity[6], double dt, const double gravity[3],
-                                                 enum lead_kind kind, double place[PLACE])
+                                                 enum trapezoid_kind kind, double place[PLACE])
 {
-    double lead[6] = {}, mean[6];
-    if (kind == LEAD_SHARED) lead_shared(gravity, dt, lead);
-    if (kind == LEAD_OWN) lead_own(body->velocity, velocity, lead); /* turned by it only where moments are equal */
-    for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - lead[k];
-    spin_move_from(body, halfway, velocity, mean, kind != LEAD_OWN, dt, place, place + 3, place + 7);
+    double correction[6] = {}, mean[6];
+    if (kind == TRAPEZOID_SHARED) trapezoid_shared(gravity, dt, correction);
+    /* turned by it only where moments are equal */
+    if (kind == TRAPEZOID_OWN) trapezoid_own(body->velocity, velocity, correction);
+    for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - correction[k];
+    spin_move_from(body, halfway, velocity, mean, kind != TRAPEZOID_OWN, dt, place, place + 3, place + 7);
 }
 
 /* Both places of a body that rests or moves by itself: one tumble is enough. */
@@ -38,9 +40,9 @@ static __device__ __forceinline__ void move_body_both(const struct sadmm_rigid *
                                                       const double velocity[6], double dt, const double gravity[3],
                                                       double stays[PLACE], double own[PLACE])
 {
-    move_body(body, halfway, velocity, dt, gravity, LEAD_OWN, own);
+    move_body(body, halfway, velocity, dt, gravity, TRAPEZOID_OWN, own);
     if (rigid_is_isotropic(v3_load(body->inertia))) {
-        move_body(body, halfway, velocity, dt, gravity, LEAD_STAYS, stays);
+        move_body(body, halfway, velocity, dt, gravity, TRAPEZOID_OFF, stays);
         return;
     }
     const struct rigid_spin end = {q_load(own + 3), v3_load(own + 10)},

@@ -41,7 +41,7 @@ static __device__ __forceinline__ void tell_touch(const island_view &islands, in
 {
     add_touch(islands, body, label, held ? touch & TOUCH_OF_BODY : touch);
     if (!held) islands.again[AGAIN] = 1;
-    if (!(touch & TOUCH_CARRIED)) islands.again[AGAIN_UNPRESSED] = 1;
+    if (!(touch & TOUCH_SUPPORTED)) islands.again[AGAIN_UNPRESSED] = 1;
 }
 
 /* Does anything touch the bodies of a block? */
@@ -69,14 +69,14 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     const bool touched = t.begin < t.end && v.step.limits;
     const int32_t label = touched ? v.graph.label[body] : 0;
     touching_begun begun = begin_touching(v, t.begin + t.lane, t.end);
-    lead_speeds own = {};
+    trapezoid_speeds own = {};
     bool held = true;
     wait_for_stream();
     let_next_begin();
     if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
     if (touched) {
         held = v.islands.info[label].held;
-        own = load_lead_speeds<true>(v, body);
+        own = load_trapezoid_speeds<true>(v, body);
     }
     contact_sums sums = sum_touching<true>(v, own, &begun);
     if (t.lane == 0) shared->touch[in_block] = sums.touch;
@@ -118,7 +118,7 @@ static __device__ __forceinline__ void end_move(const cuda_view &v, double dt, c
                                                 const struct finish_shared *shared)
 {
     const int touch = shared->touch[((int32_t)threadIdx.x - FINISH_SIDES) % FINISH_BODIES];
-    const bool keeps = lead_kind_of(TOUCH_AS_A_RULE, touch) == LEAD_STAYS;
+    const bool keeps = trapezoid_kind_of(TOUCH_AS_A_RULE, touch) == TRAPEZOID_OFF;
     double place[PLACE];
     if (!m.live) return;
 #pragma unroll
@@ -139,7 +139,7 @@ static __device__ __noinline__ void finish_free(const cuda_view &v, double dt, i
     let_next_begin();
     if (!live) return;
     load_end_velocity(v, body, velocity);
-    move_body(&before.body, halfway_of(v, body), velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
+    move_body(&before.body, halfway_of(v, body), velocity, dt, v.model.settings->gravity, TRAPEZOID_OWN, place);
     if (!moves_apart(v, body)) store_moved(v, body, before, place, true, dt);
     if (!finite_numbers(place, PLACE)) atomicMin(&v.step.control->offending_body, body);
     double owed[6] = {};
@@ -194,13 +194,13 @@ static __device__ __forceinline__ bool store_impulses(const contact_view &contac
     return finite;
 }
 
-/* A driven body that moves jolts what it touches. */
-static __device__ __noinline__ int add_jolt(const cuda_view &v, int32_t p)
+/* A kinematic body that moves would penetrate what it touches. */
+static __device__ __noinline__ int add_penetrates(const cuda_view &v, int32_t p)
 {
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
-    if (!sadmm_pair_is_driven(&v.raw.system, pair)) return 0;
-    add_bits(&v.islands.touch[v.graph.label[pair->body_a >= 0 ? pair->body_a : pair->body_b]], TOUCH_JOLT);
-    return TOUCH_JOLT;
+    if (!sadmm_pair_is_kinematic(&v.raw.system, pair)) return 0;
+    add_bits(&v.islands.touch[v.graph.label[pair->body_a >= 0 ? pair->body_a : pair->body_b]], TOUCH_PENETRATES);
+    return TOUCH_PENETRATES;
 }
 
 /* v.contacts.lanes threads a pair. */
@@ -221,9 +221,9 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
         atomicMin(&control->offending_body, v.model.bodies + body);
     if (live && v.step.limits) {
         int ways = add_ways<true>(v, pair.ends, pair.first, pair.count, lane);
-        if (v.driven.count > 0 && lane == 0) ways |= add_jolt(v, p);
-        if (ways & TOUCH_JOLT) v.islands.again[AGAIN] = 1;
-        if (ways & TOUCH_CARRIED) v.islands.again[AGAIN_CLOSED] = 1;
+        if (v.kinematic.count > 0 && lane == 0) ways |= add_penetrates(v, p);
+        if (ways & TOUCH_PENETRATES) v.islands.again[AGAIN] = 1;
+        if (ways & TOUCH_SUPPORTED) v.islands.again[AGAIN_CLOSED] = 1;
         if (ways & TOUCH_ROLLS) v.islands.again[AGAIN_ROLLS] = 1;
     }
     if (v.step.limits && v.push.bits && !v.push.planned) {

@@ -4,7 +4,7 @@
 
 #include "backend_cuda/assemble/assemble.h"
 #include "core/model/gear_law.h"
-#include "core/model/joint_lead.h"
+#include "core/model/joint_trapezoid.h"
 #include "joint_bodies.h"
 #include "move.h"
 #include "world.h"

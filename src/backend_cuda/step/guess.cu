@@ -145,7 +145,7 @@ static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen,
 bool CUDA(may_be_apart)(const struct sadmm_context *c)
 {
     const struct cuda_step *s = c->step;
-    return s->joints > 0 && s->all_joined && s->driven == 0 && c->settings.warm_start && !c->plan.residuals &&
+    return s->joints > 0 && s->all_joined && s->kinematic == 0 && c->settings.warm_start && !c->plan.residuals &&
            !stop_rule_checked(c);
 }
 

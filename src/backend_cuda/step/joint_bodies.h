@@ -4,16 +4,16 @@
 
 #include "backend_cuda/device/view.h"
 #include "core/model/coupling_law.h"
-#include "core/model/driven.h"
 #include "core/model/joint_law.h"
+#include "core/model/kinematic.h"
 
 static __device__ __forceinline__ struct joint_body body_of(const cuda_view &v, int32_t body)
 {
     struct joint_body out = {body, body >= 0 ? &v.step.before[body] : nullptr, false, false};
-    if (!sadmm_body_is_driven(body)) return out;
+    if (!sadmm_body_is_kinematic(body)) return out;
     out.system_body = -1;
-    out.rigid = &v.driven.moving[sadmm_driven(body)];
-    out.steered = true;
+    out.rigid = &v.kinematic.moving[sadmm_kinematic(body)];
+    out.prescribed = true;
     return out;
 }
 
@@ -40,9 +40,9 @@ static __device__ __forceinline__ struct joint_end joint_end_after(const cuda_vi
     const struct sadmm_resident_joint *joint = &v.joints.joints[j];
     const int32_t body = joint->body[s];
     if (body >= 0) return joint_end_of(&joint->frame[s], v3_load(place), q_load(place + 3));
-    if (!sadmm_body_is_driven(body)) return joint_end_on(&joint->frame[s], nullptr);
+    if (!sadmm_body_is_kinematic(body)) return joint_end_on(&joint->frame[s], nullptr);
     struct sadmm_rigid next;
-    driven_move(&v.driven.moving[sadmm_driven(body)], v.model.settings->dt, &next);
+    kinematic_move(&v.kinematic.moving[sadmm_kinematic(body)], v.model.settings->dt, &next);
     return joint_end_on(&joint->frame[s], &next);
 }
 

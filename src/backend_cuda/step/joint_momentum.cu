@@ -21,7 +21,7 @@ struct joint_island {
     int32_t label, count;
     const int32_t *body;
     const struct joined_structure *part;
-    int32_t bits; /* core/model/joint_lead.h */
+    int32_t bits; /* core/model/joint_trapezoid.h */
 };
 
 static __device__ __forceinline__ bool is_static(const struct sadmm_contact_pair *pair)

@@ -13,7 +13,7 @@ static __device__ __noinline__ void joint_place(const cuda_view &v, int32_t i, i
     if (v.joints.is_direct[i])
         for (int k = 0; k < 6; ++k) velocity[k] = v.joints.velocity[6 * (size_t)i + (size_t)k];
     else load_end_velocity(v, i, velocity);
-    joint_move(&v.step.before[i], halfway_of(v, i), velocity, bits & ISLAND_LEADS_STAY, v.model.settings->dt, place,
+    joint_move(&v.step.before[i], halfway_of(v, i), velocity, bits & ISLAND_TRAPEZOID_OFF, v.model.settings->dt, place,
                place + 3, place + 7);
 }
 

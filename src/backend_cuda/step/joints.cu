@@ -1,5 +1,5 @@
 /* Joints of a world on the device (docs/internals/algorithm.md, "Joints"): the host's formulas (core/model/joint_law.h,
- * joint_lead.h), in double.
+ * joint_trapezoid.h), in double.
  *
  *   rows      eight lanes a joint, one a coordinate: its laws as raw rows, as the host would make them. A joint has a
  *             fixed number of constraints; its rows fill the first ones, the rest join no bodies
@@ -14,7 +14,7 @@
 
 #include "backend_cuda/assemble/assemble.h"
 #include "core/model/coupling_law.h"
-#include "core/model/joint_lead.h"
+#include "core/model/joint_trapezoid.h"
 #include "joint_bodies.h"
 #include "move_joined.h"
 #include "world.h"
@@ -68,7 +68,7 @@ static __device__ __forceinline__ void store_row(const cuda_view &v, const struc
     row.lambda = start;
     const_cast<struct raw_row *>(v.raw.rows)[slot] = row;
     const struct sadmm_joint_source source = {joint,    (int8_t)law.role, (int8_t)law.coordinate, (int8_t)law.sign,
-                                              law.gap, law.slack, law.steered};
+                                              law.gap, law.slack, law.prescribed};
     v.joints.sources[slot] = source;
 }
 
@@ -87,7 +87,7 @@ static __device__ __forceinline__ void begin_memory(const joint_view &joints, in
         return;
     }
     if (lane > JOINT_COORDINATES) return;
-    after->leads_stay = before->leads_stay;
+    after->trapezoid_off = before->trapezoid_off;
     after->broken = before->broken;
 }
 
@@ -182,13 +182,13 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
 
 /* ---- the solution ------------------------------------------------------------------------------------------------ */
 
-static __device__ __forceinline__ struct joint_lead lead_of(const cuda_view &v, int32_t body)
+static __device__ __forceinline__ struct joint_trapezoid trapezoid_of(const cuda_view &v, int32_t body)
 {
     double velocity[6] = {};
     if (body >= 0 && v.joints.is_direct[body])
         for (size_t k = 0; k < 6; ++k) velocity[k] = v.joints.velocity[6 * (size_t)body + k];
     else if (body >= 0) load_end_velocity(v, body, velocity);
-    return joint_lead_of(body >= 0 ? &v.step.before[body] : nullptr, velocity, v.model.settings->dt);
+    return joint_trapezoid_of(body >= 0 ? &v.step.before[body] : nullptr, velocity, v.model.settings->dt);
 }
 
 static __device__ __forceinline__ int32_t *island_of(const cuda_view &v, int32_t a, int32_t b)
@@ -221,7 +221,7 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
         return;
     }
     struct sadmm_joint_memory memory = v.joints.after[j];
-    const struct joint_lead bodies[2] = {lead_of(v, joint->body[0]), lead_of(v, joint->body[1])};
+    const struct joint_trapezoid bodies[2] = {trapezoid_of(v, joint->body[0]), trapezoid_of(v, joint->body[1])};
     int bits = ISLAND_JOINED;
     double finite = 0;
     for (int32_t c = 0; c < joint->constraints; ++c) {
@@ -270,10 +270,10 @@ static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t 
     const int32_t a = live ? pair->body_a : -1, b = live ? pair->body_b : -1, body = a >= 0 ? a : b;
     const bool looks = body >= 0 && v.islands.info[v.graph.label[body]].rows;
     const struct sadmm_settings settings = *v.model.settings;
-    struct joint_lead bodies[2] = {};
-    struct lead_touch touch = {0, {0, 0}};
+    struct joint_trapezoid bodies[2] = {};
+    struct trapezoid_touch touch = {0, {0, 0}};
     if (looks) {
-        bodies[0] = lead_of(v, a), bodies[1] = lead_of(v, b);
+        bodies[0] = trapezoid_of(v, a), bodies[1] = trapezoid_of(v, b);
         for (int32_t k = lane; k < pair->count; k += v.contacts.lanes)
             joint_contact_touches(pair->normal, &v.raw.points[pair->first + k],
                                   sadmm_migration_of(v.raw.points, v.raw.migrations, pair->first + k), bodies,
@@ -283,10 +283,10 @@ static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t 
         touch.island |= __shfl_xor_sync((unsigned)ALL_LANES, touch.island, o);
         for (int s = 0; s < 2; ++s) touch.body[s] |= __shfl_xor_sync((unsigned)ALL_LANES, touch.body[s], o);
     }
-    const bool driven = looks && v.driven.count > 0 && sadmm_pair_is_driven(&v.raw.system, pair);
+    const bool kinematic = looks && v.kinematic.count > 0 && sadmm_pair_is_kinematic(&v.raw.system, pair);
     if (looks && lane == 0)
         atomicOr(island_of(v, a, b),
-                 ISLAND_TOUCHED | (driven || joint_contacts_hold(&touch, bodies) ? ISLAND_LEADS_STAY : 0));
+                 ISLAND_TOUCHED | (kinematic || joint_contacts_hold(&touch, bodies) ? ISLAND_TRAPEZOID_OFF : 0));
 }
 
 /* args.count: threads for joints; the others are for pairs. */

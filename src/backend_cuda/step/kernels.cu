@@ -7,9 +7,9 @@
 
 #include "collision/bounds.h"
 #include "core/model/coupling_law.h"
-#include "core/model/driven.h"
 #include "core/model/gear_law.h"
-#include "core/model/joint_lead.h"
+#include "core/model/joint_trapezoid.h"
+#include "core/model/kinematic.h"
 
 #include "backend_cuda/device/plan_check.h"
 #include "move_joined.h"
@@ -48,9 +48,11 @@ static __device__ __forceinline__ void edit_state(struct sadmm_rigid *body, stru
     steady_set(steady, body, values, values + 3, values + 7);
 }
 
-static __device__ __forceinline__ void edit_driven(const driven_view &driven, const struct sadmm_resident_edit &edit)
+static __device__ __forceinline__ void edit_kinematic(const kinematic_view &kinematic,
+                                                      const struct sadmm_resident_edit &edit)
 {
-    struct sadmm_driven_body *body = &const_cast<struct sadmm_driven_body *>(driven.before)[sadmm_driven(edit.target)];
+    struct sadmm_kinematic_body *body =
+        &const_cast<struct sadmm_kinematic_body *>(kinematic.before)[sadmm_kinematic(edit.target)];
     const double *values = edit.values;
     if (edit.kind == SADMM_EDIT_STATE) return edit_state(&body->rigid, &body->steady, values);
     body->target = values[0] != 0;
@@ -77,7 +79,7 @@ static __device__ __forceinline__ void make_edit(const cuda_view &v, const struc
         v.joints.gear[edit.target].enabled = values[0] != 0;
         return;
     }
-    if (sadmm_body_is_driven(edit.target)) return edit_driven(v.driven, edit);
+    if (sadmm_body_is_kinematic(edit.target)) return edit_kinematic(v.kinematic, edit);
     struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit.target]);
     if (edit.kind == SADMM_EDIT_STATE) {
         edit_state(body, const_cast<struct sadmm_steady *>(&v.step.steady_before[edit.target]), values);
@@ -110,9 +112,9 @@ static __global__ void __launch_bounds__(EDIT_THREADS)
 
 /* What a body brings along, in the order of both structures: position, orientation, velocity. Then, by a lane each,
  * what its wrench gives it and how often it was placed. */
-enum { CARRIED = 13, CARRIED_VELOCITY = 7, LANE_FORCE = CARRIED, LANE_TORQUE, LANE_PLACED, START_LANES };
-static_assert(offsetof(struct sadmm_rigid, velocity) == CARRIED_VELOCITY * sizeof(double) &&
-                  offsetof(struct sadmm_collision_body, velocity) == CARRIED_VELOCITY * sizeof(double),
+enum { COPIED = 13, COPIED_VELOCITY = 7, LANE_FORCE = COPIED, LANE_TORQUE, LANE_PLACED, START_LANES };
+static_assert(offsetof(struct sadmm_rigid, velocity) == COPIED_VELOCITY * sizeof(double) &&
+                  offsetof(struct sadmm_collision_body, velocity) == COPIED_VELOCITY * sizeof(double),
               "numbers of a body are copied one by one");
 
 /* Of body i, number `lane` of what it brings along. */
@@ -122,8 +124,8 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
     /* Every lane fetches all that any of them needs, before it is told apart: one wait for memory, not one a kind of
      * lane. */
     const int32_t slot = v.step.slot_of_body[i],
-                  k = lane >= CARRIED_VELOCITY && lane < CARRIED ? lane - CARRIED_VELOCITY : 0;
-    const double number = ((const double *)body)[lane < CARRIED ? lane : 0], dt = v.model.settings->dt,
+                  k = lane >= COPIED_VELOCITY && lane < COPIED ? lane - COPIED_VELOCITY : 0;
+    const double number = ((const double *)body)[lane < COPIED ? lane : 0], dt = v.model.settings->dt,
                  last_dt = steady->dt, change = steady->change[k];
     const int32_t streak = steady->streak[k / 3];
     const uint32_t placed = steady->placed;
@@ -131,8 +133,8 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
     const vec3 force = v3_load(body->wrench), torque = v3_load(body->wrench + 3);
     const double scale = body->gravity_scale, damping[2] = {body->damping[0], body->damping[1]};
     struct sadmm_collision_body *out = &v.step.bodies[slot];
-    if (lane < CARRIED) ((double *)out)[lane] = number;
-    if (lane >= CARRIED_VELOCITY && lane < CARRIED)
+    if (lane < COPIED) ((double *)out)[lane] = number;
+    if (lane >= COPIED_VELOCITY && lane < COPIED)
         v.step.start_velocity[6 * i + k] = steady_velocity(number, streak, change, step_ratio(dt, last_dt));
     if (lane == LANE_FORCE)
         out->acceleration[0] = v3_max_abs(force) == 0 && scale == 1 && damping[0] == 0
@@ -194,8 +196,8 @@ static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
     const int32_t label = v.graph.label[i];
     const int island = v.islands.touch[label] | (v.islands.info[label].held ? TOUCH_AS_A_RULE : 0),
               own = v.islands.touch[i];
-    const enum lead_kind kind = lead_kind_of(island, own);
-    if (kind == LEAD_OWN) return; /* so it went: what more is known now can only make it stay */
+    const enum trapezoid_kind kind = trapezoid_kind_of(island, own);
+    if (kind == TRAPEZOID_OWN) return; /* it was moved so: what more is known now can only turn the correction off */
     const body_before before = fetch_body(v.step, i);
     const double dt = v.model.settings->dt;
     double velocity[6], place[PLACE];
@@ -453,7 +455,7 @@ sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *err
     cuda_args args = {};
     const int64_t blocks = (int64_t)c->view.model.bodies * START_LANES / STEP_THREADS + 1;
     TRY(CUDA(launch_of)(c, start_step_kernel, "start", blocks, STEP_THREADS, &args, error));
-    return CUDA(launch_driven_start)(c, error);
+    return CUDA(launch_kinematic_start)(c, error);
 }
 
 /* Joints whose bodies move at the very end, once it is known where they may go. */

@@ -1,13 +1,14 @@
-/* Bodies as a step ends: moved by their velocity less their lead (math/lead.h). What holds for an island is known once
- * all of its bodies have been looked at. So a body is moved as if its island were held by friction and no contact
- * jolted, which is so wherever bodies rest; the next kernel moves those again for which that was wrong. */
+/* Bodies as a step ends: moved by their velocity less their trapezoid correction (math/trapezoid.h). What holds for an
+ * island is known once all of its bodies have been visited. So a body is moved as if its island were held by friction
+ * and no contact would penetrate, which is so wherever bodies rest; the next kernel moves those again for which that
+ * was wrong. */
 #ifndef SADMM_CUDA_STEP_MOVE_H
 #define SADMM_CUDA_STEP_MOVE_H
 
 #include "backend_cuda/device/wide.h"
 #include "backend_cuda/iterate/slow.h"
 #include "backend_cuda/iterate/solution.h"
-#include "core/model/joint_lead.h"
+#include "core/model/joint_trapezoid.h"
 #include "core/model/steady.h"
 
 /* Bits of an island where nobody has said anything else. */
@@ -52,8 +53,8 @@ static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int
     else
         for (int k = 0; k < 6; ++k) velocity[k] = row_at(v.bodies.state, (size_t)i)[k];
     for (int k = 0; k < 6; ++k) wide[k] = (double)velocity[k];
-    if (!is_carried(v)) return;
-    for (int k = 0; k < 6; ++k) wide[k] += v.raw.system.carried[6 * (size_t)i + (size_t)k];
+    if (!is_supported(v)) return;
+    for (int k = 0; k < 6; ++k) wide[k] += v.raw.system.support_motion[6 * (size_t)i + (size_t)k];
 }
 
 /* Body i goes to `place`; mean: by the mean of its velocities. */

@@ -12,14 +12,14 @@ static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i)
     const int32_t label = joined_label(v, i), bits = v.joints.touch[label];
     const body_before before = fetch_body(v.step, i);
     const double dt = v.model.settings->dt;
-    const bool leads_stay = bits & ISLAND_LEADS_STAY;
+    const bool trapezoid_off = bits & ISLAND_TRAPEZOID_OFF;
     double place[PLACE];
-    joint_move(&before.body, halfway_of(v, i), v.joints.velocity + 6 * (size_t)i, leads_stay, dt, place, place + 3,
+    joint_move(&before.body, halfway_of(v, i), v.joints.velocity + 6 * (size_t)i, trapezoid_off, dt, place, place + 3,
                place + 7);
     for (int k = 0; k < PLACE && bits & ISLAND_CLOSED; ++k) place[k] = v.joints.closed[i].place[k];
     if (bits & ISLAND_RESTORED)
         joint_restore(&v.joints.momentum[label], place, v.step.before[label].position, place + 7);
-    store_moved(v, i, before, place, !leads_stay, dt);
+    store_moved(v, i, before, place, !trapezoid_off, dt);
 }
 
 /* Joint j remembers how its bodies have been moved, once that is known; behind the joints, of a gear the first one. */
@@ -37,8 +37,8 @@ static __device__ __forceinline__ void end_joints(const cuda_view &v, int32_t j)
     }
     const struct sadmm_row_constraint *first = &v.raw.constraints[constraint];
     if (first->count == 0) return;
-    joints.after[j].leads_stay =
-        joints.touch[joined_label(v, first->body_a >= 0 ? first->body_a : first->body_b)] & ISLAND_LEADS_STAY;
+    joints.after[j].trapezoid_off =
+        joints.touch[joined_label(v, first->body_a >= 0 ? first->body_a : first->body_b)] & ISLAND_TRAPEZOID_OFF;
 }
 
 #endif

@@ -276,7 +276,7 @@ void CUDA(view_push)(struct sadmm_context *c)
     int32_t *due = buffer<int32_t>(c, BUFFER_PUSH);
     *push = none;
     if (!due) return; /* nothing is planned yet */
-    if (!push_is_apart(true, s->bodies, s->driven)) return;
+    if (!push_is_apart(true, s->bodies, s->kinematic)) return;
     push->due = due;
     push->units = (unsigned long long *)(due + PUSH_NUMBERS);
     push->bits = (int32_t *)(push->units + n);

@@ -150,7 +150,7 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     TRY(CUDA(clear_abort)(c, error));
     TRY(CUDA(wait)(c, error));
     if (report->abort_code == ABORT_NON_FINITE) {
-        s->offending_body = report->offending_body < 0 ? sadmm_driven(report->offending_body - INT32_MIN)
+        s->offending_body = report->offending_body < 0 ? sadmm_kinematic(report->offending_body - INT32_MIN)
                                                        : report->offending_body % s->bodies; /* by its state, a
                                                                                                 contact, or a joint */
         drop_steps(c, first, end);

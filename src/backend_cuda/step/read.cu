@@ -6,7 +6,7 @@
 
 #include "collision/collision.h"
 #include "core/base/memory.h"
-#include "core/model/driven.h"
+#include "core/model/kinematic.h"
 #include "core/model/stiffening.h"
 #include "world.h"
 
@@ -68,17 +68,17 @@ extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_
                      6 * n * sizeof *wrench, error);
 }
 
-extern "C" sadmm_status CUDA(read_driven)(struct sadmm_context *c, struct sadmm_driven_body *driven, double *wrench,
-                                          double *velocity, struct sadmm_error *error)
+extern "C" sadmm_status CUDA(read_kinematic)(struct sadmm_context *c, struct sadmm_kinematic_body *kinematic,
+                                             double *wrench, double *velocity, struct sadmm_error *error)
 {
     const struct cuda_step *s = c->step;
-    const size_t n = (size_t)s->driven;
+    const size_t n = (size_t)s->kinematic;
     CUDA_ENTER(c);
     CUDA(view_into)(c, 1 - s->into, 0); /* of the last step */
-    const struct driven_view last = c->view.driven;
-    const double *velocities = c->view.raw.system.driven;
+    const struct kinematic_view last = c->view.kinematic;
+    const double *velocities = c->view.raw.system.kinematic;
     CUDA(view_into)(c, s->into, 0);
-    TRY(CUDA(get)(c, driven, last.after, n * sizeof *driven, error));
+    TRY(CUDA(get)(c, kinematic, last.after, n * sizeof *kinematic, error));
     TRY(CUDA(get)(c, wrench, last.wrench, 6 * n * sizeof *wrench, error));
     return CUDA(get)(c, velocity, velocities, 6 * n * sizeof *velocity, error);
 }

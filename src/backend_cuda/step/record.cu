@@ -42,7 +42,7 @@ sadmm_status CUDA(enqueue_hits)(struct sadmm_context *c, int substep, struct sad
                substep,
                c->settings.substeps,
                c->view.step.wrench,
-               c->view.driven.count > 0 ? c->view.driven.wrench : nullptr};
+               c->view.kinematic.count > 0 ? c->view.kinematic.wrench : nullptr};
     TRY(COLLISION(enqueue_hits)(s->collision, c->stream, &find, error));
     c->view.step.before = c->view.raw.system.rigid = start;
     if (c->view.push.planned) s->push->view.raw.system.rigid = start;
@@ -146,11 +146,11 @@ static sadmm_status record_joined(struct sadmm_context *c, struct sadmm_error *e
 }
 
 /* A and b of the bodies, and joints, whose forces stiffen them: beside contact finding, of which they need nothing.
- * Where there are driven bodies, bodies wait for what they ride on. */
+ * Where there are kinematic bodies, bodies wait for the motion of their supports. */
 static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
     const bool joints = c->view.joints.count > 0;
-    if (c->view.driven.count > 0) return CUDA(launch_joint_rows)(c, error);
+    if (c->view.kinematic.count > 0) return CUDA(launch_joint_rows)(c, error);
     if (joints) TRY(record_joint_rows(c, error));
     {
         side_branch side(c, c->side);
@@ -162,11 +162,11 @@ static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *e
     return joints ? record_joints(c, error) : SADMM_OK;
 }
 
-/* record_plan where there are driven bodies: one after the other. */
-static sadmm_status record_driven_plan(struct sadmm_context *c, struct sadmm_error *error)
+/* record_plan where there are kinematic bodies: one after the other. */
+static sadmm_status record_kinematic_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
-    TRY(CUDA(launch_carry)(c, error));
+    TRY(CUDA(launch_support)(c, error));
     TRY(CUDA(enqueue_bodies)(c, error));
     if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error));
     if (c->view.joints.count > 0) {
@@ -193,7 +193,7 @@ static sadmm_status record_contacts(struct sadmm_context *c, bool late, struct s
  * bodies that do not wait for the layout. */
 static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
-    if (c->view.driven.count > 0) return record_driven_plan(c, error);
+    if (c->view.kinematic.count > 0) return record_kinematic_plan(c, error);
     const bool together = c->view.joints.count > 0 && !c->view.joints.apart, beside = together && joined_is_small(c),
                late = together && c->fast && c->settings.warm_start, /* joined bodies' inertia is not known before */
                side = !c->view.push.planned && (!late || beside);
@@ -256,7 +256,7 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
     }
     if (joints && apart) TRY(wait_for_joints(c, error));
     TRY(joints && !apart ? record_joined_finish(c, error) : CUDA(launch_finish)(c, true, error));
-    TRY(CUDA(launch_driven_finish)(c, error));
+    TRY(CUDA(launch_kinematic_finish)(c, error));
     if (takes_hits(c) && c->view.model.wrenches)
         TRY(COLLISION(give_hits)(c->step->collision, c->stream, &c->step->hits, error));
     if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");

@@ -73,7 +73,7 @@ extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta
     return SADMM_OK;
 }
 
-/* ---- Q: what contacts say of leads (math/lead.h), and moved bodies ----------------------------------------------- */
+/* ---- Q: which trapezoid corrections (math/trapezoid.h) bodies take, and moved bodies ----------------------------- */
 
 /* Eight lanes a body, then v.contacts.lanes a pair; bits are 0 before. */
 static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -86,13 +86,15 @@ static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const _
         if (p >= live_pairs(v.model)) return;
         const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
         add_ways<false>(v, fetch_ends(pair), pair->first, pair->count, i % v.contacts.lanes);
-        if (v.raw.system.driven_count > 0 && i % v.contacts.lanes == 0 && sadmm_pair_is_driven(&v.raw.system, pair))
-            add_bits(&v.islands.touch[v.graph.label[pair->body_a >= 0 ? pair->body_a : pair->body_b]], TOUCH_JOLT);
+        if (v.raw.system.kinematic_count > 0 && i % v.contacts.lanes == 0 &&
+            sadmm_pair_is_kinematic(&v.raw.system, pair))
+            add_bits(&v.islands.touch[v.graph.label[pair->body_a >= 0 ? pair->body_a : pair->body_b]],
+                     TOUCH_PENETRATES);
         return;
     }
     const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
     const int32_t body = (int32_t)t.body;
-    const lead_speeds own = load_lead_speeds<false>(v, body);
+    const trapezoid_speeds own = load_trapezoid_speeds<false>(v, body);
     touching_begun begun = begin_touching(v, t.begin + lane, t.end);
     if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
     const contact_sums sums = sum_touching<true>(v, own, &begun);
@@ -110,12 +112,12 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
     const int island = args.count ? v.islands.touch[v.graph.label[i]] : 0, own = args.count ? v.islands.touch[i] : 0;
     for (int k = 0; k < 6; ++k) {
         velocity[k] = (double)v.bodies.state[(size_t)i * ROW + (size_t)k];
-        if (v.raw.system.carried) velocity[k] += v.raw.system.carried[6 * (size_t)i + (size_t)k];
+        if (v.raw.system.support_motion) velocity[k] += v.raw.system.support_motion[6 * (size_t)i + (size_t)k];
     }
-    const enum lead_kind kind = lead_kind_of(island, own);
+    const enum trapezoid_kind kind = trapezoid_kind_of(island, own);
     move_body(&v.raw.system.rigid[i], halfway_of(v, i), velocity, v.model.settings->dt, v.model.settings->gravity, kind,
               out);
-    out[PLACE] = kind == LEAD_OWN;
+    out[PLACE] = kind == TRAPEZOID_OWN;
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
@@ -155,7 +157,7 @@ static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const 
     follow_if(all_early(v.model.bodies));
     const int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
     const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
-    const lead_speeds none = {};
+    const trapezoid_speeds none = {};
     touching_begun begun = begin_touching(v, t.begin + lane, t.end);
     if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
     const contact_sums sums = sum_touching<false>(v, none, &begun);

@@ -1,5 +1,6 @@
 /* What contacts do to bodies as a step ends. A body's eight lanes take every eighth of its sides each: wrenches, what
- * presses, and where it does not rest. Lanes of pairs: where leads would close a contact (math/lead.h). In double. */
+ * presses, and where it does not rest. Lanes of pairs: where trapezoid corrections would close a contact
+ * (math/trapezoid.h). In double. */
 #ifndef SADMM_CUDA_STEP_TOUCH_H
 #define SADMM_CUDA_STEP_TOUCH_H
 
@@ -7,18 +8,19 @@
 #include "backend_cuda/iterate/slow.h"
 #include "backend_cuda/iterate/solution.h"
 
-/* A body: its velocity before the step and at its end, and its lead. */
-struct lead_body {
-    double before[6], velocity[6], lead[6];
+/* A body: its velocity before the step and at its end, and its trapezoid correction. */
+struct trapezoid_body {
+    double before[6], velocity[6], correction[6];
 };
 
 /* WHOLE: a whole step, where iterations have left `state`; else that is how the step ends. */
-template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body(const cuda_view &v, int32_t body)
+template <bool WHOLE>
+static __device__ __forceinline__ trapezoid_body load_trapezoid_body(const cuda_view &v, int32_t body)
 {
     const struct sadmm_rigid *rigid = wide_at(v.raw.system.rigid, (size_t)body);
-    lead_body out;
+    trapezoid_body out;
     solver_real velocity[6];
-    const bool carried = WHOLE ? is_carried(v) : v.raw.system.carried != nullptr;
+    const bool supported = WHOLE ? is_supported(v) : v.raw.system.support_motion != nullptr;
     if (WHOLE) end_velocity(v, body, velocity);
     else
         for (int k = 0; k < 6; ++k) velocity[k] = row_at(v.bodies.state, (size_t)body)[k];
@@ -27,27 +29,28 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
         out.before[k] = rigid->velocity[k];
         before[k] = k < 3 ? out.before[k] : halfway_of(v, body)[HALFWAY_ANGULAR + k - 3];
         out.velocity[k] = (double)velocity[k];
-        if (carried) out.velocity[k] += v.raw.system.carried[6 * (size_t)body + (size_t)k];
+        if (supported) out.velocity[k] += v.raw.system.support_motion[6 * (size_t)body + (size_t)k];
     }
-    lead_own(before, out.velocity, out.lead);
+    trapezoid_own(before, out.velocity, out.correction);
     return out;
 }
 
-/* What contacts of a body compare with: the linear and angular parts of its speed (lead_size_at), and
- * lead_rest_speed. */
-struct lead_speeds {
+/* What contacts of a body compare with: the linear and angular parts of its speed (trapezoid_size_at), and
+ * trapezoid_rest_speed. */
+struct trapezoid_speeds {
     double moves[2], rest;
     int touch; /* forces_touch */
 };
 
-template <bool WHOLE> static __device__ __forceinline__ lead_speeds load_lead_speeds(const cuda_view &v, int32_t body)
+template <bool WHOLE>
+static __device__ __forceinline__ trapezoid_speeds load_trapezoid_speeds(const cuda_view &v, int32_t body)
 {
     const struct sadmm_rigid *rigid = wide_at(v.raw.system.rigid, (size_t)body);
-    const lead_body own = load_lead_body<WHOLE>(v, body);
-    const lead_speeds out = {
-        {lead_speed_part(own.before, own.velocity, 0), lead_speed_part(own.before, own.velocity, 1)},
-        lead_rest_speed(v.model.settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
-                        v.model.settings->dt),
+    const trapezoid_body own = load_trapezoid_body<WHOLE>(v, body);
+    const trapezoid_speeds out = {
+        {trapezoid_speed_part(own.before, own.velocity, 0), trapezoid_speed_part(own.before, own.velocity, 1)},
+        trapezoid_rest_speed(v.model.settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
+                             v.model.settings->dt),
         forces_touch(rigid)};
     return out;
 }
@@ -115,8 +118,8 @@ static __device__ __forceinline__ void fetch_impulses(const contact_view &contac
 }
 
 /* `points`: those from k on. */
-template <bool LEADS>
-static __device__ __forceinline__ void add_points(const lead_speeds &own, const touching &t, int32_t k,
+template <bool TRAPEZOID>
+static __device__ __forceinline__ void add_points(const trapezoid_speeds &own, const touching &t, int32_t k,
                                                   const touching_points &points, double per_dt, contact_sums *sums)
 {
     const double sign = t.side ? per_dt : -per_dt;
@@ -133,8 +136,9 @@ static __device__ __forceinline__ void add_points(const lead_speeds &own, const 
             sums->wrench[i] += sign * impulse[i];
             sums->wrench[i + 3] += sign * torque[i];
         }
-        if (LEADS)
-            sums->touch |= lead_push(dot3(t.normal, impulse), lead_size_at(own.moves[0], own.moves[1], arm), own.rest);
+        if (TRAPEZOID)
+            sums->touch |= trapezoid_push(dot3(t.normal, impulse), trapezoid_size_at(own.moves[0], own.moves[1], arm),
+                                          own.rest);
     }
 }
 
@@ -152,8 +156,8 @@ static __device__ __forceinline__ touching_begun begin_touching(const cuda_view 
 }
 
 /* Of a body; in all of its lanes. The first impulses are there. Every lane of the warp comes here. */
-template <bool LEADS>
-static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, const lead_speeds &own,
+template <bool TRAPEZOID>
+static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, const trapezoid_speeds &own,
                                                             touching_begun *begun)
 {
     const double per_dt = 1 / v.model.settings->dt;
@@ -162,13 +166,13 @@ static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, 
     touching_points &points = begun->points;
     for (int32_t at = begun->at; at < begun->end;) {
         for (int32_t k = 0; t.pair >= 0;) {
-            add_points<LEADS>(own, t, k, points, per_dt, &sums);
+            add_points<TRAPEZOID>(own, t, k, points, per_dt, &sums);
             k += POINTS_AT_ONCE;
             if (k >= t.count) break;
             fetch_arms(v.raw, t, k, &points);
             fetch_impulses(v.contacts, t, k, &points);
         }
-        if (LEADS && t.pair >= 0)
+        if (TRAPEZOID && t.pair >= 0)
             sums.touch |= t.other >= 0 ? TOUCH_INNER : t.friction > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH;
         at += LANES;
         if (at >= begun->end) break;
@@ -183,7 +187,7 @@ static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, 
     return sums;
 }
 
-enum { TOUCH_OF_BODY = TOUCH_CARRIED | TOUCH_MOVED | TOUCH_ROLLS };
+enum { TOUCH_OF_BODY = TOUCH_SUPPORTED | TOUCH_MOVED | TOUCH_ROLLS };
 
 /* Bits only come: one that is there already needs no more. */
 static __device__ __forceinline__ void add_bits(int32_t *to, int bits)
@@ -210,19 +214,22 @@ static __device__ __forceinline__ pair_ends fetch_ends(const struct sadmm_contac
     return ends;
 }
 
-/* What leads of bodies at a contact close: its normal and point, halfway through the step. */
-static __device__ __forceinline__ void add_way(const cuda_view &v, const lead_body sides[2], const double normal[3],
-                                               const double arm_a[3], const double arm_b[3],
+/* What trapezoid corrections of bodies at a contact close: its normal and point, halfway through the step. */
+static __device__ __forceinline__ void add_way(const cuda_view &v, const trapezoid_body sides[2],
+                                               const double normal[3], const double arm_a[3], const double arm_b[3],
                                                const struct sadmm_contact_point *point, uint32_t migrates,
-                                               struct lead_touch *touch)
+                                               struct trapezoid_touch *touch)
 {
     const double dt = v.model.settings->dt, slop = v.model.settings->slop;
-    const double leads[2] = {-lead_along(normal, sides[0].lead, arm_a), lead_along(normal, sides[1].lead, arm_b)},
-                 size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)},
-                 speed = lead_along(normal, sides[1].velocity, arm_b) - lead_along(normal, sides[0].velocity, arm_a);
-    if (lead_is_still(size, dt, slop)) return;
-    const struct lead_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, migrates};
-    lead_add_way(touch, gap, leads, size, dt, slop);
+    const double corrections[2] = {-trapezoid_along(normal, sides[0].correction, arm_a),
+                                   trapezoid_along(normal, sides[1].correction, arm_b)},
+                 size[2] = {trapezoid_size(sides[0].correction, point->arm_a),
+                            trapezoid_size(sides[1].correction, point->arm_b)},
+                 speed = trapezoid_along(normal, sides[1].velocity, arm_b) -
+                         trapezoid_along(normal, sides[0].velocity, arm_a);
+    if (trapezoid_is_still(size, dt, slop)) return;
+    const struct trapezoid_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, migrates};
+    trapezoid_add_way(touch, gap, corrections, size, dt, slop);
 }
 
 /* Of the lane's points that roll. By itself, with all that it needs: few do, and the others should not pay in registers.
@@ -231,10 +238,10 @@ template <bool WHOLE>
 static __device__ __noinline__ int add_rolling_ways(const cuda_view &v, pair_ends ends, int32_t first, int32_t count,
                                                     int32_t lane)
 {
-    struct lead_touch touch = {TOUCH_ROLLS, {TOUCH_ROLLS, TOUCH_ROLLS}};
-    lead_body sides[2] = {};
+    struct trapezoid_touch touch = {TOUCH_ROLLS, {TOUCH_ROLLS, TOUCH_ROLLS}};
+    trapezoid_body sides[2] = {};
     for (int s = 0; s < 2; ++s)
-        if (ends.body[s] >= 0) sides[s] = load_lead_body<WHOLE>(v, ends.body[s]);
+        if (ends.body[s] >= 0) sides[s] = load_trapezoid_body<WHOLE>(v, ends.body[s]);
     for (int32_t k = first + lane; k < first + count; k += v.contacts.lanes) {
         const struct sadmm_contact_point *point = &v.raw.points[k];
         if (!point->migrates) continue;
@@ -244,17 +251,18 @@ static __device__ __noinline__ int add_rolling_ways(const cuda_view &v, pair_end
     return touch.island | touch.body[0] << 8 | touch.body[1] << 16;
 }
 
-/* What leads of a pair's bodies close, by its points, every v.contacts.lanes-th from `lane` on; returns all bits. */
+/* What trapezoid corrections of a pair's bodies close, by its points, every v.contacts.lanes-th from `lane` on; returns
+ * all bits. */
 template <bool WHOLE>
 static __device__ __forceinline__ int add_ways(const cuda_view &v, const pair_ends &ends, int32_t first, int32_t count,
                                                 int32_t lane)
 {
-    struct lead_touch touch = {0, {0, 0}};
+    struct trapezoid_touch touch = {0, {0, 0}};
     bool rolls = false;
-    lead_body sides[2] = {};
+    trapezoid_body sides[2] = {};
 #pragma unroll
     for (int s = 0; s < 2; ++s)
-        if (ends.body[s] >= 0) sides[s] = load_lead_body<WHOLE>(v, ends.body[s]);
+        if (ends.body[s] >= 0) sides[s] = load_trapezoid_body<WHOLE>(v, ends.body[s]);
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
         const struct sadmm_contact_point *point = wide_at(v.raw.points, (size_t)(first + k));
         if (point->migrates) rolls = true;

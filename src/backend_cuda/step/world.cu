@@ -47,7 +47,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     c->view.raw.pairs = set.pairs;
     c->view.raw.points = set.points;
     c->view.raw.migrations = set.migrations;
-    CUDA(view_driven)(c, into);
+    CUDA(view_kinematic)(c, into);
     CUDA(view_joints)(c, into, substep);
     CUDA(view_joined)(c);
     CUDA(view_push)(c);
@@ -62,7 +62,7 @@ void CUDA(view_counts)(struct sadmm_context *c, int64_t pairs)
     c->system = nullptr;
     v->raw.system = none;
     v->raw.system.body_count = s->bodies;
-    v->raw.system.driven_count = s->driven;
+    v->raw.system.kinematic_count = s->kinematic;
     v->model.bodies = s->bodies;
     v->contacts.pair_capacity = (int32_t)((pairs + WARP - 1) / WARP * WARP);
     v->rows.count = s->apart ? 0 : s->joint_constraints;
@@ -178,7 +178,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(CUDA(upload)(c, buffer<struct sadmm_steady>(c, BUFFER_WORLD_STEADY) + before * n, PINNED_BODIES, 0,
                      world->steady, n * sizeof *world->steady, error));
     TRY(CUDA(wait)(c, error));
-    TRY(CUDA(load_driven)(c, world, error));
+    TRY(CUDA(load_kinematic)(c, world, error));
     TRY(CUDA(load_joints)(c, world, error));
     TRY(CUDA(load_joined)(c, world, error));
     CUDA(view_counts)(c, 0);

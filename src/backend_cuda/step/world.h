@@ -6,7 +6,7 @@
  *   queue.cu   run steps and see what became of them; repeat those whose plan did not hold
  *   read.cu    bring the world and the report back
  *   push.cu    islands that are pushed apart by a second problem
- *   driven.cu, joints.cu, gears.cu, joined.cu   driven bodies, joints, gears, and bodies joined by them
+ *   kinematic.cu, joints.cu, gears.cu, joined.cu   kinematic bodies, joints, gears, and bodies joined by them
  */
 #ifndef SADMM_CUDA_STEP_WORLD_H
 #define SADMM_CUDA_STEP_WORLD_H
@@ -54,7 +54,7 @@ enum { CALM_STEPS = 256 };
 
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
-    int32_t bodies, slots, driven;
+    int32_t bodies, slots, kinematic;
     int32_t joints, joint_constraints, couplings, gears;
     bool tables;                /* some joint has one of a spring */
     int32_t joined_parts;       /* of bodies that are solved directly (joined.cu); */
@@ -165,14 +165,15 @@ sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *erro
 sadmm_status CUDA(launch_finish)(struct sadmm_context *, bool first, struct sadmm_error *error);
 sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
 
-/* driven.cu: take over a world's driven bodies; where they are; */
-sadmm_status CUDA(load_driven)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);
-void CUDA(view_driven)(struct sadmm_context *, int into);
+/* kinematic.cu: take over a world's kinematic bodies; where they are; */
+sadmm_status CUDA(load_kinematic)(struct sadmm_context *, const struct sadmm_resident_world *,
+                                  struct sadmm_error *error);
+void CUDA(view_kinematic)(struct sadmm_context *, int into);
 /* their velocities and poses as the step begins; once islands are known, what these ride on; */
-sadmm_status CUDA(launch_driven_start)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_carry)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_kinematic_start)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_support)(struct sadmm_context *, struct sadmm_error *error);
 /* and the end of a (sub-)step: poses, and what contacts give them. */
-sadmm_status CUDA(launch_driven_finish)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_kinematic_finish)(struct sadmm_context *, struct sadmm_error *error);
 
 /* push_view.due: not 0: some island is pushed; not 0: the second problem does not fit its partition; its pairs that carry
  * an impulse; bits of enum push_kind, 0: there is none. */

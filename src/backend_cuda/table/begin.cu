@@ -8,15 +8,15 @@
 
 /* ---- raw data -------------------------------------------------------------------------------------------------- */
 
-/* Raw data, as core has it. Bodies: rigid, or A then b; then velocities, those of driven bodies, and what
- * bodies are carried by. Blocks, then their multipliers. */
+/* Raw data, as core has it. Bodies: rigid, or A then b; then velocities, those of kinematic bodies, and the motion of
+ * bodies' supports. Blocks, then their multipliers. */
 static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
     size_t n = (size_t)v->model.bodies;
     size_t body = c->plan.rigid ? sizeof(struct sadmm_rigid) : 42 * sizeof(double);
-    size_t bodies = n * (body + (c->system->carried ? 12 : 6) * sizeof(double)) +
-                    6 * (size_t)c->system->driven_count * sizeof(double),
+    size_t bodies = n * (body + (c->system->support_motion ? 12 : 6) * sizeof(double)) +
+                    6 * (size_t)c->system->kinematic_count * sizeof(double),
            pairs = (size_t)v->contacts.pair_capacity * sizeof(struct sadmm_contact_pair);
     size_t points = (size_t)v->model.points * sizeof(struct sadmm_contact_point);
     size_t migrations = c->system->contacts->migrating > 0
@@ -40,8 +40,9 @@ static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *err
     v->raw.system.A = (const double *)(c->plan.rigid ? none : raw);
     v->raw.system.b = c->plan.rigid ? nullptr : v->raw.system.A + 36 * n;
     v->raw.system.velocity = (double *)(raw + n * body);
-    v->raw.system.driven = v->raw.system.velocity + 6 * n;
-    if (c->system->carried) v->raw.system.carried = v->raw.system.driven + 6 * (size_t)c->system->driven_count;
+    v->raw.system.kinematic = v->raw.system.velocity + 6 * n;
+    if (c->system->support_motion)
+        v->raw.system.support_motion = v->raw.system.kinematic + 6 * (size_t)c->system->kinematic_count;
     CUDA(bind_raw_rows)(c, b[BUFFER_RAW_ROWS].data);
     v->raw.pairs = (struct sadmm_contact_pair *)b[BUFFER_RAW_PAIRS].data;
     v->raw.points = (struct sadmm_contact_point *)b[BUFFER_RAW_POINTS].data;
@@ -60,7 +61,7 @@ static void count(struct sadmm_context *c)
     v->model.points = c->plan.points;
     v->rows.count = (int32_t)sadmm_row_constraint_count(c->system);
     v->joints.count = 0;
-    v->driven.count = 0;
+    v->kinematic.count = 0;
     v->model.contact_rows = c->plan.contact_rows == 1 ? 1 : 3; /* as in whole steps, which may have none as well */
     v->model.warm_start = c->plan.warm_start;
     c->bounces = false;

@@ -31,7 +31,7 @@
             .step = sadmm_cuda_step_world##suffix,             \
             .wait = sadmm_cuda_wait_world##suffix,             \
             .read_bodies = sadmm_cuda_read_bodies##suffix,     \
-            .read_driven = sadmm_cuda_read_driven##suffix,     \
+            .read_kinematic = sadmm_cuda_read_kinematic##suffix, \
             .view = sadmm_cuda_view_world##suffix,             \
             .read_contacts = sadmm_cuda_read_contacts##suffix, \
             .read_touching = sadmm_cuda_read_touching##suffix, \

@@ -15,17 +15,17 @@ extern "C" {
 enum { SADMM_MAX_POINTS = 8 };
 
 /* Which body of a step something is on: 0 and up, one that is solved for (dynamic); -1, the static world; below, the
- * (-2 - body)-th driven one, which moves by a velocity that is given and feels nothing. So whatever is not >= 0 is as
- * static to all but relative velocities. */
+ * (-2 - body)-th kinematic one, which moves by a velocity that is given and feels nothing. So whatever is not >= 0 is
+ * as static to all but relative velocities. */
 SADMM_INLINE bool sadmm_body_moves(int32_t body) { return body != -1; }
-SADMM_INLINE bool sadmm_body_is_driven(int32_t body) { return body < -1; }
-/* Of the driven body, its number, and back. */
-SADMM_INLINE int32_t sadmm_driven(int32_t body) { return -2 - body; }
+SADMM_INLINE bool sadmm_body_is_kinematic(int32_t body) { return body < -1; }
+/* Of the kinematic body, its number, and back. */
+SADMM_INLINE int32_t sadmm_kinematic(int32_t body) { return -2 - body; }
 
 /* A manifold of a pair of shapes: one normal, up to SADMM_MAX_POINTS points. Two shapes may have several, told apart by
  * `child` (collision/geometry.h). */
 struct sadmm_contact_pair {
-    int32_t body_a, body_b;   /* system body, -1: static, below: driven */
+    int32_t body_a, body_b;   /* system body, -1: static, below: kinematic */
     int32_t shape_a, shape_b; /* world shape slot (world level), else -1 */
     int32_t first, count;     /* points */
     double normal[3];         /* unit, from a to b */
@@ -97,11 +97,11 @@ struct sadmm_contact_set {
 struct sadmm_world_hit {
     int32_t shape_a, shape_b; /* slots */
     uint32_t child, feature;
-    double position[3], normal[3]; /* m; unit, from a to b; world */
-    double impulse[3];             /* on b, N s */
-    double arm[2][3];              /* from the centres of mass of a's and b's bodies, m */
-    int32_t dynamic[2], driven[2]; /* their numbers in the step, -1: none */
-    double speed;                  /* of approach, m/s */
+    double position[3], normal[3];    /* m; unit, from a to b; world */
+    double impulse[3];                /* on b, N s */
+    double arm[2][3];                 /* from the centres of mass of a's and b's bodies, m */
+    int32_t dynamic[2], kinematic[2]; /* their numbers in the step, -1: none */
+    double speed;                     /* of approach, m/s */
     double friction;
 };
 

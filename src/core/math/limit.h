@@ -32,8 +32,8 @@
 struct limit_energies {
     double now, free, work; /* of v, of v_f, W; J */
     double drive, response;
-    double rigid; /* of the motions that are left alone, which are not in the others */
-    int driven;   /* something that is none of its bodies pushes it, by as much as it takes: it is left alone */
+    double rigid;  /* of the motions that are left alone, which are not in the others */
+    int kinematic; /* something that is none of its bodies pushes it, by as much as it takes: it is left alone */
 };
 
 SADMM_INLINE int limit_suspects(double now, double free) { return now > (1 + LIMIT_ROUNDING) * free; }
@@ -65,7 +65,7 @@ SADMM_INLINE double limit_work(const struct limit_energies *e)
 SADMM_INLINE double limit_factor(const struct limit_energies *e, double epsilon)
 {
     const double allowed = e->free + limit_work(e);
-    if (e->driven) return 1;
+    if (e->kinematic) return 1;
     return limit_suspects(e->now, allowed) && !limit_is_rounding(e, epsilon) ? sqrt(allowed / e->now) : 1;
 }
 
@@ -89,7 +89,7 @@ SADMM_INLINE int limit_bounces(double now, double free, double along, double eps
 SADMM_INLINE double limit_bounce_factor(const struct limit_energies *e, double along, double epsilon)
 {
     double factor;
-    if (e->driven || !limit_bounces(e->now, e->free, along, epsilon) || limit_is_rounding(e, epsilon)) return 1;
+    if (e->kinematic || !limit_bounces(e->now, e->free, along, epsilon) || limit_is_rounding(e, epsilon)) return 1;
     factor = (along + sqrt(along * along + 2 * e->now * e->work)) / (2 * e->now);
     return factor > 1 - LIMIT_ROUNDING ? 1 : max_of(factor, LIMIT_LEAST);
 }

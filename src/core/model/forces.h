@@ -15,8 +15,8 @@
 
 #include <math.h>
 
-#include "core/math/lead.h"
 #include "core/math/rigid.h"
+#include "core/math/trapezoid.h"
 #include "rolling.h"
 
 #ifndef SADMM_REAL_IS_DOUBLE
@@ -54,10 +54,10 @@ SADMM_INLINE bool forces_differ(const struct sadmm_rigid *body)
     return body->gravity_scale != 1 || body->damping[0] > 0 || body->damping[1] > 0;
 }
 
-/* What a body brings to its island's bits (math/lead.h): leads of one that is stiff stay. */
+/* What a body brings to its island's bits (math/trapezoid.h): the correction of a stiff one is off. */
 SADMM_INLINE int forces_touch(const struct sadmm_rigid *body)
 {
-    return (forces_differ(body) ? TOUCH_DIFFERS : 0) | (rolling_is_stiff(body) ? TOUCH_JOLT : 0);
+    return (forces_differ(body) ? TOUCH_DIFFERS : 0) | (rolling_is_stiff(body) ? TOUCH_PENETRATES : 0);
 }
 
 /* What damping takes of the speed of a part in a step, as an acceleration. */

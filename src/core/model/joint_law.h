@@ -35,7 +35,7 @@ struct sadmm_joint_memory {
     double wrench[6], point[3];                        /* as in sadmm_joint_state, on b */
     double local[6];                                   /* the wrench along the axes of a's frame */
     double left[JOINT_COORDINATES];                    /* of locks: joined_left of their rows; 0: not told */
-    bool leads_stay;                                   /* its bodies were moved by the velocities of the step's end */
+    bool trapezoid_off;                                /* its bodies were moved by the velocities of the step's end */
     bool broken;                                       /* it gave more than it bears */
 };
 
@@ -43,7 +43,7 @@ struct sadmm_joint_memory {
 struct sadmm_resident_joint {
     sadmm_joint_def def;
     int32_t constraints;         /* that its rows may take, of up to six each */
-    int32_t body[2];             /* dynamic body, or a driven one (base/contact_set.h); -1: it does not move, and its
+    int32_t body[2];             /* dynamic body, or a kinematic one (base/contact_set.h); -1: it does not move, and its
                                     frame is in the world */
     struct joint_frame frame[2];
     int32_t coupling;            /* number of the coupling whose target its frame a is; -1: none */
@@ -58,7 +58,7 @@ struct sadmm_joint_source {
     double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step.
                           Of any row, slack: INFINITY where the step does not resolve its turning. Of springs, gap:
                           the way to where a steep part of a table stops the coordinate, INFINITY: none does */
-    double steered;    /* of the row's rate what sides give that are steered; it is in the bias */
+    double prescribed; /* the row's rate due to sides of prescribed motion; it is in the bias */
 };
 
 /* A radial joint's coordinate 0 is a distance. */
@@ -94,7 +94,7 @@ SADMM_INLINE void joint_coordinate_take(const double x[JOINT_COORDINATE_NUMBERS]
 struct joint_body {
     int32_t system_body;             /* -1: it does not move */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the frame is in the world */
-    bool steered;                    /* it is no body of the system and goes by its velocity, whatever acts on it; */
+    bool prescribed;                 /* it is no body of the system and goes by its velocity, whatever acts on it; */
     bool target;                     /* it is a coupling's target: of a (joint_hold_translations) */
 };
 
@@ -109,9 +109,9 @@ SADMM_INLINE struct joint_end joint_end_on(const struct joint_frame *frame, cons
 
 /* One body of a joint in a step. */
 struct joint_side {
-    int32_t system_body;             /* -1: it does not move, or is steered */
+    int32_t system_body;             /* -1: it does not move, or as prescribed */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the static world */
-    bool steered;
+    bool prescribed;
     double velocity[6], middle[6];   /* at the start; halfway, before anything acts */
     double free[6];                  /* halfway, once gravity has acted alone */
     quat turned;                     /* its orientation halfway */
@@ -130,13 +130,13 @@ SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struc
     int k;
     side.system_body = body.system_body;
     side.rigid = body.rigid;
-    side.steered = body.steered;
+    side.prescribed = body.prescribed;
     side.turned.w = 1;
     side.turned.x = side.turned.y = side.turned.z = 0;
     for (k = 0; k < 6; ++k)
         side.velocity[k] = side.middle[k] = side.free[k] =
-            body.system_body >= 0 || body.steered ? body.rigid->velocity[k] : 0;
-    if (body.steered)
+            body.system_body >= 0 || body.prescribed ? body.rigid->velocity[k] : 0;
+    if (body.prescribed)
         side.turned = rigid_turn(q_load(body.rigid->orientation), v3_load(side.velocity + 3), settings->dt / 2);
     if (body.system_body < 0) return side;
     spin = spin_halfway(body.rigid, settings->dt);
@@ -178,7 +178,7 @@ SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const str
         struct joint_side *side = &acting.side[s];
         *side = joint_side_of(body[s], settings);
         start[s] = middle[s] = joint_end_on(&frame[s], side->rigid);
-        if (side->system_body >= 0 || side->steered) middle[s] = joint_end_halfway(&frame[s], side, settings->dt);
+        if (side->system_body >= 0 || side->prescribed) middle[s] = joint_end_halfway(&frame[s], side, settings->dt);
     }
     acting.start = joint_geometry_of(&start[0], &start[1], def->locks, radial);
     acting.middle = joint_geometry_of(&middle[0], &middle[1], def->locks, radial);
@@ -237,7 +237,7 @@ SADMM_INLINE double joint_response(const struct joint_side *side, const double r
 struct joint_law {
     int role, coordinate, sign;
     double gain, bias, compliance, lo, hi;
-    double gap, slack, steered; /* sadmm_joint_source */
+    double gap, slack, prescribed; /* sadmm_joint_source */
 };
 
 /* Two limits, drive, friction, spring and armature of a coordinate that is free. */
@@ -255,7 +255,7 @@ struct joint_moving {
     double free;          /* its rate at the end, if nothing but gravity and wrenches acted */
     double turning;       /* what the row's rate halfway is more, before anything acts: axes, arms and bodies turn */
     double turned;        /* what the rate at the end is more than the row's, so far as the law counts it */
-    double steered;       /* of the rate what steered sides give */
+    double prescribed;    /* the rate due to sides of prescribed motion */
     bool turns;           /* by more than a step resolves: its bodies will be moved by the velocities of the step's end, */
     bool late;            /* as they were in the last step, too */
     double reach;         /* it may move by so much */
@@ -271,7 +271,7 @@ SADMM_INLINE void joint_add_law(struct joint_laws *laws, const struct joint_movi
     law->gain = gain, law->bias = bias, law->compliance = compliance;
     law->lo = lo, law->hi = hi;
     law->gap = gap;
-    law->steered = sign * m->steered;
+    law->prescribed = sign * m->prescribed;
     law->slack = m->turns ? INFINITY
                : role == SADMM_ROLE_LOWER || role == SADMM_ROLE_UPPER ? 2 * m->dt * fabs(m->turning) : 0;
 }
@@ -332,7 +332,7 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
 {
     const struct joint_side *a = &acting->side[0], *b = &acting->side[1];
     struct joint_moving m;
-    double middle = 0, free = 0, steered = 0, start = 0; /* start: of velocities at the start */
+    double middle = 0, free = 0, prescribed = 0, start = 0; /* start: of velocities at the start */
     int s;
     m.memory = memory;
     m.dt = settings->dt;
@@ -344,10 +344,10 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
     m.before = joint_rate(&acting->start, k, a->velocity, b->velocity);
     for (s = 0; s < 2; ++s) {
         double row[6];
-        if (acting->side[s].system_body < 0 && !acting->side[s].steered) continue;
+        if (acting->side[s].system_body < 0 && !acting->side[s].prescribed) continue;
         joint_step_row(acting, s, k, row);
-        if (acting->side[s].steered) {
-            steered += joint_row_product(row, acting->side[s].velocity);
+        if (acting->side[s].prescribed) {
+            prescribed += joint_row_product(row, acting->side[s].velocity);
             continue;
         }
         start += joint_row_product(row, acting->side[s].velocity);
@@ -355,13 +355,13 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
         free += joint_row_product(row, acting->side[s].free);
         m.response += joint_response(&acting->side[s], row);
     }
-    start += steered, middle += steered, free += steered;
-    m.steered = steered;
+    start += prescribed, middle += prescribed, free += prescribed;
+    m.prescribed = prescribed;
     m.turning = middle - m.before;
     m.turns = joint_turns(acting, k, joint_is_radial(def->kind), start - m.before, m.dt);
     m.free = free - m.turning;
-    m.late = memory->leads_stay || m.turns;
-    m.turned = (m.late ? 0 : m.turning) + steered; /* the solve's rates are of its bodies alone */
+    m.late = memory->trapezoid_off || m.turns;
+    m.turned = (m.late ? 0 : m.turning) + prescribed; /* the solve's rates are of its bodies alone */
     m.reach = 2 * m.dt * max_of(fabs(m.before), fabs(free));
     return m;
 }

@@ -1,17 +1,17 @@
 /* Momentum and energy of islands with joints (docs/internals/algorithm.md, "Momentum"). Iterations that are cut short
- * miss some of the momentum, weights of the direct solve hold on to more, and bodies that keep their leads go other
- * ways than impulses between them were made for. So it is restored once all of that is known: velocities at the end of
- * the step change by a rigid motion of the whole island about where its bodies are then, which no joint feels and no
- * contact between them. What it should be follows from b, what bodies are halfway, and the impulses' places there: of
- * static contacts, and of rows of joints with what does not move by itself. Where leads stay, an island in the air is
- * moved as a whole to where its centre of mass gets to by the mean of its velocities: a weight halfway would turn it
- * about any other point. And where rows turn by more than a step resolves it is left with no more energy than in free
- * motion. In double. */
+ * miss some of the momentum, weights of the direct solve hold on to more, and bodies without the trapezoid correction
+ * go other ways than impulses between them were made for. So it is restored once all of that is known: velocities at
+ * the end of the step change by a rigid motion of the whole island about where its bodies are then, which no joint
+ * feels and no contact between them. What it should be follows from b, what bodies are halfway, and the impulses'
+ * places there: of static contacts, and of rows of joints with what does not move by itself. Where the correction is
+ * off, an airborne island is moved as a whole to where its centre of mass gets to by the mean of its velocities: a
+ * weight halfway would turn it about any other point. And where rows turn by more than a step resolves it is left with
+ * no more energy than in free motion. In double. */
 #ifndef SADMM_CORE_MODEL_JOINT_MOMENTUM_H
 #define SADMM_CORE_MODEL_JOINT_MOMENTUM_H
 
 #include "core/math/momentum.h"
-#include "joint_lead.h"
+#include "joint_trapezoid.h"
 #include "system_math.h"
 
 /* Is there something to restore? bits: of an island, but for ISLAND_HELD where that is not known yet. What nothing
@@ -20,8 +20,8 @@
 SADMM_INLINE bool joint_island_is_loose(int bits)
 {
     if (!(bits & ISLAND_JOINED) || bits & ISLAND_HELD) return false;
-    if (bits & ISLAND_MOORED) return bits & (ISLAND_TOUCHED | ISLAND_LEADS_STAY) && !(bits & ISLAND_TURNS);
-    return (bits & (ISLAND_TOUCHED | ISLAND_LEADS_STAY | ISLAND_STRAYS | ISLAND_CLOSED)) != 0;
+    if (bits & ISLAND_MOORED) return bits & (ISLAND_TOUCHED | ISLAND_TRAPEZOID_OFF) && !(bits & ISLAND_TURNS);
+    return (bits & (ISLAND_TOUCHED | ISLAND_TRAPEZOID_OFF | ISLAND_STRAYS | ISLAND_CLOSED)) != 0;
 }
 
 /* Sums over an island; then what restores it: velocities times `factor`, the rigid motion in sums.now, and what all of it
@@ -93,7 +93,7 @@ SADMM_INLINE void joint_add_static_point(struct joint_momentum *to, const double
     momentum_add_contact(to->sums.gram, normal, friction, r);
 }
 
-/* and a row with the static world, or a body that is steered: it acts if it has a multiplier. */
+/* and a row with the static world, or a body of prescribed motion: it acts if it has a multiplier. */
 SADMM_INLINE void joint_add_static_row(struct joint_momentum *to, const double jacobian[6], double lambda,
                                        const struct sadmm_rigid *body, const double origin[3], double dt)
 {
@@ -103,7 +103,7 @@ SADMM_INLINE void joint_add_static_row(struct joint_momentum *to, const double j
     momentum_add_row(to->sums.gram, jacobian, d);
 }
 
-/* An island in the air whose leads stay: sums are about where its bodies are before they are moved. */
+/* An airborne island whose trapezoid correction is off: sums are about where its bodies are before they are moved. */
 SADMM_INLINE void joint_find_shift(struct joint_momentum *of, double dt)
 {
     struct momentum_sums *s = &of->sums;
@@ -143,13 +143,13 @@ SADMM_INLINE double joint_slowing(const struct joint_momentum *of, const struct 
 /* What restores the island. bits: of the island. */
 SADMM_INLINE void joint_restoring(struct joint_momentum *of, int bits, double dt)
 {
-    const bool flies = of->sums.gram[MOMENTUM_CONTACTS] == 0;
+    const bool airborne = of->sums.gram[MOMENTUM_CONTACTS] == 0;
     struct momentum_motions motions;
     of->factor = 1;
     of->shift[0] = of->shift[1] = of->shift[2] = 0;
-    if (flies && bits & ISLAND_LEADS_STAY) joint_find_shift(of, dt);
+    if (airborne && bits & ISLAND_TRAPEZOID_OFF) joint_find_shift(of, dt);
     momentum_find_motions(&of->sums, &motions);
-    if (bits & ISLAND_TURNS && (!flies || joint_turns_as_a_whole(&motions, dt))) motions.count = 0;
+    if (bits & ISLAND_TURNS && (!airborne || joint_turns_as_a_whole(&motions, dt))) motions.count = 0;
     else if (bits & ISLAND_TURNS) of->factor = joint_slowing(of, &motions, bits);
     momentum_restoring(&motions, of->factor, of->sums.now);
 }

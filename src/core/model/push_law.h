@@ -19,9 +19,9 @@
  * device and no way to drive a step changes a result. */
 enum { PUSH_CUDA_MOST_BODIES = 8192 };
 
-SADMM_INLINE bool push_is_apart(bool cuda, int32_t bodies, int32_t driven)
+SADMM_INLINE bool push_is_apart(bool cuda, int32_t bodies, int32_t kinematic)
 {
-    return !cuda || (bodies <= PUSH_CUDA_MOST_BODIES && driven == 0);
+    return !cuda || (bodies <= PUSH_CUDA_MOST_BODIES && kinematic == 0);
 }
 
 /* ---- which islands ----------------------------------------------------------------------------------------------- */

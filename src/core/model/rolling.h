@@ -1,5 +1,5 @@
-/* Contacts that roll: bodies that move by the mean of their velocities before and after a step (math/lead.h) and touch
- * where their surfaces are curved, or at a corner that goes round with its body.
+/* Contacts that roll: bodies that move by the mean of their velocities before and after a step (math/trapezoid.h) and
+ * touch where their surfaces are curved, or at a corner that goes round with its body.
  *
  * Time. Their normal and arms are those of the step's *end*, so that it is there that the contact's velocity is what
  * the law says: J_1 v_1. With the ones halfway, J, what is left of J_1 v_1 would do work in every step. They are carried

@@ -84,8 +84,8 @@ SADMM_INLINE quat spin_turned_halfway(const struct sadmm_rigid *body, double dt)
     return rigid_is_isotropic(inertia) ? start.orientation : rigid_tumble(start, inertia, dt / 2).orientation;
 }
 
-/* Velocities of the start with the spin that a solution is of, to first order, which is enough to compare it with
- * (leads). */
+/* Velocities of the start with the spin that a solution is of, to first order, which is enough to compare it with (the
+ * trapezoid correction). */
 SADMM_INLINE void spin_before(const struct sadmm_rigid *body, double dt, double before[6])
 {
     const vec3 inertia = v3_load(body->inertia), spin = v3_load(body->velocity + 3);
@@ -110,9 +110,9 @@ SADMM_INLINE struct rigid_spin spin_end(const struct sadmm_rigid *body, quat hal
     return rigid_tumble(from, v3_load(body->inertia), dt / 2);
 }
 
-/* The same where it keeps its lead (math/lead.h): it has turned by that spin since the step began, as its contacts have
- * been told. Its motion in its own frame is the one that ends at `end`, and so is its energy; but as it did not turn like
- * that before, its angular momentum turns with it, by dt times the lead. */
+/* The same where the trapezoid correction is off (math/trapezoid.h): it has turned by that spin since the step began,
+ * as its contacts assume. Its motion in its own frame is the one that ends at `end`, and so is its energy; but as it
+ * did not turn like that before, its angular momentum turns with it, by dt times the correction. */
 SADMM_INLINE struct rigid_spin spin_end_whole(const struct sadmm_rigid *body, const double spin[3],
                                               struct rigid_spin end, double dt)
 {
@@ -123,7 +123,7 @@ SADMM_INLINE struct rigid_spin spin_end_whole(const struct sadmm_rigid *body, co
 }
 
 /* The pose and the velocity that the solution v leaves it with. mean: what it is moved by, and turned, where moments are
- * equal; halfway: its orientation then, looked at where they differ; whole: it keeps its lead. */
+ * equal; halfway: its orientation then, looked at where they differ; whole: the correction is off. */
 SADMM_INLINE void spin_move_from(const struct sadmm_rigid *body, const double halfway[4], const double v[6],
                                  const double mean[6], bool whole, double dt, double position[3],
                                  double orientation[4], double velocity[6])

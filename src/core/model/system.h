@@ -1,6 +1,6 @@
 /* The contact problem of one step as core and the backends share it on the host, in double.
  *
- * Bodies are the dynamic ones only, numbered 0..body_count-1; -1 is the static world. Contacts may be with driven
+ * Bodies are the dynamic ones only, numbered 0..body_count-1; -1 is the static world. Contacts may be with kinematic
  * bodies besides (contact_set.h). There are two ways to give them:
  * `rigid` (world level: A and b follow from the state, see math/rigid.h) or `A` and `b` (problem level).
  * The certificate and every backend read the same raw data through the same inline formulas.
@@ -57,10 +57,10 @@ struct sadmm_system {
     const double *A;                 /* (body_count x 36), when rigid is NULL */
     const double *b;                 /* (body_count x 6), when rigid is NULL */
     double *velocity;                /* (body_count x 6) start in, solution out */
-    const double *driven;            /* (driven_count x 6) velocities of driven bodies, m/s, rad/s, world */
-    int32_t driven_count;
-    const double *carried;           /* (body_count x 6): velocities are less this, the motion of what an island
-                                        rides on (core/world/driven.c); NULL: as they are */
+    const double *kinematic;         /* (kinematic_count x 6) velocities of kinematic bodies, m/s, rad/s, world */
+    int32_t kinematic_count;
+    const double *support_motion;    /* (body_count x 6): velocities are relative to this, the motion of an island's
+                                        support (core/world/kinematic.c); NULL: as they are */
     struct sadmm_contact_set *contacts;
     bool errors_given;               /* points carry e (problem level) instead of a gap */
     bool first;                      /* no step came before: where there are no impulses, none are known */
@@ -74,28 +74,28 @@ static inline size_t sadmm_row_constraint_count(const struct sadmm_system *syste
     return system->rows ? system->rows->constraint_count : 0;
 }
 
-/* A driven body's velocity. */
-SADMM_INLINE const double *sadmm_driven_velocity(const struct sadmm_system *system, int32_t body)
+/* A kinematic body's velocity. */
+SADMM_INLINE const double *sadmm_kinematic_velocity(const struct sadmm_system *system, int32_t body)
 {
-    return system->driven + 6 * (size_t)sadmm_driven(body);
+    return system->kinematic + 6 * (size_t)sadmm_kinematic(body);
 }
 
-/* Is one of the pair's bodies driven, and in motion? */
-SADMM_INLINE bool sadmm_pair_is_driven(const struct sadmm_system *system, const struct sadmm_contact_pair *pair)
+/* Is one of the pair's bodies kinematic, and in motion? */
+SADMM_INLINE bool sadmm_pair_is_kinematic(const struct sadmm_system *system, const struct sadmm_contact_pair *pair)
 {
     const int32_t body = pair->body_a < pair->body_b ? pair->body_a : pair->body_b;
-    if (!sadmm_body_is_driven(body)) return false;
-    const double *v = sadmm_driven_velocity(system, body);
+    if (!sadmm_body_is_kinematic(body)) return false;
+    const double *v = sadmm_kinematic_velocity(system, body);
     return v[0] != 0 || v[1] != 0 || v[2] != 0 || v[3] != 0 || v[4] != 0 || v[5] != 0;
 }
 
-/* Does the pair give its island energy? One that is carried sees its driven body at rest; but for what turns: its
- * surface goes on while the step lasts. */
+/* Does the pair give its island energy? A supported one sees its kinematic body at rest, unless that turns: its surface
+ * moves on during the step. */
 SADMM_INLINE bool sadmm_pair_gives_energy(const struct sadmm_system *system, const struct sadmm_contact_pair *pair)
 {
-    if (!sadmm_pair_is_driven(system, pair)) return false;
-    if (!system->carried) return true;
-    const double *c = system->carried + 6 * (size_t)(pair->body_a > pair->body_b ? pair->body_a : pair->body_b);
+    if (!sadmm_pair_is_kinematic(system, pair)) return false;
+    if (!system->support_motion) return true;
+    const double *c = system->support_motion + 6 * (size_t)(pair->body_a > pair->body_b ? pair->body_a : pair->body_b);
     const bool turns = c[3] != 0 || c[4] != 0 || c[5] != 0, goes = c[0] != 0 || c[1] != 0 || c[2] != 0;
     return turns || !goes;
 }

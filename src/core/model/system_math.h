@@ -66,7 +66,7 @@ SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct 
 }
 
 /* b of the motion less c, of a rigid body: b - A c. */
-SADMM_INLINE void sadmm_take_carried(double mass, sym3 I, const double c[6], double b[6])
+SADMM_INLINE void sadmm_subtract_support_motion(double mass, sym3 I, const double c[6], double b[6])
 {
     for (int k = 0; k < 3; ++k) b[k] -= mass * c[k];
     v3_store(v3_sub(v3_load(b + 3), s3_mul(I, v3_load(c + 3))), b + 3);
@@ -83,7 +83,7 @@ SADMM_INLINE void sadmm_system_rigid(const struct sadmm_system *system, const st
     A[0] = A[7] = A[14] = mass;
     A[21] = I.xx, A[28] = I.yy, A[35] = I.zz;
     A[22] = A[27] = I.xy, A[23] = A[33] = I.xz, A[29] = A[34] = I.yz;
-    if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (size_t)i, b);
+    if (system->support_motion) sadmm_subtract_support_motion(mass, I, system->support_motion + 6 * (size_t)i, b);
 }
 
 /* The same of any body. */
@@ -104,33 +104,33 @@ SADMM_INLINE vec3 sadmm_velocity_at(const double v[6], const double arm[3])
     return v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(arm)));
 }
 
-/* What a driven body adds to the velocity of b's contact point relative to a's, world frame; and what the other one is
- * carried by. */
-SADMM_INLINE vec3 sadmm_driven_part(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
-                                    const struct sadmm_contact_point *point)
+/* What a kinematic body adds to the velocity of b's contact point relative to a's, world frame, less the motion of the
+ * other one's support. */
+SADMM_INLINE vec3 sadmm_kinematic_part(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
+                                       const struct sadmm_contact_point *point)
 {
-    const bool on_b = sadmm_body_is_driven(pair->body_b);
-    if (!on_b && !sadmm_body_is_driven(pair->body_a)) return v3(0, 0, 0);
-    vec3 x = sadmm_velocity_at(sadmm_driven_velocity(system, on_b ? pair->body_b : pair->body_a),
+    const bool on_b = sadmm_body_is_kinematic(pair->body_b);
+    if (!on_b && !sadmm_body_is_kinematic(pair->body_a)) return v3(0, 0, 0);
+    vec3 x = sadmm_velocity_at(sadmm_kinematic_velocity(system, on_b ? pair->body_b : pair->body_a),
                                on_b ? point->arm_b : point->arm_a);
-    if (system->carried)
-        x = v3_sub(x, sadmm_velocity_at(system->carried + 6 * (size_t)(on_b ? pair->body_a : pair->body_b),
+    if (system->support_motion)
+        x = v3_sub(x, sadmm_velocity_at(system->support_motion + 6 * (size_t)(on_b ? pair->body_a : pair->body_b),
                                         on_b ? point->arm_a : point->arm_b));
     return on_b ? x : v3_neg(x);
 }
 
-/* The driven body of a pair that has one as the motion about the other one's centre of mass that its surface has
+/* The kinematic body of a pair that has one as the motion about the other one's centre of mass that its surface has
  * at the points: with the arms of the other one. `points`: the pair's. */
-SADMM_INLINE void sadmm_driven_about_other(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
-                                           const struct sadmm_contact_point *points, double motion[6])
+SADMM_INLINE void sadmm_kinematic_about_other(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
+                                              const struct sadmm_contact_point *points, double motion[6])
 {
-    const bool on_b = sadmm_body_is_driven(pair->body_b);
-    const double *v = sadmm_driven_velocity(system, on_b ? pair->body_b : pair->body_a),
+    const bool on_b = sadmm_body_is_kinematic(pair->body_b);
+    const double *v = sadmm_kinematic_velocity(system, on_b ? pair->body_b : pair->body_a),
                  *own = on_b ? points->arm_b : points->arm_a, *other = on_b ? points->arm_a : points->arm_b;
     v3_store(v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_sub(v3_load(own), v3_load(other)))), motion);
     v3_store(v3_load(v + 3), motion + 3);
-    if (!system->carried) return;
-    const double *c = system->carried + 6 * (size_t)(on_b ? pair->body_a : pair->body_b);
+    if (!system->support_motion) return;
+    const double *c = system->support_motion + 6 * (size_t)(on_b ? pair->body_a : pair->body_b);
     for (int k = 0; k < 6; ++k) motion[k] -= c[k];
 }
 
@@ -142,7 +142,7 @@ SADMM_INLINE vec3 sadmm_contact_velocity(const struct sadmm_system *system, cons
     if (pair->body_b >= 0) x = sadmm_velocity_at(system->velocity + 6 * (size_t)pair->body_b, point->arm_b);
     if (pair->body_a >= 0)
         x = v3_sub(x, sadmm_velocity_at(system->velocity + 6 * (size_t)pair->body_a, point->arm_a));
-    return system->driven_count > 0 ? v3_add(x, sadmm_driven_part(system, pair, point)) : x;
+    return system->kinematic_count > 0 ? v3_add(x, sadmm_kinematic_part(system, pair, point)) : x;
 }
 
 /* The contact's frame: rows n, t1, t2. */
@@ -171,9 +171,9 @@ SADMM_INLINE struct sadmm_impact_body sadmm_impact_body_of(const struct sadmm_sy
     const double dt = settings->dt;
     struct sadmm_impact_body out;
     memset(&out, 0, sizeof out);
-    if (sadmm_body_is_driven(i)) {
-        out.linear = v3_load(sadmm_driven_velocity(system, i));
-        out.angular = v3_load(sadmm_driven_velocity(system, i) + 3);
+    if (sadmm_body_is_kinematic(i)) {
+        out.linear = v3_load(sadmm_kinematic_velocity(system, i));
+        out.angular = v3_load(sadmm_kinematic_velocity(system, i) + 3);
     }
     if (i < 0) return out;
     const struct sadmm_rigid *body = &system->rigid[i];

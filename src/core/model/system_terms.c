@@ -1,7 +1,7 @@
 #include "system_terms.h"
 
-#include "core/math/lead.h"
 #include "core/math/packed6.h"
+#include "core/math/trapezoid.h"
 #include "system_math.h"
 
 static void pack(const double A[36], double out[PACKED6])
@@ -19,7 +19,7 @@ static void pack_rigid(double mass, sym3 I, double out[PACKED6])
 }
 
 void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, size_t first,
-                      size_t count, double *A, double *b, struct sadmm_lead *leads)
+                      size_t count, double *A, double *b, struct sadmm_trapezoid *trapezoids)
 {
     const struct sadmm_rigid *bodies = system->rigid;
     if (!bodies) memcpy(b, system->b + 6 * first, 6 * count * sizeof *b);
@@ -28,10 +28,11 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
         const struct spin_system spin = spin_of_system(&bodies[first + i], settings->dt);
         double mass;
         const sym3 I = sadmm_rigid_body_at(&bodies[first + i], &spin, settings, &mass, b + 6 * i);
-        q_store(spin.orientation, leads[first + i].halfway);
-        v3_store(spin.angular, leads[first + i].spin);
+        q_store(spin.orientation, trapezoids[first + i].halfway);
+        v3_store(spin.angular, trapezoids[first + i].spin);
         pack_rigid(mass, I, A + PACKED6 * i);
-        if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (first + i), b + 6 * i);
+        if (system->support_motion)
+            sadmm_subtract_support_motion(mass, I, system->support_motion + 6 * (first + i), b + 6 * i);
     }
 }
 
@@ -41,44 +42,44 @@ double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_s
     return sadmm_contact_e(system, settings, pair, points, k);
 }
 
-void sadmm_driven_motion(const struct sadmm_system *system, const struct sadmm_contact_pair *pair, double motion[6])
+void sadmm_kinematic_motion(const struct sadmm_system *system, const struct sadmm_contact_pair *pair, double motion[6])
 {
-    sadmm_driven_about_other(system, pair, &system->contacts->points[pair->first], motion);
+    sadmm_kinematic_about_other(system, pair, &system->contacts->points[pair->first], motion);
 }
 
-void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
-                      const struct sadmm_settings *settings, struct sadmm_lead *leads)
+void sadmm_find_trapezoids(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
+                           const struct sadmm_settings *settings, struct sadmm_trapezoid *trapezoids)
 {
     for (size_t i = 0; i < count; ++i) {
-        struct sadmm_lead *out = &leads[i];
-        lead_own(bodies[i].velocity, velocity + 6 * i, out->lead);
-        for (int k = 0; k < 3; ++k) out->lead[3 + k] = (velocity[6 * i + 3 + (size_t)k] - out->spin[k]) / 2;
-        out->kind = LEAD_OWN;
-        out->linear = size3(out->lead);
-        out->angular = size3(out->lead + 3);
-        out->moves_linear = lead_speed_part(bodies[i].velocity, velocity + 6 * i, 0);
-        out->moves_angular = lead_speed_part(bodies[i].velocity, velocity + 6 * i, 1);
-        out->rest = lead_rest_speed(settings->gravity, bodies[i].gravity_scale, bodies[i].wrench, bodies[i].mass,
-                                    settings->dt);
-        out->kind = LEAD_OWN;
+        struct sadmm_trapezoid *out = &trapezoids[i];
+        trapezoid_own(bodies[i].velocity, velocity + 6 * i, out->correction);
+        for (int k = 0; k < 3; ++k) out->correction[3 + k] = (velocity[6 * i + 3 + (size_t)k] - out->spin[k]) / 2;
+        out->kind = TRAPEZOID_OWN;
+        out->linear = size3(out->correction);
+        out->angular = size3(out->correction + 3);
+        out->moves_linear = trapezoid_speed_part(bodies[i].velocity, velocity + 6 * i, 0);
+        out->moves_angular = trapezoid_speed_part(bodies[i].velocity, velocity + 6 * i, 1);
+        out->rest = trapezoid_rest_speed(settings->gravity, bodies[i].gravity_scale, bodies[i].wrench, bodies[i].mass,
+                                         settings->dt);
+        out->kind = TRAPEZOID_OWN;
         out->touch = forces_touch(&bodies[i]);
     }
 }
 
-static void advance(const struct sadmm_rigid *body, const double velocity[6], const struct sadmm_lead *lead, double dt,
-                    struct sadmm_rigid *next)
+static void advance(const struct sadmm_rigid *body, const double velocity[6], const struct sadmm_trapezoid *trapezoid,
+                    double dt, struct sadmm_rigid *next)
 {
     double mean[6];
-    for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - lead->lead[k];
+    for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - trapezoid->correction[k];
     *next = *body;
-    spin_move_from(body, lead->halfway, velocity, mean, lead->kind != LEAD_OWN, dt, next->position,
+    spin_move_from(body, trapezoid->halfway, velocity, mean, trapezoid->kind != TRAPEZOID_OWN, dt, next->position,
                    next->orientation, next->velocity);
     rolling_forget(next);
-    next->mean = lead->kind == LEAD_OWN;
+    next->mean = trapezoid->kind == TRAPEZOID_OWN;
 }
 
 void sadmm_advance(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
-                   const struct sadmm_lead *leads, double dt, struct sadmm_rigid *next)
+                   const struct sadmm_trapezoid *trapezoids, double dt, struct sadmm_rigid *next)
 {
-    for (size_t i = 0; i < count; ++i) advance(&bodies[i], velocity + 6 * i, &leads[i], dt, &next[i]);
+    for (size_t i = 0; i < count; ++i) advance(&bodies[i], velocity + 6 * i, &trapezoids[i], dt, &next[i]);
 }

@@ -115,10 +115,10 @@ static void add_contact(struct island *s, int32_t p, int32_t k)
     struct direct_law *law = &s->d->laws[s->contacts];
     const mat3 frame = sadmm_contact_frame(pair->normal);
     const vec3 impulse = m3_mul(frame, v3_load(points[k].impulse)),
-               driven = m3_mul(frame, sadmm_driven_part(system, pair, &points[k]));
+               kinematic = m3_mul(frame, sadmm_kinematic_part(system, pair, &points[k]));
     c->pair = p, c->point = pair->first + k;
     c->e = sadmm_contact_e(system, s->settings, pair, points, k);
-    v3_store(driven, c->given);
+    v3_store(kinematic, c->given);
     *law = (struct direct_law){.first = 3 * s->contacts, .count = 3, .friction = pair->friction};
     v3_store(impulse, s->dense.lambda + law->first);
     for (int side = 0; side < 2; ++side) {
@@ -629,7 +629,7 @@ sadmm_status sadmm_direct_solve(struct sadmm_direct *direct, struct sadmm_joined
     struct sadmm_system down = *system;
     struct island s = {.d = direct, .joined = joined, .system = &down, .slots = slots, .settings = settings};
     const size_t n = (size_t)system->body_count;
-    down.carried = NULL;
+    down.support_motion = NULL;
     *solved = 0;
     if (system->contacts->pair_count == 0) return SADMM_OK;
     if (!sadmm_grow_empty(&direct->label, &direct->label_capacity, n, sizeof *direct->label) ||

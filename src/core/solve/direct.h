@@ -28,9 +28,9 @@ struct sadmm_direct;
 struct sadmm_direct *sadmm_direct_create(void);
 void sadmm_direct_destroy(struct sadmm_direct *direct);
 
-/* system->velocity, impulses of system->contacts and multipliers of system->rows, in place. Velocities are true ones:
- * what carries islands has been put down. After sadmm_joined_solve(after) of the same joined bodies and slots.
- * solved: islands that have changed. Errors: OUT_OF_MEMORY, nothing has changed. */
+/* system->velocity, impulses of system->contacts and multipliers of system->rows, in place. Velocities are those of the
+ * world, not relative to supports. After sadmm_joined_solve(after) of the same joined bodies and slots. solved: islands
+ * that have changed. Errors: OUT_OF_MEMORY, nothing has changed. */
 sadmm_status sadmm_direct_solve(struct sadmm_direct *direct, struct sadmm_joined *joined,
                                 const struct sadmm_system *system, const struct sadmm_row_constraint *slots,
                                 const struct sadmm_settings *settings, int32_t *solved, struct sadmm_error *error);

@@ -212,7 +212,7 @@ static void predict(struct predictor *p)
         p->failed[p->label[constraint->body_a >= 0 ? constraint->body_a : constraint->body_b]] = true;
     }
     /* what moves stops nothing */
-    for (size_t k = 0; system->driven_count > 0 && k < system->contacts->pair_count; ++k) {
+    for (size_t k = 0; system->kinematic_count > 0 && k < system->contacts->pair_count; ++k) {
         const struct sadmm_contact_pair *pair = &system->contacts->pairs[k];
         if (sadmm_pair_gives_energy(system, pair))
             p->failed[p->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]] = true;

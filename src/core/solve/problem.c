@@ -28,7 +28,7 @@ void sadmm_problem_drop_parts(sadmm_problem *problem)
 {
     sadmm_free(problem->contacts.pairs);
     sadmm_free(problem->contacts.points);
-    sadmm_free(problem->driven);
+    sadmm_free(problem->kinematic);
     sadmm_free(problem->blocks);
     sadmm_rows_free(&problem->rows);
     sadmm_free(problem->A);
@@ -36,8 +36,8 @@ void sadmm_problem_drop_parts(sadmm_problem *problem)
     sadmm_free(problem->velocity);
     memset(&problem->contacts, 0, sizeof problem->contacts);
     problem->blocks = NULL;
-    problem->driven = NULL;
-    problem->driven_count = 0;
+    problem->kinematic = NULL;
+    problem->kinematic_count = 0;
     problem->A = problem->b = problem->velocity = NULL;
     problem->body_count = problem->block_count = 0;
 }
@@ -77,8 +77,8 @@ static struct sadmm_system make_system(const sadmm_problem *problem, struct sadm
         .A = problem->A,
         .b = problem->b,
         .velocity = problem->velocity,
-        .driven = problem->driven,
-        .driven_count = problem->driven_count,
+        .kinematic = problem->kinematic,
+        .kinematic_count = problem->kinematic_count,
         .contacts = contacts,
         .errors_given = true,
         .first = true,

@@ -172,7 +172,7 @@ sadmm_status sadmm_problem_set_bodies(sadmm_problem *problem, int32_t count, con
 /* ---- contacts ------------------------------------------------------------------------------------------------ */
 
 /* Does its static side move? */
-static bool is_driven(const sadmm_problem_contact *contact)
+static bool is_kinematic(const sadmm_problem_contact *contact)
 {
     return contact->velocity[0] != 0 || contact->velocity[1] != 0 || contact->velocity[2] != 0;
 }
@@ -189,7 +189,7 @@ static sadmm_status check_contact(int32_t index, const sadmm_problem_contact *co
     if (contact->body_b >= 0) TRY(check_vector("contacts", index, "arm_b", contact->arm_b, 3, -HUGE_VAL, error));
     TRY(check_number("contacts", index, "error", contact->error, error));
     TRY(check_vector("contacts", index, "velocity", contact->velocity, 3, -HUGE_VAL, error));
-    if (contact->body_a >= 0 && contact->body_b >= 0 && is_driven(contact))
+    if (contact->body_a >= 0 && contact->body_b >= 0 && is_kinematic(contact))
         REFUSE("contacts[%d].velocity = (%g, %g, %g): must be 0, for neither body is -1", index, contact->velocity[0],
                contact->velocity[1], contact->velocity[2]);
     return check_friction("contacts", index, contact->friction, error);
@@ -212,26 +212,26 @@ static bool continues_pair(const struct sadmm_contact_pair *pair, const struct s
     return difference <= 1e-12 * scale;
 }
 
-/* Number of the contact's driven body, which it has to itself or shares with the contact before it; -1: none. */
-static int32_t load_driven(const sadmm_problem_contact *contact, double *driven, int32_t *count)
+/* Number of the contact's kinematic body, which it has to itself or shares with the contact before it; -1: none. */
+static int32_t load_kinematic(const sadmm_problem_contact *contact, double *kinematic, int32_t *count)
 {
     double own[6] = {0};
-    if (!is_driven(contact)) return -1;
+    if (!is_kinematic(contact)) return -1;
     for (int k = 0; k < 3; ++k) own[k] = contact->body_a < 0 ? -contact->velocity[k] : contact->velocity[k];
-    if (*count == 0 || memcmp(driven + 6 * ((size_t)*count - 1), own, sizeof own) != 0)
-        memcpy(driven + 6 * (size_t)(*count)++, own, sizeof own);
+    if (*count == 0 || memcmp(kinematic + 6 * ((size_t)*count - 1), own, sizeof own) != 0)
+        memcpy(kinematic + 6 * (size_t)(*count)++, own, sizeof own);
     return *count - 1;
 }
 
-/* driven: load_driven. */
-static void load_contact(const sadmm_problem_contact *contact, const double *impulse, int32_t driven,
+/* kinematic: load_kinematic. */
+static void load_contact(const sadmm_problem_contact *contact, const double *impulse, int32_t kinematic,
                          struct sadmm_contact_pair *pair, struct sadmm_contact_point *point)
 {
     memset(pair, 0, sizeof *pair);
     memset(point, 0, sizeof *point);
     pair->body_a = contact->body_a;
     pair->body_b = contact->body_b;
-    if (driven >= 0) *(contact->body_a < 0 ? &pair->body_a : &pair->body_b) = sadmm_driven(driven);
+    if (kinematic >= 0) *(contact->body_a < 0 ? &pair->body_a : &pair->body_b) = sadmm_kinematic(kinematic);
     pair->shape_a = pair->shape_b = -1;
     pair->friction = contact->friction;
     memcpy(pair->normal, contact->normal, sizeof pair->normal);
@@ -259,21 +259,21 @@ sadmm_status sadmm_problem_set_contacts(sadmm_problem *problem, int32_t count, c
     struct sadmm_contact_set set = {0};
     set.pairs = sadmm_alloc((size_t)count, sizeof *set.pairs);
     set.points = sadmm_alloc((size_t)count, sizeof *set.points);
-    int32_t driven_count = 0;
-    for (int32_t k = 0; k < count; ++k) driven_count += is_driven(&contacts[k]);
-    double *driven = driven_count > 0 ? sadmm_alloc(6 * (size_t)driven_count, sizeof *driven) : NULL;
-    if (!set.pairs || !set.points || (driven_count > 0 && !driven)) {
+    int32_t kinematic_count = 0;
+    for (int32_t k = 0; k < count; ++k) kinematic_count += is_kinematic(&contacts[k]);
+    double *kinematic = kinematic_count > 0 ? sadmm_alloc(6 * (size_t)kinematic_count, sizeof *kinematic) : NULL;
+    if (!set.pairs || !set.points || (kinematic_count > 0 && !kinematic)) {
         sadmm_free(set.pairs);
         sadmm_free(set.points);
-        sadmm_free(driven);
+        sadmm_free(kinematic);
         return sadmm_fail_memory(error, "the problem's contacts");
     }
     set.pair_capacity = set.point_capacity = set.point_count = (size_t)count;
-    driven_count = 0;
+    kinematic_count = 0;
     for (int32_t k = 0; k < count; ++k) {
         struct sadmm_contact_pair next;
         load_contact(&contacts[k], impulses0 ? impulses0 + 3 * (size_t)k : NULL,
-                     load_driven(&contacts[k], driven, &driven_count), &next, &set.points[k]);
+                     load_kinematic(&contacts[k], kinematic, &kinematic_count), &next, &set.points[k]);
         struct sadmm_contact_pair *last = set.pair_count ? &set.pairs[set.pair_count - 1] : NULL;
         if (last && continues_pair(last, &set.points[last->first], &next, &set.points[k])) {
             ++last->count;
@@ -286,9 +286,9 @@ sadmm_status sadmm_problem_set_contacts(sadmm_problem *problem, int32_t count, c
 
     sadmm_free(problem->contacts.pairs);
     sadmm_free(problem->contacts.points);
-    sadmm_free(problem->driven);
-    problem->driven = driven;
-    problem->driven_count = driven_count;
+    sadmm_free(problem->kinematic);
+    problem->kinematic = kinematic;
+    problem->kinematic_count = kinematic_count;
     problem->contacts = set;
     return SADMM_OK;
 }

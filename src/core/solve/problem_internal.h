@@ -18,8 +18,8 @@ struct sadmm_problem {
     double *A, *b;               /* (bodies x 36), (bodies x 6) */
     double *velocity;            /* (bodies x 6) */
     struct sadmm_contact_set contacts;
-    double *driven;              /* (driven_count x 6) of pairs whose static side moves */
-    int32_t driven_count;
+    double *kinematic;           /* (kinematic_count x 6) of pairs whose static side moves */
+    int32_t kinematic_count;
     int32_t block_count;
     sadmm_problem_block *blocks; /* as given, to be read back */
     struct sadmm_rows rows;      /* what they mean: a constraint a block, in their order */

@@ -53,10 +53,10 @@ sadmm_status sadmm_problem_get_contact(sadmm_problem *problem, int32_t index, sa
     const struct sadmm_contact_point *point = &set->points[index];
     contact->body_a = pair->body_a >= 0 ? pair->body_a : -1;
     contact->body_b = pair->body_b >= 0 ? pair->body_b : -1;
-    const bool on_a = sadmm_body_is_driven(pair->body_a), on_b = sadmm_body_is_driven(pair->body_b);
+    const bool on_a = sadmm_body_is_kinematic(pair->body_a), on_b = sadmm_body_is_kinematic(pair->body_b);
     for (int k = 0; k < 3; ++k)
-        contact->velocity[k] = on_a   ? -problem->driven[6 * (size_t)sadmm_driven(pair->body_a) + (size_t)k]
-                               : on_b ? problem->driven[6 * (size_t)sadmm_driven(pair->body_b) + (size_t)k]
+        contact->velocity[k] = on_a   ? -problem->kinematic[6 * (size_t)sadmm_kinematic(pair->body_a) + (size_t)k]
+                               : on_b ? problem->kinematic[6 * (size_t)sadmm_kinematic(pair->body_b) + (size_t)k]
                                       : 0;
     memcpy(contact->normal, pair->normal, sizeof contact->normal);
     memcpy(contact->arm_a, point->arm_a, sizeof contact->arm_a);

@@ -30,11 +30,11 @@ struct sadmm_push {
     struct sadmm_contact_set contacts;
     int32_t *bodies, *first; /* of the step; the first one of its island, as these are numbered */
     struct sadmm_rigid *rigid;
-    double *velocity, *carried; /* x 6 */
-    double *way;                /* x 6: v_1 - v_0 */
+    double *velocity, *support_motion; /* x 6 */
+    double *way;                       /* x 6: v_1 - v_0 */
     struct push_island *islands;
     bool *free;                 /* its island is in the air */
-    size_t body_capacity, first_capacity, rigid_capacity, velocity_capacity, carried_capacity, way_capacity,
+    size_t body_capacity, first_capacity, rigid_capacity, velocity_capacity, support_motion_capacity, way_capacity,
         island_capacity, free_capacity;
 };
 
@@ -46,7 +46,7 @@ void sadmm_push_destroy(struct sadmm_push *p)
     if (p->context) p->kernels->destroy(p->context);
     sadmm_contact_set_free(&p->contacts);
     void *blocks[] = {p->label, p->index, p->sums, p->pairs, p->bodies, p->first, p->rigid,
-                      p->velocity, p->carried, p->way, p->islands, p->free};
+                      p->velocity, p->support_motion, p->way, p->islands, p->free};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(p);
 }
@@ -113,7 +113,7 @@ static sadmm_status number_bodies(struct sadmm_push *p, int32_t all, struct sadm
         !sadmm_grow_empty(&p->free, &p->free_capacity, n, sizeof *p->free) ||
         !sadmm_grow_empty(&p->rigid, &p->rigid_capacity, n, sizeof *p->rigid) ||
         !sadmm_grow_empty(&p->velocity, &p->velocity_capacity, 6 * n, sizeof *p->velocity) ||
-        !sadmm_grow_empty(&p->carried, &p->carried_capacity, 6 * n, sizeof *p->carried) ||
+        !sadmm_grow_empty(&p->support_motion, &p->support_motion_capacity, 6 * n, sizeof *p->support_motion) ||
         !sadmm_grow_empty(&p->way, &p->way_capacity, 6 * n, sizeof *p->way) ||
         !sadmm_grow_empty(&p->islands, &p->island_capacity, n, sizeof *p->islands)) {
         p->system.body_count = 0;
@@ -215,7 +215,8 @@ static void gather_bodies(struct sadmm_push *p, const struct sadmm_system *from)
         const size_t i = (size_t)p->bodies[k], at = 6 * (size_t)k;
         p->rigid[k] = from->rigid[i];
         memcpy(p->velocity + at, from->velocity + 6 * i, 6 * sizeof *p->velocity);
-        if (from->carried) memcpy(p->carried + at, from->carried + 6 * i, 6 * sizeof *p->carried);
+        if (from->support_motion)
+            memcpy(p->support_motion + at, from->support_motion + 6 * i, 6 * sizeof *p->support_motion);
     }
 }
 
@@ -252,9 +253,9 @@ sadmm_status sadmm_push_solve(struct sadmm_push *p, const struct sadmm_kernels *
         .body_count = p->system.body_count,
         .rigid = p->rigid,
         .velocity = p->velocity,
-        .driven = system->driven,
-        .driven_count = system->driven_count,
-        .carried = system->carried ? p->carried : NULL,
+        .kinematic = system->kinematic,
+        .kinematic_count = system->kinematic_count,
+        .support_motion = system->support_motion ? p->support_motion : NULL,
         .contacts = &p->contacts,
     };
     struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);

@@ -21,7 +21,7 @@ struct sadmm_collision_input;
 struct sadmm_resident_joint; /* core/model/joint_law.h */
 struct sadmm_joint_memory;
 struct sadmm_coupling_memory; /* core/model/coupling_law.h */
-struct sadmm_driven_body;     /* core/model/driven.h */
+struct sadmm_kinematic_body;  /* core/model/kinematic.h */
 struct sadmm_resident_gear;   /* core/model/gear_law.h */
 
 /* A world, from the host. */
@@ -31,9 +31,9 @@ struct sadmm_resident_world {
     const struct sadmm_rigid *rigid;           /* (body_count) */
     const struct sadmm_steady *steady;         /* (body_count) */
     const int32_t *slot_of;                    /* (body_count) body slot */
-    int32_t driven_count;
-    const struct sadmm_driven_body *driven;    /* (driven_count) none with a target: these come as edits */
-    const struct sadmm_contact_set *contacts;  /* of the last step, with impulses */
+    int32_t kinematic_count;
+    const struct sadmm_kinematic_body *kinematic; /* (kinematic_count) none with a target: these come as edits */
+    const struct sadmm_contact_set *contacts;     /* of the last step, with impulses */
     int32_t joint_count;
     const struct sadmm_resident_joint *joints;      /* (joint_count) */
     const struct sadmm_joint_memory *joint_memory;  /* (joint_count) of the last step */
@@ -50,9 +50,9 @@ struct sadmm_resident_world {
 };
 
 enum sadmm_edit_kind {
-    SADMM_EDIT_STATE,    /* target: a dynamic body, or a driven one; position (3), orientation (4), velocity (6) */
+    SADMM_EDIT_STATE,    /* target: a dynamic body, or a kinematic one; position (3), orientation (4), velocity (6) */
     SADMM_EDIT_FORCES,   /* target: a dynamic body; force, torque (6), scale of gravity, damping (2) */
-    SADMM_EDIT_TARGET,   /* target: a driven body; 1: it is to be there after the step, 0: it goes by its velocity;
+    SADMM_EDIT_TARGET,   /* target: a kinematic body; 1: it is to be there after the step, 0: it goes by its velocity;
                             position (3), orientation (4), the length of the step (s) */
     SADMM_EDIT_SETTINGS, /* sadmm_settings_numbers(): a backend's own, from what `step` is given */
     SADMM_EDIT_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate
@@ -90,7 +90,7 @@ struct sadmm_resident_report {
     struct {
         double total, collide, assemble, solve, finish;
     } ms;                      /* on the backend's own clock */
-    int32_t offending_body;           /* NON_FINITE: a body that is not finite (below: a driven one), -1: unknown */
+    int32_t offending_body;           /* NON_FINITE: a body that is not finite (below: a kinematic one), -1: unknown */
 };
 
 /* Where a backend has bodies after the last step done: pointers of its device's memory, not to be written to. */
@@ -115,10 +115,10 @@ struct sadmm_resident_kernels {
     /* The world after the last step done; any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_bodies)(struct sadmm_context *, struct sadmm_rigid *rigid, struct sadmm_steady *steady,
                                 double *wrench /* (bodies x 6) */, struct sadmm_error *);
-    /* Driven bodies after the last step done, what contacts gave them in it (driven_count x 6), and the velocities that
-     * they had in it (driven_count x 6); any pointer may be NULL. Nothing may be enqueued. */
-    sadmm_status (*read_driven)(struct sadmm_context *, struct sadmm_driven_body *, double *wrench, double *velocity,
-                                struct sadmm_error *);
+    /* Kinematic bodies after the last step done, what contacts gave them in it (kinematic_count x 6), and the
+     * velocities that they had in it (kinematic_count x 6); any pointer may be NULL. Nothing may be enqueued. */
+    sadmm_status (*read_kinematic)(struct sadmm_context *, struct sadmm_kinematic_body *, double *wrench,
+                                   double *velocity, struct sadmm_error *);
     /* Until the next step, or load. Nothing may be enqueued. */
     sadmm_status (*view)(struct sadmm_context *, struct sadmm_resident_view *, struct sadmm_error *);
     /* Contacts of the last step done, with its impulses. Nothing may be enqueued. */

@@ -40,7 +40,7 @@ enum sadmm_stage_kind {
     SADMM_STAGE_LIMIT,              /* -    momentum that no contact may change (math/momentum.h); FAST: energy (math/limit.h) */
     SADMM_STAGE_SOLUTION,           /* -    velocities and multipliers to where the caller reads them */
     SADMM_STAGE_PUSH_SOLVE,         /* -    the second problem: velocities that push apart */
-    SADMM_STAGE_INTEGRATE,          /* Q    states after dt, each body's position correction included (math/lead.h) */
+    SADMM_STAGE_INTEGRATE,          /* Q states after dt, each body's position correction included (math/trapezoid.h) */
     SADMM_STAGE_BLOCK_SOLVE_AGAIN,  /* -    bodies with joints, beside the contact impulses found */
     SADMM_STAGE_NCP_SOLVE,          /* -    contacts of small islands with joints, exactly (direct.h) */
     SADMM_STAGE_REACTIONS,          /* -    what joints keep and report */

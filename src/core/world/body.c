@@ -168,7 +168,7 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     if (slot == world->body_slots) ++world->body_slots;
     sadmm_slots_take(&world->bodies_taken, slot);
     ++world->body_count;
-    if (def->type == SADMM_BODY_KINEMATIC) sadmm_world_count_driven(world, 1);
+    if (def->type == SADMM_BODY_KINEMATIC) sadmm_world_count_kinematic(world, 1);
     id->slot = (uint32_t)slot + 1;
     id->generation = generation;
     return SADMM_OK;
@@ -190,7 +190,7 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     --world->body_count;
     sadmm_slots_release(&world->bodies_taken, id.slot - 1);
     if (body->type == SADMM_BODY_DYNAMIC) --world->dynamic_count;
-    if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_count_driven(world, -1);
+    if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_count_kinematic(world, -1);
     world->contacts_readable = false;
     return SADMM_OK;
 }

@@ -54,8 +54,9 @@ void sadmm_world_contact_position(const sadmm_world *world, const struct sadmm_c
 double sadmm_world_contact_speed(const sadmm_world *world, const struct sadmm_contact_pair *pair,
                                  const struct sadmm_contact_point *point)
 {
-    const struct sadmm_system system = {.driven = world->start.driven, .driven_count = world->start.driven_count};
-    vec3 x = sadmm_driven_part(&system, pair, point);
+    const struct sadmm_system system = {.kinematic = world->start.kinematic,
+                                        .kinematic_count = world->start.kinematic_count};
+    vec3 x = sadmm_kinematic_part(&system, pair, point);
     if (pair->body_b >= 0) x = v3_add(x, sadmm_velocity_at(world->start.rigid[pair->body_b].velocity, point->arm_b));
     if (pair->body_a >= 0) x = v3_sub(x, sadmm_velocity_at(world->start.rigid[pair->body_a].velocity, point->arm_a));
     return -v3_dot(x, v3_load(pair->normal));
@@ -169,8 +170,8 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, con
     const sadmm_settings settings = sadmm_settings_of_substep(&world->step_settings);
     struct sadmm_system system = {.body_count = world->plan.bodies,
                                   .rigid = world->start.rigid,
-                                  .driven = world->start.driven,
-                                  .driven_count = world->start.driven_count};
+                                  .kinematic = world->start.kinematic,
+                                  .kinematic_count = world->start.kinematic_count};
     for (size_t i = 0; i < n; ++i) {
         sadmm_system_body(&system, &settings, (int32_t)i, f->A + 36 * i, f->b + 6 * i);
         memcpy(f->v + 6 * i, world->start.velocity + 6 * i, 6 * sizeof *f->v);
@@ -182,7 +183,7 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, con
             sadmm_problem_contact *contact = &f->contacts[k];
             contact->body_a = pair->body_a >= 0 ? pair->body_a : -1;
             contact->body_b = pair->body_b >= 0 ? pair->body_b : -1;
-            v3_store(sadmm_driven_part(&system, pair, point), contact->velocity);
+            v3_store(sadmm_kinematic_part(&system, pair, point), contact->velocity);
             memcpy(contact->normal, pair->normal, sizeof contact->normal);
             memcpy(contact->arm_a, point->arm_a, sizeof contact->arm_a);
             memcpy(contact->arm_b, point->arm_b, sizeof contact->arm_b);

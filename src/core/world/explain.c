@@ -35,9 +35,9 @@ static void explain_constraints(struct text *t, const struct sadmm_plan *plan, i
     else line(t, "rows         left out: there are none\n");
 }
 
-static void explain_driven(struct text *t, int32_t count)
+static void explain_kinematic(struct text *t, int32_t count)
 {
-    if (count > 0) line(t, "driven       %d kinematic bodies\n", count);
+    if (count > 0) line(t, "kinematic    %d bodies\n", count);
 }
 
 static void explain_options(struct text *t, const struct sadmm_plan *plan, const sadmm_settings *s)
@@ -90,7 +90,7 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
         line(&t, "sub-steps    %d of %g s with up to %d iterations each; what follows is the last one's\n",
              settings.substeps, settings.dt, settings.iterations);
     explain_constraints(&t, plan, world->report.joints, world->report.couplings);
-    explain_driven(&t, world->driven_count);
+    explain_kinematic(&t, world->kinematic_count);
     explain_options(&t, plan, &settings);
     line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, settings.iterations * settings.substeps,
          world->report.iterations == settings.substeps && !plan->points ? ": without constraints Step 1 is exact" : "");

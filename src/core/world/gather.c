@@ -105,7 +105,7 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     g.world = world;
     g.barrier = (struct sadmm_barrier){0};
     sadmm_parallel(&world->team, sadmm_pass_threads(last_threads(world), slots), gather_share, &g);
-    TRY(sadmm_world_gather_driven(world));
+    TRY(sadmm_world_gather_kinematic(world));
     sadmm_world_begin_couplings(world);
     return sadmm_world_begin_joints(world);
 }
@@ -139,7 +139,7 @@ void sadmm_world_turn(sadmm_world *world, int substep)
     struct turning turning = {world, substep};
     sadmm_parallel(&world->team, sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count), turn_share,
                    &turning);
-    sadmm_world_turn_driven(world);
+    sadmm_world_turn_kinematic(world);
 }
 
 void sadmm_world_swap_starts(sadmm_world *world)
@@ -187,8 +187,8 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
         .velocity = world->velocity,
         .contacts = &world->contacts,
         .first = !world->stepped,
-        .driven = world->start.driven,
-        .driven_count = world->start.driven_count,
+        .kinematic = world->start.kinematic,
+        .kinematic_count = world->start.kinematic_count,
         .rows = world->start.rows.constraint_count > 0 ? &world->start.rows : NULL,
     };
     return system;

@@ -1,11 +1,11 @@
 /* Hits of bodies in flight, each at its moment; not those on meshes.
  *
  * A solve knows one velocity of a body in a step. What is hit within it by a body that was just hit, or hit twice, asks
- * for several. So before contacts are found, bodies that no contact carries are followed along their ways: pairs that
- * bounce and approach faster than the threshold of restitution, or pass (flyers.h), are taken one after the other, in
- * the order of the time at which they first touch, each with the law of impact there (core/math/hit.h), and what the
- * two come near from then on is looked for again. A body is then given the start from which it would be where it is,
- * with the velocity that it has:
+ * for several. So before contacts are found, bodies that no contact supports are followed along their paths: pairs that
+ * bounce and approach faster than the threshold of restitution, or pass (swept_bodies.h), are taken one after the
+ * other, in the order of the time at which they first touch, each with the law of impact there (core/math/hit.h), and
+ * what the two come near from then on is looked for again. A body is then given the start from which it would be where
+ * it is, with the velocity that it has:
  *
  *     x~ = x(t) - t v~ - t^2/2 a,      v~ = v(t)+ - t a
  *
@@ -18,29 +18,29 @@
 #include <string.h>
 
 #include "collision/broad_phase.h"
-#include "collision/flyers.h"
+#include "collision/swept_bodies.h"
 #include "core/base/memory.h"
-#include "core/flight/flyer.h"
+#include "core/flight/swept_body.h"
 #include "world_internal.h"
 
 /* A hit that is foreseen. */
 struct foreseen {
     uint64_t key; /* shapes, in the order of pairs */
     uint32_t child;
-    int32_t flyer[2];
+    int32_t swept_body[2];
     uint32_t hits[2];
     struct sadmm_flight_touch touch;
 };
 
 struct sadmm_hits {
-    unsigned char *flyers; /* enum sadmm_flyer, by body slot */
-    int32_t *index;        /* by body slot: its flyer + 1, 0: none yet */
-    double *since;         /* by body slot */
-    struct flyer *list;
+    unsigned char *kinds; /* enum sadmm_swept_kind, by body slot */
+    int32_t *index;       /* by body slot: its swept body + 1, 0: none yet */
+    double *since;        /* by body slot */
+    struct swept_body *list;
     struct foreseen *foreseen;
     int32_t *queue;                     /* a heap of these, the next one first */
     struct sadmm_pair_list fast, pairs; /* of the sub-step; of a shape that was hit */
-    size_t flyer_capacity, index_capacity, since_capacity, count, capacity, foreseen_count, foreseen_capacity,
+    size_t kind_capacity, index_capacity, since_capacity, count, capacity, foreseen_count, foreseen_capacity,
         queue_count, queue_capacity;
 };
 
@@ -85,38 +85,38 @@ static int32_t take_from_queue(struct sadmm_hits *h)
 
 /* ---- ways -------------------------------------------------------------------------------------------------------- */
 
-/* The number of a body's flyer, -1: out of memory. */
-static int32_t flyer_of(struct taking *t, int32_t slot)
+/* The number of a body among the swept ones, -1: out of memory. */
+static int32_t swept_body_of(struct taking *t, int32_t slot)
 {
     struct sadmm_hits *h = t->hits;
     const sadmm_world *world = t->world;
     const int32_t system = world->collision_bodies[slot].system_body;
     if (h->index[slot] > 0) return h->index[slot] - 1;
     if (!sadmm_grow(&h->list, &h->capacity, h->count, h->count + 1, sizeof *h->list)) return -1;
-    struct flyer *f = &h->list[h->count];
+    struct swept_body *f = &h->list[h->count];
     memset(f, 0, sizeof *f);
     f->slot = slot;
     f->dynamic = system >= 0 ? system : -1;
-    f->driven = sadmm_body_is_driven(system) ? sadmm_driven(system) : -1;
-    f->start = system >= 0                    ? world->start.rigid[system]
-               : sadmm_body_is_driven(system) ? world->driven[f->driven].rigid
-                                              : world->bodies[slot].rigid;
-    flyer_begin(f, &t->settings);
+    f->kinematic = sadmm_body_is_kinematic(system) ? sadmm_kinematic(system) : -1;
+    f->start = system >= 0                       ? world->start.rigid[system]
+               : sadmm_body_is_kinematic(system) ? world->kinematic[f->kinematic].rigid
+                                                 : world->bodies[slot].rigid;
+    swept_body_begin(f, &t->settings);
     h->index[slot] = (int32_t)++h->count;
     return (int32_t)h->count - 1;
 }
 
 /* ---- what is foreseen -------------------------------------------------------------------------------------------- */
 
-static struct sadmm_flying_shape shape_of(const struct taking *t, uint32_t slot, const struct flyer *f)
+static struct sadmm_swept_shape shape_of(const struct taking *t, uint32_t slot, const struct swept_body *f)
 {
     const struct sadmm_shape *shape = &t->world->shapes[slot];
-    const struct sadmm_flying_shape out = {shape, &t->world->geometries[shape->geometry], &f->flight};
+    const struct sadmm_swept_shape out = {shape, &t->world->geometries[shape->geometry], &f->flight};
     return out;
 }
 
 /* The body is followed no further. */
-static void give_up(struct flyer *f) { *(f->passes ? &f->ended : &f->too_many) = true; }
+static void give_up(struct swept_body *f) { *(f->passes ? &f->ended : &f->too_many) = true; }
 
 /* When do two shapes hit each other, from `from` on? False: out of memory. */
 static bool foresee(struct taking *t, uint64_t key, double from)
@@ -124,10 +124,10 @@ static bool foresee(struct taking *t, uint64_t key, double from)
     struct sadmm_hits *h = t->hits;
     const uint32_t slot[2] = {(uint32_t)(key >> 32), (uint32_t)key};
     const int32_t body[2] = {t->world->shapes[slot[0]].body, t->world->shapes[slot[1]].body};
-    const int32_t number[2] = {flyer_of(t, body[0]), flyer_of(t, body[1])};
+    const int32_t number[2] = {swept_body_of(t, body[0]), swept_body_of(t, body[1])};
     if (number[0] < 0 || number[1] < 0) return false;
-    const struct flyer *a = &h->list[number[0]], *b = &h->list[number[1]];
-    struct sadmm_flying_pair pair = {
+    const struct swept_body *a = &h->list[number[0]], *b = &h->list[number[1]];
+    struct sadmm_swept_pair pair = {
         shape_of(t, slot[0], a), shape_of(t, slot[1], b), t->input.hulls, 0, t->settings.restitution_threshold, false};
     struct sadmm_flight_touch touch;
     /* What the triangles of a mesh push along depends on those around them, which one touch by itself does not see: that
@@ -144,7 +144,7 @@ static bool foresee(struct taking *t, uint64_t key, double from)
 }
 
 /* The box that a shape sweeps from a hit on. False: out of memory. */
-static bool set_box(struct taking *t, uint32_t slot, const struct flyer *f)
+static bool set_box(struct taking *t, uint32_t slot, const struct swept_body *f)
 {
     const struct sadmm_shape *shape = &t->world->shapes[slot];
     const struct sadmm_geometry *geometry = &t->world->geometries[shape->geometry];
@@ -152,21 +152,21 @@ static bool set_box(struct taking *t, uint32_t slot, const struct flyer *f)
     struct sadmm_box3 box;
     sadmm_flight_at(&f->flight, f->flight.since, &from);
     sadmm_flight_at(&f->flight, t->settings.dt, &to);
-    flyer_box(shape, geometry, &f->flight, t->settings.dt, &from, &to, &box);
+    swept_body_box(shape, geometry, &f->flight, t->settings.dt, &from, &to, &box);
     return sadmm_collision_set_box(t->world->collision, slot, &box);
 }
 
 /* What a body that was hit comes near from there on; `except`: a body whose pairs with it are known. */
 static bool foresee_body(struct taking *t, int32_t number, int32_t except)
 {
-    const struct flyer f = t->hits->list[number];
+    const struct swept_body f = t->hits->list[number];
     const struct sadmm_world_body *body = &t->world->bodies[f.slot];
     for (uint32_t name = body->first_shape; name; name = t->world->shape_links[name - 1].next) {
         const uint32_t slot = name - 1;
         if (t->world->shapes[slot].sensor) continue;
         t->hits->pairs.count = 0;
         if (!set_box(t, slot, &f) ||
-            !sadmm_collision_list_near(t->world->collision, &t->input, t->hits->flyers, slot, &t->hits->pairs))
+            !sadmm_collision_list_near(t->world->collision, &t->input, t->hits->kinds, slot, &t->hits->pairs))
             return false;
         for (size_t k = 0; k < t->hits->pairs.count; ++k) {
             const uint64_t key = t->hits->pairs.keys[k];
@@ -198,10 +198,10 @@ static bool record(struct taking *t, const struct foreseen *item, const struct h
         memcpy(out->normal, item->touch.normal, sizeof out->normal);
         v3_store(hit_impulse(hit, k, 1), out->impulse);
         for (int side = 0; side < 2; ++side) {
-            const struct flyer *f = &t->hits->list[item->flyer[side]];
+            const struct swept_body *f = &t->hits->list[item->swept_body[side]];
             v3_store(hit->arm[side][k], out->arm[side]);
             out->dynamic[side] = f->dynamic;
-            out->driven[side] = f->driven;
+            out->kinematic[side] = f->kinematic;
         }
         out->speed = -(double)hit_velocity(hit, k).x;
         out->friction = hit->friction;
@@ -211,41 +211,41 @@ static bool record(struct taking *t, const struct foreseen *item, const struct h
 
 static bool take_hit(struct taking *t, const struct foreseen item)
 {
-    struct flyer *f[2] = {&t->hits->list[item.flyer[0]], &t->hits->list[item.flyer[1]]};
-    const struct flyer *const of[2] = {f[0], f[1]};
+    struct swept_body *f[2] = {&t->hits->list[item.swept_body[0]], &t->hits->list[item.swept_body[1]]};
+    const struct swept_body *const of[2] = {f[0], f[1]};
     struct sadmm_flight_pose pose[2];
     struct hit hit;
     for (int side = 0; side < 2; ++side) sadmm_flight_at(&f[side]->flight, item.touch.time, &pose[side]);
     memset(&hit, 0, sizeof hit);
     sadmm_collision_pair_law(t->world->collision, &t->input, item.key, &hit.friction, &hit.restitution);
-    flyers_hit(of, &item.touch, t->settings.restitution_threshold, pose, &hit);
+    swept_bodies_hit(of, &item.touch, t->settings.restitution_threshold, pose, &hit);
     hit_solve(&hit);
     if (!record(t, &item, &hit)) return false;
-    flyers_part(f, &t->settings, item.touch.time, pose, &hit);
+    swept_bodies_part(f, &t->settings, item.touch.time, pose, &hit);
     const int32_t slot_a = f[0]->slot;
-    return (f[0]->dynamic < 0 || foresee_body(t, item.flyer[0], -1)) &&
-           (t->hits->list[item.flyer[1]].dynamic < 0 ||
-            foresee_body(t, item.flyer[1], t->hits->list[item.flyer[0]].dynamic < 0 ? -1 : slot_a));
+    return (f[0]->dynamic < 0 || foresee_body(t, item.swept_body[0], -1)) &&
+           (t->hits->list[item.swept_body[1]].dynamic < 0 ||
+            foresee_body(t, item.swept_body[1], t->hits->list[item.swept_body[0]].dynamic < 0 ? -1 : slot_a));
 }
 
 static bool holds(const struct sadmm_hits *h, const struct foreseen *item)
 {
-    return h->list[item->flyer[0]].hits == item->hits[0] && h->list[item->flyer[1]].hits == item->hits[1];
+    return h->list[item->swept_body[0]].hits == item->hits[0] && h->list[item->swept_body[1]].hits == item->hits[1];
 }
 
 /* ---- a sub-step's ------------------------------------------------------------------------------------------------ */
 
 static bool reserve(struct sadmm_hits *h, size_t slots)
 {
-    return sadmm_grow(&h->flyers, &h->flyer_capacity, 0, slots, sizeof *h->flyers) &&
+    return sadmm_grow(&h->kinds, &h->kind_capacity, 0, slots, sizeof *h->kinds) &&
            sadmm_grow(&h->index, &h->index_capacity, 0, slots, sizeof *h->index) &&
            sadmm_grow(&h->since, &h->since_capacity, 0, slots, sizeof *h->since);
 }
 
-static unsigned char flyer_kind(const struct sadmm_world_body *body, double dt)
+static unsigned char swept_kind(const struct sadmm_world_body *body, double dt)
 {
-    if (!body->alive || body->type != SADMM_BODY_DYNAMIC) return SADMM_FLYER_FIXED;
-    return flyer_is_damped(&body->rigid, dt) ? SADMM_FLYER_NONE : SADMM_FLYER_DYNAMIC;
+    if (!body->alive || body->type != SADMM_BODY_DYNAMIC) return SADMM_SWEPT_FIXED;
+    return swept_body_is_damped(&body->rigid, dt) ? SADMM_SWEPT_NONE : SADMM_SWEPT_DYNAMIC;
 }
 
 void sadmm_world_mark_held(const sadmm_world *world, unsigned char *bodies, unsigned char mark)
@@ -261,15 +261,15 @@ void sadmm_world_mark_held(const sadmm_world *world, unsigned char *bodies, unsi
 static void mark_bodies(struct taking *t)
 {
     const sadmm_world *world = t->world;
-    unsigned char *flyers = t->hits->flyers;
+    unsigned char *kinds = t->hits->kinds;
     for (size_t slot = 0; slot < world->body_slots; ++slot)
-        flyers[slot] = flyer_kind(&world->bodies[slot], t->settings.dt);
-    sadmm_world_mark_held(world, flyers, SADMM_FLYER_NONE);
-    sadmm_collision_mark_pressed(world->collision, &world->contacts, flyers);
+        kinds[slot] = swept_kind(&world->bodies[slot], t->settings.dt);
+    sadmm_world_mark_held(world, kinds, SADMM_SWEPT_NONE);
+    sadmm_collision_mark_pressed(world->collision, &world->contacts, kinds);
 }
 
 /* The orientation that a body has at its last hit, from which contact finding turns it by its velocity. */
-static void place_at_hit(const struct flyer *f, struct sadmm_collision_body *out)
+static void place_at_hit(const struct swept_body *f, struct sadmm_collision_body *out)
 {
     struct sadmm_flight_pose pose;
     sadmm_flight_at(&f->flight, f->flight.since, &pose);
@@ -284,13 +284,13 @@ static void write_back(struct taking *t)
     const struct sadmm_hits *h = t->hits;
     bool any = false;
     for (size_t i = 0; i < h->count; ++i) {
-        const struct flyer *f = &h->list[i];
+        const struct swept_body *f = &h->list[i];
         if (f->hits == 0) continue;
         double *velocity = world->velocity + 6 * (size_t)f->dynamic;
         struct sadmm_collision_body *out = &world->collision_bodies[f->slot];
         any = true;
         world->start.rigid[f->dynamic] = f->start;
-        for (int k = 0; k < 3; ++k) { /* it flies on: what contacts do not change is right from the start */
+        for (int k = 0; k < 3; ++k) { /* it stays airborne: what contacts do not change is right from the start */
             velocity[k] = f->start.velocity[k] + t->settings.dt * f->flight.acceleration[k];
             velocity[3 + k] = f->flight.spin[k];
         }
@@ -310,7 +310,7 @@ static bool may_hit(struct taking *t, const struct foreseen *item)
 {
     bool may = true;
     for (int side = 0; side < 2; ++side) {
-        struct flyer *f = &t->hits->list[item->flyer[side]];
+        struct swept_body *f = &t->hits->list[item->swept_body[side]];
         if (f->hits < (uint32_t)t->settings.hits) continue;
         give_up(f);
         may = false;
@@ -322,8 +322,8 @@ static bool may_hit(struct taking *t, const struct foreseen *item)
 static bool note_passing(struct taking *t, uint64_t key)
 {
     if (!sadmm_collision_passes(t->world->collision, &t->input, key)) return true;
-    const int32_t number[2] = {flyer_of(t, t->world->shapes[key >> 32].body),
-                               flyer_of(t, t->world->shapes[(uint32_t)key].body)};
+    const int32_t number[2] = {swept_body_of(t, t->world->shapes[key >> 32].body),
+                               swept_body_of(t, t->world->shapes[(uint32_t)key].body)};
     if (number[0] < 0 || number[1] < 0) return false;
     t->hits->list[number[0]].passes = t->hits->list[number[1]].passes = true;
     return true;
@@ -334,10 +334,10 @@ static bool take_all(struct taking *t)
     struct sadmm_hits *h = t->hits;
     bool ok = true;
     for (size_t k = 0; ok && k < h->fast.count; ++k)
-        if (sadmm_collision_may_hit(t->world->collision, h->flyers, h->fast.keys[k]))
+        if (sadmm_collision_may_hit(t->world->collision, h->kinds, h->fast.keys[k]))
             ok = note_passing(t, h->fast.keys[k]);
     for (size_t k = 0; ok && k < h->fast.count; ++k)
-        if (sadmm_collision_may_hit(t->world->collision, h->flyers, h->fast.keys[k]))
+        if (sadmm_collision_may_hit(t->world->collision, h->kinds, h->fast.keys[k]))
             ok = foresee(t, h->fast.keys[k], 0);
     while (ok && h->queue_count > 0) {
         const struct foreseen *item = &h->foreseen[take_from_queue(h)];
@@ -364,7 +364,7 @@ static bool leave_out(struct taking *t)
     bool any = false;
     for (size_t i = 0; i < t->hits->count; ++i) {
         if (!t->hits->list[i].too_many || t->hits->list[i].dynamic < 0) continue;
-        t->hits->flyers[t->hits->list[i].slot] = SADMM_FLYER_NONE;
+        t->hits->kinds[t->hits->list[i].slot] = SADMM_SWEPT_NONE;
         any = true;
     }
     return any;
@@ -422,17 +422,17 @@ sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep)
     return take_most(&t);
 }
 
-/* The flyer of a shape's body, NULL: it was not followed to the end. */
-static const struct flyer *followed_of(const sadmm_world *world, int32_t shape)
+/* The swept body that a shape is of, NULL: it was not followed to the end. */
+static const struct swept_body *followed_of(const sadmm_world *world, int32_t shape)
 {
     const struct sadmm_hits *h = world->hits;
     const int32_t slot = world->shapes[shape].body, number = h->index[slot] - 1;
-    return number < 0 || h->flyers[slot] == SADMM_FLYER_NONE || h->list[number].ended ? NULL : &h->list[number];
+    return number < 0 || h->kinds[slot] == SADMM_SWEPT_NONE || h->list[number].ended ? NULL : &h->list[number];
 }
 
 /* Was the pair followed? */
-static bool is_followed(const sadmm_world *world, const struct sadmm_contact_pair *pair, const struct flyer *a,
-                        const struct flyer *b)
+static bool is_followed(const sadmm_world *world, const struct sadmm_contact_pair *pair, const struct swept_body *a,
+                        const struct swept_body *b)
 {
     return a && b && (pair->restitution > 0 || a->hits > 0 || b->hits > 0) &&
            world->geometries[world->shapes[pair->shape_b].geometry].type != SADMM_SHAPE_MESH;
@@ -450,11 +450,11 @@ void sadmm_world_open_gaps(sadmm_world *world)
     if (!world->hits || world->hits->count == 0) return;
     for (size_t p = 0; p < world->contacts.pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
-        const struct flyer *a = followed_of(world, pair->shape_a), *b = followed_of(world, pair->shape_b);
+        const struct swept_body *a = followed_of(world, pair->shape_a), *b = followed_of(world, pair->shape_b);
         if (!is_followed(world, pair, a, b)) continue;
         const double thinner = thinner_of(world, pair);
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
-            flyers_open_gap(pair, &a->flight, &b->flight, thinner, &settings, &world->contacts.points[k]);
+            swept_bodies_open_gap(pair, &a->flight, &b->flight, thinner, &settings, &world->contacts.points[k]);
     }
 }
 
@@ -464,9 +464,9 @@ void sadmm_world_add_hit_wrenches(sadmm_world *world, const sadmm_settings *sett
     for (size_t k = world->start.hit_first; k < world->start.hit_count; ++k) {
         const struct sadmm_world_hit *hit = &world->start.hits[k];
         for (int side = 0; side < 2; ++side) {
-            const bool driven = hit->driven[side] >= 0;
-            const double share = (side ? 1 : -1) * (driven ? mean : 1 / settings->dt);
-            double *wrench = driven                    ? world->driven[hit->driven[side]].wrench
+            const bool kinematic = hit->kinematic[side] >= 0;
+            const double share = (side ? 1 : -1) * (kinematic ? mean : 1 / settings->dt);
+            double *wrench = kinematic                 ? world->kinematic[hit->kinematic[side]].wrench
                              : hit->dynamic[side] >= 0 ? world->wrench + 6 * (size_t)hit->dynamic[side]
                                                        : NULL;
             if (!wrench) continue;
@@ -482,6 +482,6 @@ void sadmm_world_free_hits(sadmm_world *world)
     sadmm_free(world->start.hits);
     sadmm_free(world->last_start.hits);
     if (!h) return;
-    void *blocks[] = {h->flyers, h->index, h->since, h->list, h->foreseen, h->queue, h->fast.keys, h->pairs.keys, h};
+    void *blocks[] = {h->kinds, h->index, h->since, h->list, h->foreseen, h->queue, h->fast.keys, h->pairs.keys, h};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
 }

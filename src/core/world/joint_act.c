@@ -10,7 +10,7 @@ struct joint_body sadmm_world_joint_body(const sadmm_world *world, int32_t slot)
     out.rigid = &body->rigid;
     if (body->type == SADMM_BODY_STATIC) return out;
     if (body->type == SADMM_BODY_KINEMATIC)
-        return (struct joint_body){-1, &world->driven[sadmm_driven(body->system_body)].rigid, true, false};
+        return (struct joint_body){-1, &world->kinematic[sadmm_kinematic(body->system_body)].rigid, true, false};
     out.system_body = body->system_body;
     out.rigid = &world->start.rigid[out.system_body];
     return out;

@@ -5,7 +5,7 @@
 #include "core/base/memory.h"
 #include "core/model/joint_close.h"
 #include "core/model/forces.h"
-#include "core/model/joint_lead.h"
+#include "core/model/joint_trapezoid.h"
 #include "core/solve/joined.h"
 #include "world_internal.h"
 
@@ -21,8 +21,8 @@ static struct joint_end end_of(const sadmm_world *world, const struct sadmm_worl
     if (s == 0 && joint->coupling) return joint_end_on(frame, &world->couplings[joint->coupling - 1].next.target);
     const struct joint_body body = sadmm_world_joint_body(world, joint->body[s]);
     if (body.system_body >= 0) return joint_end_on(frame, &world->next[body.system_body]);
-    if (body.steered)
-        return joint_end_on(frame, &world->driven[sadmm_driven(world->bodies[joint->body[s]].system_body)].next);
+    if (body.prescribed)
+        return joint_end_on(frame, &world->kinematic[sadmm_kinematic(world->bodies[joint->body[s]].system_body)].next);
     return joint_end_on(frame, body.rigid);
 }
 

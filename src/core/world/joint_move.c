@@ -1,17 +1,17 @@
 /* Positions after a (sub-)step in islands with joints, from the velocities that the solve found
- * (core/model/joint_lead.h). */
+ * (core/model/joint_trapezoid.h). */
 #include <string.h>
 
 #include "core/base/memory.h"
 #include "core/math/momentum.h"
 #include "core/model/islands.h"
-#include "core/model/joint_lead.h"
+#include "core/model/joint_trapezoid.h"
 #include "world_internal.h"
 
-static struct joint_lead lead_of(const sadmm_world *world, int32_t body, double dt)
+static struct joint_trapezoid trapezoid_of(const sadmm_world *world, int32_t body, double dt)
 {
-    return body >= 0 ? joint_lead_of(&world->start.rigid[body], world->velocity + 6 * (size_t)body, dt)
-                     : joint_lead_of(NULL, NULL, dt);
+    return body >= 0 ? joint_trapezoid_of(&world->start.rigid[body], world->velocity + 6 * (size_t)body, dt)
+                     : joint_trapezoid_of(NULL, NULL, dt);
 }
 
 static uint16_t *island_of(const sadmm_world *world, int32_t a, int32_t b)
@@ -23,8 +23,8 @@ static void add_constraint(const sadmm_world *world, const struct sadmm_row_cons
                            const sadmm_settings *settings)
 {
     const struct sadmm_rows *rows = &world->start.rows;
-    const struct joint_lead bodies[2] = {lead_of(world, constraint->body_a, settings->dt),
-                                         lead_of(world, constraint->body_b, settings->dt)};
+    const struct joint_trapezoid bodies[2] = {trapezoid_of(world, constraint->body_a, settings->dt),
+                                              trapezoid_of(world, constraint->body_b, settings->dt)};
     uint16_t *island = island_of(world, constraint->body_a, constraint->body_b);
     int moorings = 0;
     *island |= ISLAND_JOINED;
@@ -59,15 +59,16 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
         uint16_t *island = island_of(world, pair->body_a, pair->body_b);
         if (!(*island & ISLAND_JOINED)) continue;
         *island |= ISLAND_TOUCHED | (holds(contacts, pair) ? ISLAND_HELD : 0);
-        if (*island & ISLAND_LEADS_STAY) continue;
-        const struct joint_lead bodies[2] = {lead_of(world, pair->body_a, settings->dt),
-                                             lead_of(world, pair->body_b, settings->dt)};
-        struct lead_touch touch = {0, {0, 0}};
+        if (*island & ISLAND_TRAPEZOID_OFF) continue;
+        const struct joint_trapezoid bodies[2] = {trapezoid_of(world, pair->body_a, settings->dt),
+                                                  trapezoid_of(world, pair->body_b, settings->dt)};
+        struct trapezoid_touch touch = {0, {0, 0}};
         for (int32_t p = pair->first; p < pair->first + pair->count; ++p)
             joint_contact_touches(pair->normal, &contacts->points[p],
                                   sadmm_migration_of(contacts->points, contacts->migrations, p), bodies, settings,
                                   &touch);
-        if (sadmm_pair_is_driven(system, pair) || joint_contacts_hold(&touch, bodies)) *island |= ISLAND_LEADS_STAY;
+        if (sadmm_pair_is_kinematic(system, pair) || joint_contacts_hold(&touch, bodies))
+            *island |= ISLAND_TRAPEZOID_OFF;
     }
 }
 
@@ -85,16 +86,16 @@ sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *s
         if (world->start.rigid[i].rolls & ROLLING_IS_STIFFENED)
             world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
         if (!(island & ISLAND_JOINED)) continue;
-        next->mean = !(island & ISLAND_LEADS_STAY);
+        next->mean = !(island & ISLAND_TRAPEZOID_OFF);
         double halfway[4];
         q_store(spin_turned_halfway(&world->start.rigid[i], settings->dt), halfway);
-        joint_move(&world->start.rigid[i], halfway, world->velocity + 6 * i, island & ISLAND_LEADS_STAY, settings->dt,
-                   next->position, next->orientation, next->velocity);
+        joint_move(&world->start.rigid[i], halfway, world->velocity + 6 * i, island & ISLAND_TRAPEZOID_OFF,
+                   settings->dt, next->position, next->orientation, next->velocity);
     }
     for (size_t k = 0; k < system.rows->constraint_count; ++k) {
         const struct sadmm_row_constraint *constraint = &system.rows->constraints[k];
-        world->joints[world->joint_sources[constraint->first].joint].next.leads_stay =
-            *island_of(world, constraint->body_a, constraint->body_b) & ISLAND_LEADS_STAY;
+        world->joints[world->joint_sources[constraint->first].joint].next.trapezoid_off =
+            *island_of(world, constraint->body_a, constraint->body_b) & ISLAND_TRAPEZOID_OFF;
     }
     TRY(sadmm_world_close_joints(world, settings, off));
     return sadmm_world_restore_joined(world, settings);

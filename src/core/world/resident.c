@@ -65,7 +65,8 @@ static void edit_body_again(sadmm_world *world, struct sadmm_world_body *body)
 static void edit_again(sadmm_world *world)
 {
     for (int32_t i = 0; i < world->dynamic_count; ++i) edit_body_again(world, &world->bodies[world->slot_of[i]]);
-    for (int32_t k = 0; k < world->driven_count; ++k) edit_body_again(world, &world->bodies[world->driven_slots[k]]);
+    for (int32_t k = 0; k < world->kinematic_count; ++k)
+        edit_body_again(world, &world->bodies[world->kinematic_slots[k]]);
     sadmm_world_edit_joints_again(world);
 }
 
@@ -137,14 +138,14 @@ static sadmm_status list_held(sadmm_world *world)
 /* The world as it is now. What the last step started from stays: it can be read until a step is done. */
 static sadmm_status load(sadmm_world *world)
 {
-    size_t n = (size_t)world->dynamic_count, driven = (size_t)world->driven_count;
+    size_t n = (size_t)world->dynamic_count, kinematic = (size_t)world->kinematic_count;
     sadmm_world_swap_starts(world);
     sadmm_status status = sadmm_world_gather(world);
     sadmm_world_swap_starts(world);
     TRY(status);
     if (!sadmm_grow(&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
                     sizeof *world->resident.steady) ||
-        !sadmm_grow(&world->resident.edited, &world->resident.edited_capacity, 0, n + driven + 1,
+        !sadmm_grow(&world->resident.edited, &world->resident.edited_capacity, 0, n + kinematic + 1,
                     sizeof *world->resident.edited))
         return sadmm_fail_memory(&world->error, "the step");
     for (size_t i = 0; i < n; ++i) {
@@ -152,8 +153,8 @@ static sadmm_status load(sadmm_world *world)
         world->resident.steady[i] = body->steady;
         begin_edits(body);
     }
-    for (size_t k = 0; k < driven; ++k) begin_edits(&world->bodies[world->driven_slots[k]]);
-    TRY(sadmm_world_list_driven(world));
+    for (size_t k = 0; k < kinematic; ++k) begin_edits(&world->bodies[world->kinematic_slots[k]]);
+    TRY(sadmm_world_list_kinematic(world));
     TRY(sadmm_world_list_joints(world));
     TRY(sadmm_world_list_gears(world));
     TRY(list_held(world));
@@ -164,8 +165,8 @@ static sadmm_status load(sadmm_world *world)
         .rigid = world->last_start.rigid,
         .steady = world->resident.steady,
         .slot_of = world->slot_of,
-        .driven_count = world->driven_count,
-        .driven = world->resident.driven,
+        .kinematic_count = world->kinematic_count,
+        .kinematic = world->resident.kinematic,
         .contacts = &world->contacts,
         .joint_count = world->resident.joint_count,
         .joints = world->resident.joints,
@@ -184,8 +185,8 @@ static sadmm_status load(sadmm_world *world)
     world->resident.loaded = true;
     world->resident.enqueued = world->resident.done = world->resident.repeats = 0;
     world->resident.edited_count = 0;
-    for (size_t k = 0; k < driven; ++k) {
-        struct sadmm_world_body *body = &world->bodies[world->driven_slots[k]];
+    for (size_t k = 0; k < kinematic; ++k) {
+        struct sadmm_world_body *body = &world->bodies[world->kinematic_slots[k]];
         if (body->target.set) sadmm_world_edit(world, body, SADMM_EDIT_TARGET);
     }
     world->resident.kept_step = world->report.step;
@@ -305,8 +306,8 @@ static sadmm_status settle(sadmm_world *world, sadmm_status status)
     }
     world->resident.enqueued = world->resident.done;
     if (status != SADMM_ERROR_NON_FINITE || report.offending_body == -1) return status;
-    if (!sadmm_body_is_driven(report.offending_body)) return sadmm_world_not_finite(world, report.offending_body);
-    return sadmm_world_slot_not_finite(world, world->driven_slots[sadmm_driven(report.offending_body)]);
+    if (!sadmm_body_is_kinematic(report.offending_body)) return sadmm_world_not_finite(world, report.offending_body);
+    return sadmm_world_slot_not_finite(world, world->kinematic_slots[sadmm_kinematic(report.offending_body)]);
 }
 
 /* The backend does not change forces, nor a state that was set after the last step. */
@@ -325,7 +326,7 @@ static sadmm_status pull_bodies(sadmm_world *world)
         if (world->plan.wrenches)
             memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
     }
-    TRY(sadmm_world_read_driven(world));
+    TRY(sadmm_world_read_kinematic(world));
     sadmm_world_moved(world);
     world->resident.bodies_behind = false;
     world->resident.kept_step = world->report.step;
@@ -346,7 +347,7 @@ static sadmm_status pull_contacts(sadmm_world *world)
         !sadmm_grow(&start->impulse, &start->impulse_capacity, 0, 3 * count, sizeof *start->impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     TRY(backend->read_start(world->context, start->rigid, start->velocity, start->impulse, &world->error));
-    TRY(sadmm_world_read_driven_start(world));
+    TRY(sadmm_world_read_kinematic_start(world));
     TRY(backend->read_bodies(world->context, world->next, NULL, NULL, &world->error));
     for (size_t i = 0; i < n; ++i)
         memcpy(world->velocity + 6 * i, world->next[i].velocity, 6 * sizeof *world->velocity);

@@ -4,8 +4,9 @@
  *   save_objects.c   settings, bodies, shapes with their hulls and meshes, joints, gears, couplings
  *   save_step.c      the last step: contacts, rows, report
  *
- * Reading goes into a world that is empty, and holds every index against what is there, so that no bytes lead a step out
- * of an array. Numbers are held to the ranges of the calls that set them, where a step cannot leave these.
+ * Reading goes into a world that is empty, and holds every index against what is there, so that no bytes trapezoid
+ * correction a step out of an array. Numbers are held to the ranges of the calls that set them, where a step cannot
+ * leave these.
  */
 #ifndef SADMM_CORE_WORLD_SAVE_H
 #define SADMM_CORE_WORLD_SAVE_H

@@ -150,7 +150,7 @@ static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size
     ++world->body_count;
     world->dynamic_count += body->type == SADMM_BODY_DYNAMIC;
     sadmm_slots_take(&world->bodies_taken, slot);
-    if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_count_driven(world, 1);
+    if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_count_kinematic(world, 1);
 }
 
 /* ---- shapes ------------------------------------------------------------------------------------------------------ */
@@ -386,7 +386,7 @@ static void archive_joint_memory(struct sadmm_archive *archive, struct sadmm_joi
     SADMM_ARCHIVE(archive, m->point);
     SADMM_ARCHIVE(archive, m->local);
     SADMM_ARCHIVE(archive, m->left);
-    sadmm_archive_flag(archive, &m->leads_stay);
+    sadmm_archive_flag(archive, &m->trapezoid_off);
     sadmm_archive_flag(archive, &m->broken);
 }
 

@@ -7,7 +7,7 @@
 /* A body of the step, as contacts and rows name it. */
 static bool side_fits(const sadmm_world *world, int32_t body)
 {
-    return body >= -1 ? body < world->plan.bodies : sadmm_driven(body) < world->start.driven_count;
+    return body >= -1 ? body < world->plan.bodies : sadmm_kinematic(body) < world->start.kinematic_count;
 }
 
 /* ---- contacts ---------------------------------------------------------------------------------------------------- */
@@ -221,11 +221,11 @@ void sadmm_archive_step(struct sadmm_archive *archive, sadmm_world *world)
     archive_plan(archive, &world->plan);
     const bool readable = world->contacts_readable;
     size_t bodies = readable ? (size_t)world->plan.bodies : 0, numbers = 6 * bodies,
-           driven = 6 * (size_t)start->driven_count;
+           kinematic = 6 * (size_t)start->kinematic_count;
     if (archive->reading)
         sadmm_archive_expect(archive, world->plan.bodies >= 0, "the plan of a step"); /* bodies may have come since */
-    sadmm_archive_array(archive, &start->driven, &driven, &start->driven_capacity, sizeof(double), INT32_MAX);
-    start->driven_count = (int32_t)(driven / 6);
+    sadmm_archive_array(archive, &start->kinematic, &kinematic, &start->kinematic_capacity, sizeof(double), INT32_MAX);
+    start->kinematic_count = (int32_t)(kinematic / 6);
     /* Without contacts that can be read nothing of this can. */
     sadmm_archive_array(archive, &start->rigid, &bodies, &start->rigid_capacity, sizeof *start->rigid, INT32_MAX);
     sadmm_archive_array(archive, &start->velocity, &numbers, &start->velocity_capacity, sizeof(double), INT32_MAX);

@@ -39,7 +39,7 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
     const struct sadmm_geometry geometry = sadmm_shape_form_geometry(def);
     static const enum sadmm_motion motion[] = {[SADMM_BODY_DYNAMIC] = SADMM_MOTION_DYNAMIC,
                                                [SADMM_BODY_STATIC] = SADMM_MOTION_NONE,
-                                               [SADMM_BODY_KINEMATIC] = SADMM_MOTION_DRIVEN};
+                                               [SADMM_BODY_KINEMATIC] = SADMM_MOTION_KINEMATIC};
     TRY(sadmm_geometry_check(&geometry, motion[body->type], "def->", error));
     if (def->sensor && def->type == SADMM_SHAPE_MESH)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,

@@ -134,7 +134,7 @@ static void commit(sadmm_world *world)
 {
     const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
     sadmm_parallel(&world->team, threads, commit_share, world);
-    sadmm_world_commit_driven(world);
+    sadmm_world_commit_kinematic(world);
     sadmm_world_moved(world);
     sadmm_world_commit_joints(world);
     sadmm_world_commit_couplings(world, world->def.settings.substeps);
@@ -199,7 +199,7 @@ static sadmm_status choose_pushes(struct host_step *step)
 {
     sadmm_world *world = step->world;
     if (step->depth_now <= step->settings.slop || !push_is_apart(world->kernels->backend == SADMM_BACKEND_CUDA,
-                                                       step->system.body_count, step->system.driven_count))
+                                                       step->system.body_count, step->system.kinematic_count))
         return SADMM_OK;
     if (!world->push) world->push = sadmm_push_create();
     if (!world->push) return sadmm_fail_memory(&world->error, "bodies that overlap");
@@ -230,7 +230,7 @@ static sadmm_status make_plan(struct host_step *step)
     sadmm_world *world = step->world;
     step->system = sadmm_world_system(world);
     step->system.first = step->system.first && step->stages.substep == 0;
-    TRY(sadmm_world_carry(world, &step->system));
+    TRY(sadmm_world_enter_support_frame(world, &step->system));
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
     step->direct = step->pushed = 0;
@@ -260,13 +260,13 @@ static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage
 static sadmm_status integrate(struct host_step *step)
 {
     sadmm_world *world = step->world;
-    sadmm_world_put_down(world, &step->system);
+    sadmm_world_leave_support_frame(world, &step->system);
     return world->kernels->integrate(world->context, world->next, &world->error);
 }
 
 static sadmm_status move_kinematic(struct host_step *step)
 {
-    TRY(sadmm_world_move_driven(step->world, &step->settings));
+    TRY(sadmm_world_move_kinematic(step->world, &step->settings));
     sadmm_world_move_targets(step->world, step->settings.dt);
     return SADMM_OK;
 }
@@ -286,7 +286,7 @@ static sadmm_status keep(struct host_step *step)
 static sadmm_status find_wrenches(const struct host_step *step)
 {
     sadmm_world *world = step->world;
-    sadmm_world_add_driven_wrenches(world, &step->settings);
+    sadmm_world_add_kinematic_wrenches(world, &step->settings);
     if (step->direct == 0) TRY(world->kernels->recover_wrenches(world->context, world->wrench, &world->error));
     else sadmm_world_find_wrenches(world, &step->settings); /* by impulses that the backend has not */
     for (size_t i = 0; i < (size_t)world->dynamic_count; ++i)
@@ -299,7 +299,7 @@ static sadmm_status find_wrenches(const struct host_step *step)
 static sadmm_status certify(struct host_step *step)
 {
     sadmm_world *world = step->world;
-    step->system.carried = NULL;
+    step->system.support_motion = NULL;
     world->certified_step = world->report.step + 1; /* what this step will be */
     return sadmm_certify_with(&world->certificate_workspace, &step->system, &step->settings, &step->report.certificate,
                               &world->error);

@@ -1,14 +1,14 @@
 /* A world's insides, shared by the files of this folder. Each calls those before it alone:
  *
  *   slots, links, pair_table, block_pool, ids, report   lists and names
- *   driven                           kinematic bodies in a step
+ *   kinematic                        kinematic bodies in a step
  *   gather                           what a step reads
  *   hits                             hits of bodies in flight, each at its moment
  *   coupling_step                    what couplings keep from step to step
  *   joint_act                        a joint in a step
  *   gear_rows, joint_rows            gears and joints as constraint rows
  *   joint_momentum, joint_move       where joints let bodies go, with what momentum
- *   resident_joints, resident_driven, resident   where a backend keeps the world
+ *   resident_joints, resident_kinematic, resident   where a backend keeps the world
  *   query_scene                      what queries look at
  *   shape_form, shape, mass, joint, coupling, gear, body, contacts,
  *   query_ray, query_shape, explain  what callers see of it, and change
@@ -53,7 +53,7 @@ struct sadmm_world_body {
     uint32_t generation; /* of the next id when dead, of the current one when alive */
     sadmm_body_type type;
     int32_t environment;
-    int32_t system_body; /* in the last step, -1: static or not there, below: driven (core/base/contact_set.h) */
+    int32_t system_body; /* in the last step, -1: static or not there, below: kinematic (core/base/contact_set.h) */
     struct sadmm_rigid rigid;
     uint32_t first_shape, first_joint; /* links: names of a shape are its slot + 1, of a joint below */
     double contact_wrench[6];
@@ -76,7 +76,7 @@ struct sadmm_world_block_shape {
 };
 
 /* A kinematic body in a step. */
-struct sadmm_world_driven {
+struct sadmm_world_kinematic {
     int32_t slot;
     struct sadmm_rigid rigid, next; /* as the (sub-)step begins and ends */
     double wrench[6];               /* of contacts, of the sub-steps made so far */
@@ -85,8 +85,8 @@ struct sadmm_world_driven {
 /* What may be set of a joint without loading the world again: its coordinates, 0 to 5, and (TARGET: of a coupling) */
 enum sadmm_joint_edit { SADMM_JOINT_ENABLED = JOINT_COORDINATES, SADMM_JOINT_TARGET, SADMM_JOINT_EDITS };
 
-/* A joint slot. That of a coupling is out of callers' sight: its frame a is the target, which is steered, and what acts
- * are position drives of all coordinates. */
+/* A joint slot. That of a coupling is out of callers' sight: its frame a is the target, whose motion is prescribed, and
+ * what acts are position drives of all coordinates. */
 struct sadmm_world_joint {
     bool alive;
     uint32_t generation;
@@ -145,9 +145,9 @@ struct sadmm_step_start {
     double *impulse;           /* points x 3: the warm start */
     struct sadmm_rows rows;    /* of joints; their multipliers are the solution */
     double *multiplier;        /* rows: the warm start */
-    double *driven;            /* kinematic bodies x 6: velocities, m/s, rad/s */
-    int32_t driven_count;
-    size_t driven_capacity, rigid_capacity, velocity_capacity, impulse_capacity, multiplier_capacity;
+    double *kinematic;         /* kinematic bodies x 6: velocities, m/s, rad/s */
+    int32_t kinematic_count;
+    size_t kinematic_capacity, rigid_capacity, velocity_capacity, impulse_capacity, multiplier_capacity;
 };
 
 /* Two shapes that touch, or a sensor and what it sees. */
@@ -170,9 +170,9 @@ struct sadmm_world {
 
     struct sadmm_world_body *bodies;
     size_t body_slots, body_capacity;
-    int32_t body_count, dynamic_count, driven_count; /* driven: kinematic */
-    int32_t *driven_slots;                           /* of these, ascending, as of the last step */
-    bool driven_listed;                              /* none has come or gone since */
+    int32_t body_count, dynamic_count, kinematic_count;
+    int32_t *kinematic_slots; /* of these, ascending, as of the last step */
+    bool kinematic_listed;    /* none has come or gone since */
     struct sadmm_slot_set bodies_taken;
     struct sadmm_shape *shapes;
     uint32_t *shape_generations;
@@ -237,14 +237,14 @@ struct sadmm_world {
     struct sadmm_rigid *next;                      /* dynamic bodies after the step */
     double *velocity, *wrench;                     /* dynamic bodies x 6 */
     struct sadmm_steady *steady;                   /* dynamic bodies, after the sub-steps made so far */
-    struct sadmm_world_driven *driven;             /* in slot order */
-    double *carried;                               /* dynamic bodies x 6: the motion of what they ride on */
-    int32_t *carriers, *carried_labels;            /* islands, and at their labels what they ride on */
+    struct sadmm_world_kinematic *kinematic;       /* in slot order */
+    double *support_motion;                        /* dynamic bodies x 6: of their support */
+    int32_t *supports, *support_labels;            /* islands, and at their labels what supports them */
     double *wrench_sum;                            /* dynamic bodies x 6, of these; both only where there are several */
     int32_t *slot_of;                              /* dynamic body -> slot */
     size_t collision_body_capacity, next_capacity, velocity_capacity, wrench_capacity, slot_of_capacity,
-        steady_capacity, wrench_sum_capacity, driven_capacity, driven_slot_capacity, carried_capacity, carrier_capacity,
-        carried_label_capacity;
+        steady_capacity, wrench_sum_capacity, kinematic_capacity, kinematic_slot_capacity, support_motion_capacity,
+        support_capacity, support_label_capacity;
     struct sadmm_plan plan;
     sadmm_settings step_settings;                  /* of the whole step */
     bool stepped;
@@ -261,14 +261,14 @@ struct sadmm_world {
         int64_t kept_step;   /* steps and time of the bodies above */
         double kept_time;
         struct sadmm_steady *steady; /* dynamic bodies */
-        struct sadmm_driven_body *driven; /* kinematic bodies, as they are loaded, and as they are read; */
-        double *driven_wrench;       /* (x 6) likewise */
+        struct sadmm_kinematic_body *kinematic; /* kinematic bodies, as they are loaded, and as they are read; */
+        double *kinematic_wrench;    /* (x 6) likewise */
         uint32_t *edited;    /* slots of bodies with `edits`; capacity: all that move */
         struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
         unsigned char *held; /* by body slot: joints hold it (hits.c) */
         bool hits_behind;    /* those of the last step are not here yet */
-        size_t held_capacity, steady_capacity, driven_capacity, driven_wrench_capacity, edited_count, edited_capacity,
-            edit_capacity;
+        size_t held_capacity, steady_capacity, kinematic_capacity, kinematic_wrench_capacity, edited_count,
+            edited_capacity, edit_capacity;
         struct sadmm_resident_joint *joints; /* as they were loaded; */
         struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
         int32_t *joint_slots;                /* their slots */
@@ -324,31 +324,31 @@ struct sadmm_world {
     sadmm_step_report report;
 };
 
-/* ---- driven.c ---- */
+/* ---- kinematic.c ---- */
 
-/* Kinematic bodies in slot order into `driven` and `start`, and numbers of theirs for collision, which has their
+/* Kinematic bodies in slot order into `kinematic` and `start`, and numbers of theirs for collision, which has their
  * poses. */
-sadmm_status sadmm_world_gather_driven(sadmm_world *world);
+sadmm_status sadmm_world_gather_kinematic(sadmm_world *world);
 /* A kinematic body has come (change 1) or gone (-1). */
-static inline void sadmm_world_count_driven(sadmm_world *world, int32_t change)
+static inline void sadmm_world_count_kinematic(sadmm_world *world, int32_t change)
 {
-    world->driven_count += change;
-    world->driven_listed = false;
+    world->kinematic_count += change;
+    world->kinematic_listed = false;
 }
-/* Islands that ride on a kinematic body are solved as what they are in its motion: system->carried, and
+/* Islands that a kinematic body supports are solved relative to its motion: system->support_motion, and
  * system->velocity less that; and back. */
-sadmm_status sadmm_world_carry(sadmm_world *world, struct sadmm_system *system);
-void sadmm_world_put_down(sadmm_world *world, const struct sadmm_system *system);
+sadmm_status sadmm_world_enter_support_frame(sadmm_world *world, struct sadmm_system *system);
+void sadmm_world_leave_support_frame(sadmm_world *world, const struct sadmm_system *system);
 /* Where they are after the (sub-)step. NON_FINITE. */
-sadmm_status sadmm_world_move_driven(sadmm_world *world, const sadmm_settings *settings);
+sadmm_status sadmm_world_move_kinematic(sadmm_world *world, const sadmm_settings *settings);
 /* The next sub-step begins there. */
-void sadmm_world_turn_driven(sadmm_world *world);
+void sadmm_world_turn_kinematic(sadmm_world *world);
 /* What the (sub-)step's contacts give them. */
 /* Contact wrenches of dynamic bodies, eq. (12), by the points' impulses as they are. */
 void sadmm_world_find_wrenches(sadmm_world *world, const sadmm_settings *settings);
-void sadmm_world_add_driven_wrenches(sadmm_world *world, const sadmm_settings *settings);
+void sadmm_world_add_kinematic_wrenches(sadmm_world *world, const sadmm_settings *settings);
 /* The step is done. */
-void sadmm_world_commit_driven(sadmm_world *world);
+void sadmm_world_commit_kinematic(sadmm_world *world);
 /* SADMM_ERROR_NON_FINITE that names the body of a slot. */
 sadmm_status sadmm_world_slot_not_finite(sadmm_world *world, int32_t slot);
 
@@ -458,13 +458,13 @@ void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sa
 /* The choice of the kernels, at the first step. */
 sadmm_status sadmm_world_choose_backend(sadmm_world *world);
 
-/* ---- resident_driven.c ---- */
+/* ---- resident_kinematic.c ---- */
 
-/* Kinematic bodies of a world that is about to be loaded, into resident.driven. */
-sadmm_status sadmm_world_list_driven(sadmm_world *world);
+/* Kinematic bodies of a world that is about to be loaded, into resident.kinematic. */
+sadmm_status sadmm_world_list_kinematic(sadmm_world *world);
 /* After the last step done; the velocities that they had in it, into `start`. Nothing is enqueued. */
-sadmm_status sadmm_world_read_driven(sadmm_world *world);
-sadmm_status sadmm_world_read_driven_start(sadmm_world *world);
+sadmm_status sadmm_world_read_kinematic(sadmm_world *world);
+sadmm_status sadmm_world_read_kinematic_start(sadmm_world *world);
 
 /* ---- resident.c ---- */
 

@@ -1,7 +1,7 @@
 /* Which shapes a step's hits may be between: candidates of contact finding before their manifolds, and what else a body
  * comes near once a hit has changed its way. */
-#ifndef SADMM_COLLISION_FLYERS_H
-#define SADMM_COLLISION_FLYERS_H
+#ifndef SADMM_COLLISION_SWEPT_BODIES_H
+#define SADMM_COLLISION_SWEPT_BODIES_H
 
 #include "bounds.h"
 #include "collision.h"
@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 /* What a body is to hits, by world body slot. */
-enum sadmm_flyer { SADMM_FLYER_NONE, SADMM_FLYER_FIXED, SADMM_FLYER_DYNAMIC };
+enum sadmm_swept_kind { SADMM_SWEPT_NONE, SADMM_SWEPT_FIXED, SADMM_SWEPT_DYNAMIC };
 
 struct sadmm_pair_list;
 
@@ -22,9 +22,9 @@ sadmm_status sadmm_collision_look_ahead(struct sadmm_collision *collision, const
 /* Bodies have other velocities since: it does. */
 void sadmm_collision_look_again(struct sadmm_collision *collision);
 
-/* Bodies that a contact of the last set presses on become SADMM_FLYER_NONE. After look_ahead. */
+/* Bodies that a contact of the last set presses on become SADMM_SWEPT_NONE. After look_ahead. */
 void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const struct sadmm_contact_set *contacts,
-                                  unsigned char *flyers);
+                                  unsigned char *kinds);
 
 /* The pairs of shapes, as (a << 32 | b) in the order of pairs, that approach faster than the threshold, at least as far
  * as their velocities and boxes tell, and of which either has restitution (bounces: any shape has), or which pass
@@ -38,7 +38,7 @@ bool sadmm_collision_passes(const struct sadmm_collision *collision, const struc
                             uint64_t key);
 
 /* Do both of a pair take part, one of them at least as a dynamic body? */
-bool sadmm_collision_may_hit(const struct sadmm_collision *collision, const unsigned char *flyers, uint64_t key);
+bool sadmm_collision_may_hit(const struct sadmm_collision *collision, const unsigned char *kinds, uint64_t key);
 
 /* What its contacts have in common. */
 void sadmm_collision_pair_law(const struct sadmm_collision *collision, const struct sadmm_collision_input *input,
@@ -46,9 +46,10 @@ void sadmm_collision_pair_law(const struct sadmm_collision *collision, const str
 
 /* A shape has another box from now on, the one that it sweeps from a hit on. False: out of memory. */
 bool sadmm_collision_set_box(struct sadmm_collision *collision, uint32_t slot, const struct sadmm_box3 *swept);
-/* The shapes of flyers whose boxes meet that of a shape, after set_box of it, as list_fast gives pairs, in any order. */
+/* The shapes of swept bodies whose boxes meet that of a shape, after set_box of it, as list_fast gives pairs, in any
+ * order. */
 bool sadmm_collision_list_near(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
-                               const unsigned char *flyers, uint32_t slot, struct sadmm_pair_list *list);
+                               const unsigned char *kinds, uint32_t slot, struct sadmm_pair_list *list);
 
 #ifdef __cplusplus
 }

@@ -1,4 +1,4 @@
-#include "flyers.h"
+#include "swept_bodies.h"
 
 #include <float.h>
 
@@ -15,7 +15,7 @@ static bool presses(const struct sadmm_contact_set *contacts, const struct sadmm
 }
 
 void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const struct sadmm_contact_set *contacts,
-                                  unsigned char *flyers)
+                                  unsigned char *kinds)
 {
     const struct sadmm_candidates *c = &collision->candidates;
     for (size_t p = 0; p < contacts->pair_count; ++p) {
@@ -24,21 +24,21 @@ void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const
             !(c->state[pair->shape_a] & c->state[pair->shape_b] & SLOT_PRESENT))
             continue;
         const struct sadmm_proxy *a = &c->proxies[pair->shape_a], *b = &c->proxies[pair->shape_b];
-        unsigned char *of_a = &flyers[a->body], *of_b = &flyers[b->body];
-        if ((*of_a != SADMM_FLYER_DYNAMIC && *of_b != SADMM_FLYER_DYNAMIC) ||
+        unsigned char *of_a = &kinds[a->body], *of_b = &kinds[b->body];
+        if ((*of_a != SADMM_SWEPT_DYNAMIC && *of_b != SADMM_SWEPT_DYNAMIC) ||
             pair->revision != word_of_pair(a->revision, b->revision) || !presses(contacts, pair))
             continue;
-        if (*of_a == SADMM_FLYER_DYNAMIC) *of_a = SADMM_FLYER_NONE;
-        if (*of_b == SADMM_FLYER_DYNAMIC) *of_b = SADMM_FLYER_NONE;
+        if (*of_a == SADMM_SWEPT_DYNAMIC) *of_a = SADMM_SWEPT_NONE;
+        if (*of_b == SADMM_SWEPT_DYNAMIC) *of_b = SADMM_SWEPT_NONE;
     }
 }
 
-bool sadmm_collision_may_hit(const struct sadmm_collision *collision, const unsigned char *flyers, uint64_t key)
+bool sadmm_collision_may_hit(const struct sadmm_collision *collision, const unsigned char *kinds, uint64_t key)
 {
     const struct sadmm_candidates *c = &collision->candidates;
-    const unsigned char of_a = flyers[c->proxies[key >> 32].body], of_b = flyers[c->proxies[key & UINT32_MAX].body];
-    return of_a != SADMM_FLYER_NONE && of_b != SADMM_FLYER_NONE &&
-           (of_a == SADMM_FLYER_DYNAMIC || of_b == SADMM_FLYER_DYNAMIC);
+    const unsigned char of_a = kinds[c->proxies[key >> 32].body], of_b = kinds[c->proxies[key & UINT32_MAX].body];
+    return of_a != SADMM_SWEPT_NONE && of_b != SADMM_SWEPT_NONE &&
+           (of_a == SADMM_SWEPT_DYNAMIC || of_b == SADMM_SWEPT_DYNAMIC);
 }
 
 bool sadmm_collision_passes(const struct sadmm_collision *collision, const struct sadmm_collision_input *input,
@@ -114,7 +114,7 @@ static bool swept_meet(const struct sadmm_candidates *c, uint32_t slot, uint32_t
 
 /* Add the pair, if it is one. */
 static bool add_near(const struct sadmm_collision *collision, const struct sadmm_collision_input *input,
-                     const unsigned char *flyers, uint32_t slot, uint32_t other, struct sadmm_pair_list *list)
+                     const unsigned char *kinds, uint32_t slot, uint32_t other, struct sadmm_pair_list *list)
 {
     const struct sadmm_candidates *c = &collision->candidates;
     const int32_t group = c->seen[slot].group, of_other = c->seen[other].group;
@@ -122,23 +122,23 @@ static bool add_near(const struct sadmm_collision *collision, const struct sadmm
         (group >= 0 && of_other >= 0 && of_other != group))
         return true;
     const uint64_t key = sadmm_pair_in_order(c, unordered_key(slot, other));
-    if (!sadmm_collision_may_hit(collision, flyers, key) || sadmm_pair_is_disabled(input, key)) return true;
+    if (!sadmm_collision_may_hit(collision, kinds, key) || sadmm_pair_is_disabled(input, key)) return true;
     if (!sadmm_pair_list_add(list, slot, other)) return false;
     list->keys[list->count - 1] = key;
     return true;
 }
 
 bool sadmm_collision_list_near(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
-                               const unsigned char *flyers, uint32_t slot, struct sadmm_pair_list *list)
+                               const unsigned char *kinds, uint32_t slot, struct sadmm_pair_list *list)
 {
     const struct sadmm_box_row *row = &collision->row;
     size_t first, last;
     sadmm_box_row_find(row, &collision->candidates.boxes[slot].box, &first, &last);
     for (size_t i = first; i < last; ++i) {
         const uint32_t other = (uint32_t)row->keys[i];
-        if (!row->out[other] && !add_near(collision, input, flyers, slot, other, list)) return false;
+        if (!row->out[other] && !add_near(collision, input, kinds, slot, other, list)) return false;
     }
     for (size_t i = 0; i < row->beside_count; ++i)
-        if (!add_near(collision, input, flyers, slot, row->beside[i], list)) return false;
+        if (!add_near(collision, input, kinds, slot, row->beside[i], list)) return false;
     return true;
 }

@@ -1,7 +1,7 @@
-/* A body in flight: the way it goes within a (sub-)step, what a hit makes of that, and the start from which it would be
- * where it is (hits.c says why). For the host and devices; in double. */
-#ifndef SADMM_CORE_FLIGHT_FLYER_H
-#define SADMM_CORE_FLIGHT_FLYER_H
+/* A swept body, whose path within a (sub-)step is followed: that path, what a hit makes of it, and the start from which
+ * it would be where it is (hits.c says why). For the host and devices; in double. */
+#ifndef SADMM_CORE_FLIGHT_SWEPT_BODY_H
+#define SADMM_CORE_FLIGHT_SWEPT_BODY_H
 
 #include <float.h>
 #include <math.h>
@@ -16,9 +16,9 @@
 #include "core/model/spin.h"
 
 /* A body that takes part. */
-struct flyer {
+struct swept_body {
     int32_t slot, dynamic; /* dynamic: -1 if it is not */
-    int32_t driven;        /* -1 if it is not */
+    int32_t kinematic;     /* -1 if it is not */
     struct sadmm_rigid start;
     struct sadmm_flight flight;
     uint32_t hits; /* that it has had: what was foreseen before the last one does not hold */
@@ -30,15 +30,15 @@ struct flyer {
 /* ---- ways -------------------------------------------------------------------------------------------------------- */
 
 /* v after the step over v at its start but for what forces add, along the body's centre of mass. */
-SADMM_INLINE double flyer_kept(const struct sadmm_rigid *body, double dt)
+SADMM_INLINE double swept_body_kept(const struct sadmm_rigid *body, double dt)
 {
     const struct forces_damping linear = forces_damping_of(body, 0, dt);
     return linear.keep / linear.mass;
 }
 
 /* The acceleration that the step gives its velocity. */
-SADMM_INLINE void flyer_accelerate(const struct sadmm_rigid *body, const struct sadmm_settings *settings,
-                                   double acceleration[3])
+SADMM_INLINE void swept_body_accelerate(const struct sadmm_rigid *body, const struct sadmm_settings *settings,
+                                        double acceleration[3])
 {
     double free[6];
     int k;
@@ -47,26 +47,26 @@ SADMM_INLINE void flyer_accelerate(const struct sadmm_rigid *body, const struct 
 }
 
 /* dt I^-1 torque, as damping lets it be. */
-SADMM_INLINE vec3 flyer_torque_gain(const struct sadmm_rigid *body, quat q, double dt)
+SADMM_INLINE vec3 swept_body_torque_gain(const struct sadmm_rigid *body, quat q, double dt)
 {
     const double share = dt / forces_damping_of(body, 1, dt).mass;
     return v3_scale(rigid_angular_velocity(q, v3_load(body->inertia), v3_load(body->wrench + 3)), share);
 }
 
 /* What torques and damping make of an angular velocity in a step (core/model/system_math.h: b over A); and back. */
-SADMM_INLINE vec3 flyer_spin_after(const struct sadmm_rigid *body, quat q, vec3 before, double dt)
+SADMM_INLINE vec3 swept_body_spin_after(const struct sadmm_rigid *body, quat q, vec3 before, double dt)
 {
     const struct forces_damping angular = forces_damping_of(body, 1, dt);
-    return v3_add(v3_scale(before, angular.keep / angular.mass), flyer_torque_gain(body, q, dt));
+    return v3_add(v3_scale(before, angular.keep / angular.mass), swept_body_torque_gain(body, q, dt));
 }
-SADMM_INLINE vec3 flyer_spin_without(const struct sadmm_rigid *body, quat q, vec3 after, double dt)
+SADMM_INLINE vec3 swept_body_spin_without(const struct sadmm_rigid *body, quat q, vec3 after, double dt)
 {
     const struct forces_damping angular = forces_damping_of(body, 1, dt);
-    return v3_scale(v3_sub(after, flyer_torque_gain(body, q, dt)), angular.mass / angular.keep);
+    return v3_scale(v3_sub(after, swept_body_torque_gain(body, q, dt)), angular.mass / angular.keep);
 }
 
-/* Of equal moments: as the step takes its lead back (math/lead.h). */
-SADMM_INLINE void flyer_turn_evenly(struct sadmm_flight *flight, quat q, vec3 before, vec3 after, double at)
+/* Of equal moments: as the step turns it, with its trapezoid correction (math/trapezoid.h). */
+SADMM_INLINE void swept_body_turn_evenly(struct sadmm_flight *flight, quat q, vec3 before, vec3 after, double at)
 {
     q_store(q, flight->orientation);
     v3_store(after, flight->spin);
@@ -76,7 +76,7 @@ SADMM_INLINE void flyer_turn_evenly(struct sadmm_flight *flight, quat q, vec3 be
 
 /* The most by which a body's angular velocity differs from that halfway: it changes by ((I_y - I_z) / I_x w_y w_z, ...)
  * in the body's frame, w no larger than rigid_rate2 says. */
-SADMM_INLINE double flyer_sway(vec3 inertia, struct rigid_spin halfway, double dt)
+SADMM_INLINE double swept_body_sway(vec3 inertia, struct rigid_spin halfway, double dt)
 {
     const vec3 w = m3_tmul(q_matrix(halfway.orientation), halfway.angular),
                share = v3((inertia.y - inertia.z) / inertia.x, (inertia.z - inertia.x) / inertia.y,
@@ -86,44 +86,45 @@ SADMM_INLINE double flyer_sway(vec3 inertia, struct rigid_spin halfway, double d
 }
 
 /* Of others: as the step turns it about the middle (core/model/spin.h). */
-SADMM_INLINE void flyer_turn_freely(struct sadmm_flight *flight, vec3 inertia, struct rigid_spin halfway, double dt)
+SADMM_INLINE void swept_body_turn_freely(struct sadmm_flight *flight, vec3 inertia, struct rigid_spin halfway,
+                                         double dt)
 {
     q_store(halfway.orientation, flight->orientation);
     v3_store(halfway.angular, flight->spin);
     v3_store(halfway.angular, flight->turn);
     v3_store(inertia, flight->inertia);
-    flight->sway = flyer_sway(inertia, halfway, dt);
+    flight->sway = swept_body_sway(inertia, halfway, dt);
     flight->at = dt / 2;
 }
 
-SADMM_INLINE void flyer_turn_from_start(struct flyer *f, double dt)
+SADMM_INLINE void swept_body_turn_from_start(struct swept_body *f, double dt)
 {
     const struct sadmm_rigid *start = &f->start;
     const vec3 inertia = v3_load(start->inertia);
     if (rigid_is_isotropic(inertia)) {
         const struct rigid_spin spin = spin_start(start);
-        const vec3 after = flyer_spin_after(start, spin.orientation, spin.angular, dt);
-        flyer_turn_evenly(&f->flight, spin.orientation, spin.angular, after, 0);
+        const vec3 after = swept_body_spin_after(start, spin.orientation, spin.angular, dt);
+        swept_body_turn_evenly(&f->flight, spin.orientation, spin.angular, after, 0);
     } else {
         struct rigid_spin halfway = spin_halfway(start, dt);
-        halfway.angular = flyer_spin_after(start, halfway.orientation, halfway.angular, dt);
-        flyer_turn_freely(&f->flight, inertia, halfway, dt);
+        halfway.angular = swept_body_spin_after(start, halfway.orientation, halfway.angular, dt);
+        swept_body_turn_freely(&f->flight, inertia, halfway, dt);
     }
 }
 
 /* By its spin at t, which it has after what acts on it in the step, the one at its start. */
-SADMM_INLINE void flyer_turn_from_hit(struct flyer *f, double dt, double t, struct rigid_spin hit)
+SADMM_INLINE void swept_body_turn_from_hit(struct swept_body *f, double dt, double t, struct rigid_spin hit)
 {
     const vec3 inertia = v3_load(f->start.inertia);
     struct rigid_spin start = hit;
     if (rigid_is_isotropic(inertia)) {
-        start.angular = flyer_spin_without(&f->start, hit.orientation, hit.angular, dt);
-        flyer_turn_evenly(&f->flight, hit.orientation, start.angular, hit.angular, t);
+        start.angular = swept_body_spin_without(&f->start, hit.orientation, hit.angular, dt);
+        swept_body_turn_evenly(&f->flight, hit.orientation, start.angular, hit.angular, t);
         start.orientation = rigid_turn(hit.orientation, v3_load(f->flight.turn), -t);
     } else {
         start = rigid_tumble(hit, inertia, dt / 2 - t);
-        flyer_turn_freely(&f->flight, inertia, start, dt);
-        start.angular = flyer_spin_without(&f->start, start.orientation, start.angular, dt);
+        swept_body_turn_freely(&f->flight, inertia, start, dt);
+        start.angular = swept_body_spin_without(&f->start, start.orientation, start.angular, dt);
         start = rigid_tumble(start, inertia, -dt / 2);
     }
     q_store(start.orientation, f->start.orientation);
@@ -131,44 +132,44 @@ SADMM_INLINE void flyer_turn_from_hit(struct flyer *f, double dt, double t, stru
 }
 
 /* From its start, by what it is. */
-SADMM_CALLED void flyer_begin(struct flyer *f, const struct sadmm_settings *settings)
+SADMM_CALLED void swept_body_begin(struct swept_body *f, const struct sadmm_settings *settings)
 {
     struct sadmm_flight *flight = &f->flight;
     memset(flight, 0, sizeof *flight);
     memcpy(flight->position, f->start.position, sizeof flight->position);
     memcpy(flight->orientation, f->start.orientation, sizeof flight->orientation);
-    if (f->dynamic < 0 && f->driven < 0) return;
+    if (f->dynamic < 0 && f->kinematic < 0) return;
     memcpy(flight->velocity, f->start.velocity, sizeof flight->velocity);
     memcpy(flight->turn, f->start.velocity + 3, sizeof flight->turn);
     memcpy(flight->spin, f->start.velocity + 3, sizeof flight->spin);
     if (f->dynamic < 0) return;
-    flyer_accelerate(&f->start, settings, flight->acceleration);
-    flyer_turn_from_start(f, settings->dt);
+    swept_body_accelerate(&f->start, settings, flight->acceleration);
+    swept_body_turn_from_start(f, settings->dt);
 }
 
 /* The start from which a body would come to the pose at t with these velocities. */
-SADMM_CALLED void flyer_leave(struct flyer *f, const struct sadmm_settings *settings, double t,
-                              const struct sadmm_flight_pose *pose, vec3 linear, vec3 spin)
+SADMM_CALLED void swept_body_leave(struct swept_body *f, const struct sadmm_settings *settings, double t,
+                                   const struct sadmm_flight_pose *pose, vec3 linear, vec3 spin)
 {
-    const double dt = settings->dt, s = t / dt, k = flyer_kept(&f->start, dt), share = 1 + s * (k - 1);
+    const double dt = settings->dt, s = t / dt, k = swept_body_kept(&f->start, dt), share = 1 + s * (k - 1);
     const struct rigid_spin hit = {q_load(pose->orientation), spin};
     struct sadmm_rigid *start = &f->start;
     double gained[3];
     int j;
-    flyer_accelerate(start, settings, gained); /* dt a = (k - 1) v + what forces add */
+    swept_body_accelerate(start, settings, gained); /* dt a = (k - 1) v + what forces add */
     for (j = 0; j < 3; ++j) gained[j] = dt * gained[j] - (k - 1) * start->velocity[j];
     v3_store(v3_scale(v3_madd(linear, -s, v3_load(gained)), 1 / share), start->velocity);
-    flyer_accelerate(start, settings, f->flight.acceleration);
+    swept_body_accelerate(start, settings, f->flight.acceleration);
     for (j = 0; j < 3; ++j)
         start->position[j] = pose->position[j] - t * (start->velocity[j] + t / 2 * f->flight.acceleration[j]);
-    flyer_turn_from_hit(f, dt, t, hit);
+    swept_body_turn_from_hit(f, dt, t, hit);
     memcpy(f->flight.position, start->position, sizeof f->flight.position);
     memcpy(f->flight.velocity, start->velocity, sizeof f->flight.velocity);
     f->flight.since = t;
 }
 
 /* Its start is another place. */
-SADMM_INLINE void flyer_move_start(struct flyer *f, vec3 way)
+SADMM_INLINE void swept_body_move_start(struct swept_body *f, vec3 way)
 {
     double by[3];
     int k;
@@ -181,15 +182,15 @@ SADMM_INLINE void flyer_move_start(struct flyer *f, vec3 way)
 }
 
 /* What loses most of its velocity within the step has no start from which it would come. */
-SADMM_INLINE bool flyer_is_damped(const struct sadmm_rigid *body, double dt)
+SADMM_INLINE bool swept_body_is_damped(const struct sadmm_rigid *body, double dt)
 {
     return body->damping[0] * dt > 1 || body->damping[1] * dt > 1;
 }
 
 /* The box that a shape sweeps from a hit on; from, to: its body's pose at that and at the step's end. */
-SADMM_INLINE void flyer_box(const struct sadmm_shape *shape, const struct sadmm_geometry *geometry,
-                            const struct sadmm_flight *flight, double dt, const struct sadmm_flight_pose *from,
-                            const struct sadmm_flight_pose *to, struct sadmm_box3 *box)
+SADMM_INLINE void swept_body_box(const struct sadmm_shape *shape, const struct sadmm_geometry *geometry,
+                                 const struct sadmm_flight *flight, double dt, const struct sadmm_flight_pose *from,
+                                 const struct sadmm_flight_pose *to, struct sadmm_box3 *box)
 {
     const double left = dt - flight->since, arm = v3_norm(v3_load(shape->position)),
                  sags = left * left / 8 * v3_norm(v3_load(flight->acceleration)),
@@ -204,7 +205,8 @@ SADMM_INLINE void flyer_box(const struct sadmm_shape *shape, const struct sadmm_
 
 /* ---- a hit ------------------------------------------------------------------------------------------------------- */
 
-SADMM_INLINE void flyer_hit_body(const struct flyer *f, const struct sadmm_flight_pose *pose, struct hit_body *out)
+SADMM_INLINE void swept_body_hit_body(const struct swept_body *f, const struct sadmm_flight_pose *pose,
+                                      struct hit_body *out)
 {
     memset(out, 0, sizeof *out);
     out->linear = v3_load(pose->velocity);
@@ -220,8 +222,8 @@ SADMM_INLINE void flyer_hit_body(const struct flyer *f, const struct sadmm_fligh
 }
 
 /* hit->friction and restitution are set. */
-SADMM_INLINE void flyers_hit(const struct flyer *const f[2], const struct sadmm_flight_touch *touch, double threshold,
-                             const struct sadmm_flight_pose pose[2], struct hit *hit)
+SADMM_INLINE void swept_bodies_hit(const struct swept_body *const f[2], const struct sadmm_flight_touch *touch,
+                                   double threshold, const struct sadmm_flight_pose pose[2], struct hit *hit)
 {
     int side, k;
     hit->threshold = threshold;
@@ -229,7 +231,7 @@ SADMM_INLINE void flyers_hit(const struct flyer *const f[2], const struct sadmm_
     v3_tangents(hit->frame.r[0], &hit->frame.r[1], &hit->frame.r[2]);
     hit->count = touch->count;
     for (side = 0; side < 2; ++side) {
-        flyer_hit_body(f[side], &pose[side], &hit->body[side]);
+        swept_body_hit_body(f[side], &pose[side], &hit->body[side]);
         for (k = 0; k < touch->count; ++k)
             hit->arm[side][k] = v3_sub(v3_load(touch->point[k]), v3_load(pose[side].position));
     }
@@ -237,8 +239,9 @@ SADMM_INLINE void flyers_hit(const struct flyer *const f[2], const struct sadmm_
 
 /* What the hit leaves together and forces press on each other stays together: their ways would part and overlap again
  * by what falls within the step. Apart by `along` at the start, along the normal. */
-SADMM_INLINE double flyers_overlap_of_held(const struct sadmm_flight *a, const struct sadmm_flight *b, double time,
-                                           double dt, const struct hit *hit, const vec3 linear[2], const vec3 spin[2])
+SADMM_INLINE double swept_bodies_overlap_of_held(const struct sadmm_flight *a, const struct sadmm_flight *b,
+                                                 double time, double dt, const struct hit *hit, const vec3 linear[2],
+                                                 const vec3 spin[2])
 {
     const double left = dt - time,
                  falls = -v3_dot(hit->frame.r[0], v3_sub(v3_load(b->acceleration), v3_load(a->acceleration)));
@@ -253,29 +256,31 @@ SADMM_INLINE double flyers_overlap_of_held(const struct sadmm_flight *a, const s
 }
 
 /* Both go on from the hit, which is solved. */
-SADMM_INLINE void flyers_part(struct flyer *const f[2], const struct sadmm_settings *settings, double time,
-                              const struct sadmm_flight_pose pose[2], const struct hit *hit)
+SADMM_INLINE void swept_bodies_part(struct swept_body *const f[2], const struct sadmm_settings *settings, double time,
+                                    const struct sadmm_flight_pose pose[2], const struct hit *hit)
 {
     vec3 linear[2], spin[2];
     int side;
     for (side = 0; side < 2; ++side) hit_apply(hit, side, &linear[side], &spin[side]);
     const double overlap =
-                     flyers_overlap_of_held(&f[0]->flight, &f[1]->flight, time, settings->dt, hit, linear, spin),
+                     swept_bodies_overlap_of_held(&f[0]->flight, &f[1]->flight, time, settings->dt, hit, linear, spin),
                  mass = hit->body[0].inverse_mass + hit->body[1].inverse_mass;
     for (side = 0; side < 2; ++side) {
         if (f[side]->dynamic < 0) continue;
         ++f[side]->hits;
-        flyer_leave(f[side], settings, time, &pose[side], linear[side], spin[side]);
-        flyer_move_start(f[side],
-                         v3_scale(hit->frame.r[0], (side ? 1 : -1) * overlap * hit->body[side].inverse_mass / mass));
+        swept_body_leave(f[side], settings, time, &pose[side], linear[side], spin[side]);
+        swept_body_move_start(f[side],
+                              v3_scale(hit->frame.r[0],
+                                       (side ? 1 : -1) * overlap * hit->body[side].inverse_mass / mass));
     }
 }
 
 /* ---- contacts after hits ----------------------------------------------------------------------------------------- */
 
 /* How fast the two come closer at a point by their own motions, at the end of the sub-step, m/s. */
-SADMM_INLINE double flyers_approach(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point,
-                                    const struct sadmm_flight *a, const struct sadmm_flight *b, double dt)
+SADMM_INLINE double swept_bodies_approach(const struct sadmm_contact_pair *pair,
+                                          const struct sadmm_contact_point *point, const struct sadmm_flight *a,
+                                          const struct sadmm_flight *b, double dt)
 {
     double across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0}, speed = 0;
     int k;
@@ -289,15 +294,15 @@ SADMM_INLINE double flyers_approach(const struct sadmm_contact_pair *pair, const
 
 /* Gaps are opened by so much more, and by no more than this share of the thinner shape: nothing goes through where the
  * touch of thin shapes is lost in rounding. */
-#define FLYERS_OPEN        1e-6
-#define FLYERS_OPENED_MOST 0.25
-SADMM_INLINE void flyers_open_gap(const struct sadmm_contact_pair *pair, const struct sadmm_flight *a,
-                                  const struct sadmm_flight *b, double thinner, const struct sadmm_settings *settings,
-                                  struct sadmm_contact_point *point)
+#define SWEPT_OPEN        1e-6
+#define SWEPT_OPENED_MOST 0.25
+SADMM_INLINE void swept_bodies_open_gap(const struct sadmm_contact_pair *pair, const struct sadmm_flight *a,
+                                        const struct sadmm_flight *b, double thinner,
+                                        const struct sadmm_settings *settings, struct sadmm_contact_point *point)
 {
-    const double speed = flyers_approach(pair, point, a, b, settings->dt),
-                 way = (1 + FLYERS_OPEN) * speed * settings->dt;
-    if (speed > settings->restitution_threshold && way > point->gap && way - point->gap <= FLYERS_OPENED_MOST * thinner)
+    const double speed = swept_bodies_approach(pair, point, a, b, settings->dt),
+                 way = (1 + SWEPT_OPEN) * speed * settings->dt;
+    if (speed > settings->restitution_threshold && way > point->gap && way - point->gap <= SWEPT_OPENED_MOST * thinner)
         point->gap = way;
 }
 

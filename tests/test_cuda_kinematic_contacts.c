@@ -1,12 +1,13 @@
 /* Kinematic bodies in steps that the device makes alone, against the same kernels driven by the host: states, contacts,
- * wrenches, joints, events, rays, whatever is set between steps. The emulated device (test_cuda_driven_emulated.c) has
- * the host's sines: equal to the last bit. A GPU's own differ by rounding, so that there worlds in which kinematic
- * bodies turn are compared for a short while and closely; those in which none turns are equal there, too. */
+ * wrenches, joints, events, rays, whatever is set between steps. The emulated device
+ * (test_cuda_kinematic_contacts_emulated.c) has the host's sines: equal to the last bit. A GPU's own differ by
+ * rounding, so that there worlds in which kinematic bodies turn are compared for a short while and closely; those in
+ * which none turns are equal there, too. */
 #include "cuda_worlds.h"
 
-enum { LIFT, BELT, PUSHER, REST, LEFT, RIGHT, POST, TABLE, DRIVEN, FIRST_DYNAMIC = DRIVEN + 1 };
+enum { LIFT, BELT, PUSHER, REST, LEFT, RIGHT, POST, TABLE, KINEMATIC, FIRST_DYNAMIC = KINEMATIC + 1 };
 
-static sadmm_body_id add_driven(sadmm_world *world, double x, double z, double half)
+static sadmm_body_id add_kinematic(sadmm_world *world, double x, double z, double half)
 {
     const double size[3] = {half, 0.5, 0.1};
     sadmm_body_def body = sadmm_body_def_default();
@@ -34,10 +35,10 @@ static sadmm_world *yard(int precision, sadmm_method method, int substeps, bool 
     def.settings.penalty_period = 10;
     def.settings.substeps = substeps;
     sadmm_world *world = create_world(&def);
-    static const double where[DRIVEN][3] = {{-4, 0, 0.3}, {-2, 0.1, 0.6}, {0, 0.2, 0.1}, {2, 0.1, 0.3},
-                                            {4, 0.3, 0.1}, {4.6, 0.3, 0.1}, {7, 0.5, 0.1}, {9, 0.2, 0.4}};
+    static const double where[KINEMATIC][3] = {{-4, 0, 0.3}, {-2, 0.1, 0.6}, {0, 0.2, 0.1}, {2, 0.1, 0.3},
+                                               {4, 0.3, 0.1}, {4.6, 0.3, 0.1}, {7, 0.5, 0.1}, {9, 0.2, 0.4}};
     add_floor(world, 0.5);
-    for (int k = 0; k < DRIVEN; ++k) add_driven(world, where[k][0], where[k][1], where[k][2]);
+    for (int k = 0; k < KINEMATIC; ++k) add_kinematic(world, where[k][0], where[k][1], where[k][2]);
     for (int i = 0; i < 3; ++i) add_box(world, -4 + 0.01 * i, 0, 0.202 + 0.201 * i, 0.1, 1 + i, 0.5);
     add_box(world, -2, 0, 0.301, 0.1, 2, 0.5);
     for (int i = 0; i < 3; ++i) add_box(world, 0.22 + 0.21 * i, 0.02 * i, 0.1, 0.1, 1, 0.3);
@@ -293,7 +294,7 @@ static sadmm_world *plate_and_box(int precision, int substeps, double length, do
     def.settings.substeps = substeps;
     sadmm_world *world = create_world(&def);
     add_floor(world, 0.5);
-    add_driven(world, 0, 0.1, length);
+    add_kinematic(world, 0, 0.1, length);
     add_box(world, x, y, z, 0.1, 2, 0.5);
     use_device(world, precision, 0);
     return world;
@@ -360,7 +361,7 @@ START_TEST(many_bodies_on_one)
         shape.type = SADMM_SHAPE_BOX;
         memcpy(shape.size, half, sizeof half);
         MUST(worlds[w], sadmm_world_add_shape(worlds[w], plate, &shape, NULL));
-        add_driven(worlds[w], 0, 5, 0.1);
+        add_kinematic(worlds[w], 0, 5, 0.1);
         for (int i = 0; i < 300; ++i) add_box(worlds[w], 0.3 * (i % 20), 0.3 * (i / 20), 0.1999, 0.1, 1 + i % 3, 0.5);
         use_device(worlds[w], _i, 0);
     }
@@ -375,7 +376,7 @@ END_TEST
 
 int main(void)
 {
-    Suite *suite = suite_create("cuda_driven");
+    Suite *suite = suite_create("cuda_kinematic_contacts");
     const int precisions = tested_precisions();
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     ADD_CASE(suite, resident_steps_equal_those_by_host, 0, precisions * WAYS);

@@ -1,11 +1,11 @@
 /* Where joints let bodies go (docs/internals/algorithm.md, "Time stepping of rows"): all bodies of an island with
- * joints move by the mean of their velocities before and after the step, or all by those after it (math/lead.h), or
- * they would come apart. In double. */
-#ifndef SADMM_CORE_MODEL_JOINT_LEAD_H
-#define SADMM_CORE_MODEL_JOINT_LEAD_H
+ * joints move by the mean of their velocities before and after the step, or all by those after it (math/trapezoid.h),
+ * or they would come apart. In double. */
+#ifndef SADMM_CORE_MODEL_JOINT_TRAPEZOID_H
+#define SADMM_CORE_MODEL_JOINT_TRAPEZOID_H
 
 #include "core/base/contact_set.h"
-#include "core/math/lead.h"
+#include "core/math/trapezoid.h"
 #include "joint_law.h"
 #include "rolling.h"
 #include "spin.h"
@@ -16,7 +16,7 @@
  * CLOSED: its joints have been closed. */
 enum {
     ISLAND_JOINED = 1,
-    ISLAND_LEADS_STAY = 2,
+    ISLAND_TRAPEZOID_OFF = 2,
     ISLAND_TOUCHED = 4,
     ISLAND_HELD = 8,
     ISLAND_RESTORED = 16,
@@ -33,87 +33,89 @@ enum {
 SADMM_INLINE bool joint_island_may_open(int bits) { return (bits & (ISLAND_STRAYS | ISLAND_TURNS)) != 0; }
 
 /* A body as the step ends. */
-struct joint_lead {
+struct joint_trapezoid {
     const struct sadmm_rigid *rigid; /* at the start; NULL: it does not move */
-    double velocity[6], lead[6];
+    double velocity[6], correction[6];
 };
 
 /* velocity: the solution; rigid NULL: not read. */
-SADMM_INLINE struct joint_lead joint_lead_of(const struct sadmm_rigid *rigid, const double *velocity, double dt)
+SADMM_INLINE struct joint_trapezoid joint_trapezoid_of(const struct sadmm_rigid *rigid, const double *velocity,
+                                                       double dt)
 {
-    struct joint_lead out;
+    struct joint_trapezoid out;
     double before[6];
     int k;
     out.rigid = rigid;
     if (rigid) spin_before(rigid, dt, before);
     for (k = 0; k < 6; ++k) {
         out.velocity[k] = rigid ? velocity[k] : 0;
-        out.lead[k] = rigid ? (velocity[k] - before[k]) / 2 : 0;
+        out.correction[k] = rigid ? (velocity[k] - before[k]) / 2 : 0;
     }
     return out;
 }
 
-/* Of a pair of shapes in an island with joints, points with the solution's impulses: what one of them does; do leads
- * stay for what all of them do, since they would close a contact, or a body rests on one? */
+/* Of a pair of shapes in an island with joints, points with the solution's impulses: what one of them adds; is the
+ * trapezoid correction off after all of them, since it would make a contact penetrate or a body rests on one? */
 SADMM_INLINE void joint_contact_touches(const double normal[3], const struct sadmm_contact_point *point,
                                         const struct sadmm_contact_migration *migration,
-                                        const struct joint_lead bodies[2], const struct sadmm_settings *settings,
-                                        struct lead_touch *touch)
+                                        const struct joint_trapezoid bodies[2], const struct sadmm_settings *settings,
+                                        struct trapezoid_touch *touch)
 {
     const struct rolling_halfway at = rolling_halfway_of(normal, point, migration);
-    double speed = 0, lead[2], size[2], moves[2] = {0, 0}, rest[2] = {0, 0};
+    double speed = 0, correction[2], size[2], moves[2] = {0, 0}, rest[2] = {0, 0};
     int s;
     for (s = 0; s < 2; ++s) {
-        const struct joint_lead *body = &bodies[s];
+        const struct joint_trapezoid *body = &bodies[s];
         const double *arm = s ? at.arm_b : at.arm_a, sign = s ? 1 : -1;
-        speed += sign * lead_along(at.normal, body->velocity, arm);
-        lead[s] = sign * lead_along(at.normal, body->lead, arm);
-        size[s] = lead_size(body->lead, arm);
+        speed += sign * trapezoid_along(at.normal, body->velocity, arm);
+        correction[s] = sign * trapezoid_along(at.normal, body->correction, arm);
+        size[s] = trapezoid_size(body->correction, arm);
         if (!body->rigid) continue;
-        moves[s] = lead_speed(body->rigid->velocity, body->velocity, arm);
-        rest[s] = lead_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
-                                  body->rigid->mass, settings->dt);
+        moves[s] = trapezoid_speed(body->rigid->velocity, body->velocity, arm);
+        rest[s] = trapezoid_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
+                                       body->rigid->mass, settings->dt);
     }
-    const struct lead_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
-    lead_add_point(touch, gap, dot3(normal, point->impulse), lead, size, moves, rest, settings->dt, settings->slop);
+    const struct trapezoid_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
+    trapezoid_add_point(touch, gap, dot3(normal, point->impulse), correction, size, moves, rest, settings->dt,
+                        settings->slop);
 }
-SADMM_INLINE bool joint_contacts_hold(const struct lead_touch *touch, const struct joint_lead bodies[2])
+SADMM_INLINE bool joint_contacts_hold(const struct trapezoid_touch *touch, const struct joint_trapezoid bodies[2])
 {
-    const int carried = TOUCH_CARRIED | TOUCH_MOVED;
-    bool holds = touch->island & TOUCH_JOLT;
+    const int supported = TOUCH_SUPPORTED | TOUCH_MOVED;
+    bool holds = touch->island & TOUCH_PENETRATES;
     int s;
-    for (s = 0; s < 2; ++s) holds = holds || (bodies[s].rigid && (touch->body[s] & carried) == TOUCH_CARRIED);
+    for (s = 0; s < 2; ++s) holds = holds || (bodies[s].rigid && (touch->body[s] & supported) == TOUCH_SUPPORTED);
     return holds;
 }
 
-/* Does taking leads back carry the joint beyond a limit that it has just reached, or beyond where a spring's table
- * stops it? (A limit that presses all the time, a stone on a string, is met by the mean of both velocities, too.)
+/* Would the trapezoid correction move the joint beyond a limit that it has just reached, or beyond where a spring's
+ * table stops it? (A limit that presses all the time, a stone on a string, is met by the mean of both velocities, too.)
  * row_a, row_b: the row's Jacobians. */
-SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
-                                    const double row_b[6], const struct joint_lead bodies[2],
-                                    const struct sadmm_settings *settings)
+SADMM_INLINE bool joint_limit_penetrates(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
+                                         const double row_b[6], const struct joint_trapezoid bodies[2],
+                                         const struct sadmm_settings *settings)
 {
     const bool table = source->role == SADMM_ROLE_SPRING && source->gap < INFINITY;
-    const double margin = source->slack + LEAD_SLOP * settings->slop;
-    double lead = 0, speed = source->steered, way;
+    const double margin = source->slack + TRAPEZOID_SLOP * settings->slop;
+    double correction = 0, speed = source->prescribed, way;
     int s, j;
     if (!table && ((source->role != SADMM_ROLE_LOWER && source->role != SADMM_ROLE_UPPER) || !(lambda > 0)))
         return false;
     for (s = 0; s < 2; ++s) {
         const double *row = s ? row_b : row_a;
         for (j = 0; j < 6; ++j) {
-            lead += row[j] * bodies[s].lead[j];
+            correction += row[j] * bodies[s].correction[j];
             speed += row[j] * bodies[s].velocity[j];
         }
     }
-    way = settings->dt * (speed - lead);
+    way = settings->dt * (speed - correction);
     if (!table) return source->gap + way < (source->gap < 0 ? source->gap : 0) - margin;
     return lambda < 0 ? way > max_of(source->gap, 0) + margin : -way > max_of(-source->gap, 0) + margin;
 }
 
 /* The coordinate in which a row holds a body to what does not move by itself, as a bit. */
 SADMM_INLINE int joint_mooring(const struct sadmm_joint_source *source, double lambda,
-                               const struct joint_lead bodies[2])
+                               const struct joint_trapezoid bodies[2])
 {
     const bool moors = !bodies[0].rigid || !bodies[1].rigid;
     return moors && (source->role == SADMM_ROLE_LOCK || lambda != 0) ? 1 << source->coordinate : 0;
@@ -123,24 +125,25 @@ SADMM_INLINE int joint_mooring(const struct sadmm_joint_source *source, double l
 
 /* What a row says of its island. */
 SADMM_INLINE int joint_row_touches(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
-                                   const double row_b[6], const struct joint_lead bodies[2],
+                                   const double row_b[6], const struct joint_trapezoid bodies[2],
                                    const struct sadmm_settings *settings)
 {
     const bool powers = source->role == SADMM_ROLE_DRIVE || source->role == SADMM_ROLE_SPRING ||
                         source->role == SADMM_ROLE_ARMATURE;
     const int bits = (joint_mooring(source, lambda, bodies) ? ISLAND_MOORED : 0) | (powers ? ISLAND_POWERED : 0);
-    if (source->slack == INFINITY) return bits | ISLAND_LEADS_STAY | ISLAND_TURNS;
-    return joint_limit_jolts(source, lambda, row_a, row_b, bodies, settings) ? bits | ISLAND_LEADS_STAY : bits;
+    if (source->slack == INFINITY) return bits | ISLAND_TRAPEZOID_OFF | ISLAND_TURNS;
+    return joint_limit_penetrates(source, lambda, row_a, row_b, bodies, settings) ? bits | ISLAND_TRAPEZOID_OFF : bits;
 }
 
 /* Position, orientation and velocity at the end, by the solution v. halfway: its orientation then (spin.h). */
 SADMM_INLINE void joint_move(const struct sadmm_rigid *from, const double halfway[4], const double v[6],
-                             bool leads_stay, double dt, double position[3], double orientation[4], double velocity[6])
+                             bool trapezoid_off, double dt, double position[3], double orientation[4],
+                             double velocity[6])
 {
     double mean[6];
     int k;
-    for (k = 0; k < 6; ++k) mean[k] = leads_stay ? v[k] : (from->velocity[k] + v[k]) / 2;
-    spin_move_from(from, halfway, v, mean, leads_stay, dt, position, orientation, velocity);
+    for (k = 0; k < 6; ++k) mean[k] = trapezoid_off ? v[k] : (from->velocity[k] + v[k]) / 2;
+    spin_move_from(from, halfway, v, mean, trapezoid_off, dt, position, orientation, velocity);
 }
 
 #endif

@@ -1,3 +1,0 @@
-/* test_cuda_driven.c on the emulated device. */
-#define CUDA_EMULATED
-#include "test_cuda_driven.c"
