@@ -1,4 +1,4 @@
-/* What solves on the host: tests of joined bodies go through all of them. */
+/* What solves on the host: tests of articulations go through all of them. */
 #ifndef SADMM_TESTS_SOLVERS_H
 #define SADMM_TESTS_SOLVERS_H
 

@@ -182,7 +182,7 @@ END_TEST
 
 /* ---- against the CPU --------------------------------------------------------------------------------------------- */
 
-/* Links under 100 kg that are kicked, and a rope that is let go: both are solved directly, in double. */
+/* Links under 100 kg that are kicked, and a rope that is let go: both take the block direct solve, in double. */
 START_TEST(chains_move_as_on_the_cpu)
 {
     static const double steps[] = {0.01, 1. / 60};

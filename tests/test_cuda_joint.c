@@ -650,7 +650,7 @@ START_TEST(joints_that_nothing_touches_are_solved_apart)
 END_TEST
 
 /* More than a thread block has room for: links of a chain that comes down on a floor; and contacts, of many boxes that
- * lie on one joined body. */
+ * lie on one jointed body. */
 static sadmm_world *large_yard(bool chain, int precision)
 {
     sadmm_world_def def = sadmm_world_def_default();
@@ -727,9 +727,9 @@ static bool is_dynamic(sadmm_world *world, sadmm_body_id id)
     return def.type == SADMM_BODY_DYNAMIC;
 }
 
-/* Islands that are solved directly take such steps to the host, whose impulses are those of the wrenches then; and back
- * to the device where nobody asks for it any more. */
-START_TEST(islands_are_solved_directly)
+/* Islands of the dense contact solve take such steps to the host, whose impulses are those of the wrenches then; and
+ * back to the device where nobody asks for it any more. */
+START_TEST(islands_take_the_dense_contact_solve)
 {
     struct sadmm_scene scene = open_scene("ragdolls:1");
     sadmm_world *world = build_scene(&scene);
@@ -739,7 +739,7 @@ START_TEST(islands_are_solved_directly)
     use_device(world, _i, 0);
     if (EMULATED) settings.iterations = 4;
     settings.certify = true;
-    settings.direct_points = 128;
+    settings.ncp_points = 128;
     MUST(world, sadmm_world_set_settings(world, &settings));
     for (int step = 0; step < steps; ++step) {
         step_world(world, 1);
@@ -764,7 +764,7 @@ START_TEST(islands_are_solved_directly)
     }
     ck_assert_int_le(above, 2);
     ck_assert_int_gt(pressed, EMULATED ? 10 : 50);
-    settings.direct_points = 0;
+    settings.ncp_points = 0;
     MUST(world, sadmm_world_set_settings(world, &settings));
     step_world(world, EMULATED ? 2 : 20);
     sadmm_world_destroy(world);
@@ -784,6 +784,6 @@ int main(void)
     ADD_CASE(suite, parts_of_any_size_are_solved, 0, 4);
     ADD_CASE(suite, rows_of_a_resident_step_are_read, 0, tested_precisions());
     ADD_CASE(suite, joints_survive_a_step_that_fails, 0, tested_precisions());
-    ADD_CASE(suite, islands_are_solved_directly, 0, tested_precisions());
+    ADD_CASE(suite, islands_take_the_dense_contact_solve, 0, tested_precisions());
     return run_cuda_suite(suite);
 }

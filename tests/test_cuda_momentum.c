@@ -118,7 +118,7 @@ START_TEST(mechanisms)
 }
 END_TEST
 
-/* Stacks that are held, balls that roll, clusters in the air and one on the ground, side by side. */
+/* Anchored stacks, balls that roll, clusters in the air and one on the ground, side by side. */
 static void add_mixture(sadmm_world *world)
 {
     static const struct cluster kinds[] = {{SADMM_SHAPE_SPHERE, 5, 0.15, true}, {SADMM_SHAPE_BOX, 8, 0.095, true}};

@@ -427,8 +427,8 @@ START_TEST(blocks_have_no_unit)
 }
 END_TEST
 
-/* The weight scale stays where the misses are balanced, goes down where the momentum lags, up where the impulses creep,
- * by the power 0.3 of how far they are off and a factor of 4 at most a refresh; it never leaves [0.1, 5]. */
+/* The weight scale stays where the residuals are balanced, goes down where the momentum lags, up where the impulses
+ * creep, by the power 0.3 of how far they are off and a factor of 4 at most a refresh; it never leaves [0.1, 5]. */
 START_TEST(weight_scales_follow_the_balance)
 {
     ck_assert(!weight_stalls(30) && weight_stalls(31));
@@ -445,12 +445,12 @@ START_TEST(weight_scales_follow_the_balance)
 }
 END_TEST
 
-/* What a contact misses, lambda - Pi_C(lambda - u/w), with lambda = (2, 0, 0), mu = 0.5, w = 4 in its frame, by hand;
- * its energy is the same in the world's frame, for any normal. */
-START_TEST(what_contacts_miss_is_known)
+/* The residual of a contact, lambda - Pi_C(lambda - u/w), with lambda = (2, 0, 0), mu = 0.5, w = 4 in its frame, by
+ * hand; its energy is the same in the world's frame, for any normal. */
+START_TEST(contact_residuals_are_known)
 {
     static const struct {
-        double u[3], missing[3];
+        double u[3], residual[3];
         int moves;
     } cases[] = {
         {{-4, -4, 4}, {-1, -1, 1}, 0},   /* (3, 1, -1) is in the cone: |(1, -1)| < 1.5 */
@@ -460,11 +460,11 @@ START_TEST(what_contacts_miss_is_known)
     };
     const double lambda[3] = {2, 0, 0}, normals[][3] = {{1, 0, 0}, {0, 0.6, -0.8}, {2 / 3.0, -2 / 3.0, 1 / 3.0}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
-        double missing[3], y[3], projected[3], energy = 0;
-        contact_missing_rows(lambda, cases[k].u, 0.5, 4, missing);
+        double residual[3], y[3], projected[3], energy = 0;
+        contact_residual_rows(lambda, cases[k].u, 0.5, 4, residual);
         for (int i = 0; i < 3; ++i) {
-            ck_assert_double_eq_tol(missing[i], cases[k].missing[i], 4 * DBL_EPSILON); /* of numbers up to 3 */
-            energy += 4 * missing[i] * missing[i];
+            ck_assert_double_eq_tol(residual[i], cases[k].residual[i], 4 * DBL_EPSILON); /* of numbers up to 3 */
+            energy += 4 * residual[i] * residual[i];
             y[i] = lambda[i] - cases[k].u[i] / 4;
         }
         ck_assert_int_eq(contact_project_rows(y, 0.5, projected), cases[k].moves);
@@ -787,7 +787,7 @@ int main(void)
     tcase_add_loop_test(weights, small_gaps_are_eased, 0, 4);
     tcase_add_test(weights, blocks_have_no_unit);
     tcase_add_test(weights, weight_scales_follow_the_balance);
-    tcase_add_test(weights, what_contacts_miss_is_known);
+    tcase_add_test(weights, contact_residuals_are_known);
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
     tcase_add_test(solutions, cold_solves);
     tcase_add_test(solutions, masses_do_not_matter);

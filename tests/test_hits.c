@@ -854,8 +854,8 @@ START_TEST(what_does_not_bounce_is_left_to_the_solve)
 END_TEST
 
 #ifdef HITS_ON_CUDA
-/* Balls, boxes and capsules, one of several shapes, a kinematic and a joined one: steps that the device makes are those
- * that the host makes with its kernels, to the bit, in one sub-step or two. */
+/* Balls, boxes and capsules, one of several shapes, a kinematic and a jointed one: steps that the device makes are
+ * those that the host makes with its kernels, to the bit, in one sub-step or two. */
 static void throw_more(sadmm_world *world)
 {
     sadmm_body_def body = sadmm_body_def_default();

@@ -225,8 +225,8 @@ START_TEST(bad_input_is_refused)
 }
 END_TEST
 
-/* Bodies that are joined do not meet, unless asked; as long as one of their joints is there. */
-START_TEST(joined_bodies_do_not_meet)
+/* Jointed bodies do not meet, unless asked; as long as one of their joints is there. */
+START_TEST(jointed_bodies_do_not_meet)
 {
     const sadmm_world_def def = joint_world(SADMM_BACKEND_CPU, SADMM_F64);
     sadmm_world *world = create_world(&def);
@@ -905,7 +905,7 @@ static void momenta(sadmm_world *world, double p[6])
     }
 }
 
-/* What three joined bodies in the air lose of their momentum in 1 s: *linear, *angular, relative. planar: they turn in
+/* What three jointed bodies in the air lose of their momentum in 1 s: *linear, *angular, relative. planar: they turn in
  * a plane. */
 static void lost_momentum(double dt, int iterations, bool planar, double *linear, double *angular)
 {
@@ -940,7 +940,7 @@ static void lost_momentum(double dt, int iterations, bool planar, double *linear
 
 /* To rounding, whatever the iterations, in the plane and in space: both bodies of a joint feel what it transmits at one
  * point. */
-START_TEST(free_joined_bodies_keep_momentum)
+START_TEST(free_articulations_keep_momentum)
 {
     static const int budgets[] = {1, 20, 500};
     for (int k = 0; k < 6; ++k) {
@@ -959,7 +959,7 @@ int main(void)
     suite_add_tcase(suite, cases);
     tcase_add_test(cases, joints_come_and_go);
     tcase_add_test(cases, bad_input_is_refused);
-    tcase_add_test(cases, joined_bodies_do_not_meet);
+    tcase_add_test(cases, jointed_bodies_do_not_meet);
     tcase_add_loop_test(cases, kinds_hold, 0, SOLVERS * SADMM_JOINT_KIND_COUNT);
     tcase_add_test(cases, frames_are_drawn_together);
     tcase_add_loop_test(cases, closed_loops_hold, 0, SOLVERS);
@@ -981,6 +981,6 @@ int main(void)
     tcase_add_test(cases, frozen_problems_have_the_rows);
     tcase_add_loop_test(cases, a_step_that_fails_changes_no_joint, 0, 2);
     tcase_add_test(cases, memory_runs_out);
-    tcase_add_test(cases, free_joined_bodies_keep_momentum);
+    tcase_add_test(cases, free_articulations_keep_momentum);
     return run_suite(suite);
 }

@@ -1,5 +1,5 @@
-/* Momentum that no contact may change is kept whatever the iterations: clusters in flight, bodies on ice; and what is
- * held stays as it is. */
+/* Momentum that no contact may change is kept whatever the iterations: clusters in flight, bodies on ice; anchored
+ * islands stay as they are. */
 #include <string.h>
 
 #include "core/base/parallel.h"
@@ -127,7 +127,7 @@ END_TEST
 
 /* One point with friction leaves turns about it, two the turn about their line, a third beside the line none; a line of
  * points leaves its turn. */
-START_TEST(points_with_friction_hold)
+START_TEST(points_with_friction_anchor)
 {
     static const double up[3] = {0, 0, 1}, points[3][3] = {{0.1, 0, -0.1}, {0.3, 0.1, -0.1}, {0.2, 0.2, -0.1}};
     struct momentum_sums sums = some_island();
@@ -142,16 +142,16 @@ START_TEST(points_with_friction_hold)
             velocity_at(m.motion[k], points[0], v);
             ck_assert_double_le(length3(v), 1e-13);
         }
-        ck_assert(!momentum_is_held(0.5, &arms));
+        ck_assert(!momentum_is_anchored(0.5, &arms));
         add_arm(&arms, points[n], 1);
     }
-    ck_assert(momentum_is_held(0.5, &arms));
-    ck_assert(!momentum_is_held(0, &arms));
+    ck_assert(momentum_is_anchored(0.5, &arms));
+    ck_assert(!momentum_is_anchored(0, &arms));
     for (int k = 0; k < 4; ++k) {
         const double r[3] = {0.1 * k + 5, 0.2 * k, 1};
         add_arm(&line, r, 1);
     }
-    ck_assert(!momentum_is_held(0.5, &line));
+    ck_assert(!momentum_is_anchored(0.5, &line));
 }
 END_TEST
 
@@ -344,7 +344,7 @@ START_TEST(threads_do_not_show)
 }
 END_TEST
 
-/* ---- what is held ---------------------------------------------------------------------------------------------- */
+/* ---- what is anchored ------------------------------------------------------------------------------------------ */
 
 /* v before and after what ends a step's iterations. */
 static void end_step(struct runner *r, double *before, double *after, size_t numbers)
@@ -359,7 +359,7 @@ static void end_step(struct runner *r, double *before, double *after, size_t num
 }
 
 /* A pyramid on a rough floor is left as it is, to the bit, unsolved; on ice it is not. Gravity pulls it aside. */
-START_TEST(held_islands_are_left_alone)
+START_TEST(anchored_islands_are_left_alone)
 {
     for (int engine = 0; engine < ENGINES; ++engine)
         for (int rough = 0; rough < 2; ++rough) {
@@ -401,7 +401,7 @@ int main(void)
     TCase *formulas = tcase_create("formulas"), *worlds = tcase_create("worlds");
     tcase_add_test(formulas, motions_are_those_that_contacts_do_not_feel);
     tcase_add_test(formulas, islands_in_the_air);
-    tcase_add_test(formulas, points_with_friction_hold);
+    tcase_add_test(formulas, points_with_friction_anchor);
     tcase_add_test(formulas, restored_motion_has_the_momentum);
     tcase_set_timeout(worlds, 120);
     tcase_add_loop_test(worlds, clusters_in_flight, 0, ENGINES * BUDGETS);
@@ -411,7 +411,7 @@ int main(void)
     tcase_add_loop_test(worlds, overlapping_balls_fall_and_come_apart, 0, BUDGETS);
     tcase_add_loop_test(worlds, clusters_gain_no_energy, 0, BUDGETS);
     tcase_add_loop_test(worlds, threads_do_not_show, 0, 4);
-    tcase_add_test(worlds, held_islands_are_left_alone);
+    tcase_add_test(worlds, anchored_islands_are_left_alone);
     suite_add_tcase(suite, formulas);
     suite_add_tcase(suite, worlds);
     return run_suite(suite);

@@ -278,7 +278,7 @@ START_TEST(what_nothing_takes_back_is_kept_out)
 {
     for (int smooth = 0; smooth < 2; ++smooth) {
         sadmm_world_def def = world_def(0.005, SADMM_METHOD_FAST);
-        def.settings.iterations = 100; /* what a step misses stays on ice, 1e-4 m/s with 20 */
+        def.settings.iterations = 100; /* the residual of a step stays on ice, 1e-4 m/s with 20 */
         sadmm_world *world = bodies_world(&def, _i);
         add_floor(world, smooth ? 0 : 0.5);
         sadmm_body_id id[2];

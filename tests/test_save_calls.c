@@ -354,7 +354,7 @@ static sadmm_status set_settings(struct draw *d, sadmm_world *world)
     case 2: s.method = (sadmm_method)below(d, 2); break;
     case 3: s.iterations = 1 + below(d, 30); break;
     case 4: s.warm_start = below(d, 2); break;
-    case 5: s.direct_points = below(d, 2) ? 64 : 0; break;
+    case 5: s.ncp_points = below(d, 2) ? 64 : 0; break;
     case 6: s.certify = below(d, 2); break;
     case 7: s.recover_wrenches = below(d, 2); break;
     case 8: s.measure_residuals = below(d, 2); break;

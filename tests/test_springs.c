@@ -129,8 +129,8 @@ START_TEST(any_stiffness_is_stable)
 }
 END_TEST
 
-/* 1e12 N/m is the hard joint: the chain that swings (POINT), or bears its weight, is where it would be; the
- * springs give by 1e-11 m, and the joints by as little. */
+/* 1e12 N/m is the hard joint: the chain that swings (POINT), or bears its weight, is where it would be; the springs
+ * yield 1e-11 m, and the joints as little. */
 START_TEST(stiffness_without_bound_is_the_hard_joint)
 {
     const enum kind kind = (enum kind)(_i / SOLVERS);

@@ -498,7 +498,7 @@ START_TEST(settings_are_compared_by_their_members)
     memcpy(&a.member, &given.member, sizeof given.member), memcpy(&b.member, &given.member, sizeof given.member)
     BOTH(dt), BOTH(substeps), BOTH(gravity), BOTH(method), BOTH(iterations), BOTH(relaxation), BOTH(penalty_period);
     BOTH(penalty_mass_factor), BOTH(penalty_offset), BOTH(penalty_ratio_limit), BOTH(penalty_update_warm),
-        BOTH(warm_start), BOTH(direct_points);
+        BOTH(warm_start), BOTH(ncp_points);
     BOTH(residual_tolerance), BOTH(certificate_tolerance), BOTH(certificate_momentum_tolerance), BOTH(check_period);
     BOTH(measure_residuals), BOTH(certify), BOTH(recover_wrenches), BOTH(baumgarte), BOTH(slop), BOTH(correction_speed);
     BOTH(restitution_threshold), BOTH(hits), BOTH(threads);

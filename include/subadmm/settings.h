@@ -47,8 +47,8 @@ SADMM_API sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_
 /* The largest sadmm_settings.substeps. */
 enum { SADMM_MOST_SUBSTEPS = 64 };
 
-/* The largest sadmm_settings.direct_points. */
-enum { SADMM_MOST_DIRECT_POINTS = 128 };
+/* The largest sadmm_settings.ncp_points. */
+enum { SADMM_MOST_NCP_POINTS = 128 };
 
 /* The largest sadmm_settings.hits. */
 enum { SADMM_MOST_HITS = 64 };
@@ -93,10 +93,10 @@ typedef struct sadmm_settings {
                                     without impulses and first steps start from predicted loads
                                     (docs/internals/algorithm.md) */
 
-    int direct_points;           /* worlds: islands with joints and at most so many contact points are solved directly
+    int ncp_points;              /* worlds: islands with joints and at most so many contact points are solved directly
                                     after the iterations (docs/internals/algorithm.md, "Dense contact solve (NCP)"),
                                     contacts and rows to rounding: robots that stand, walk, grasp. In [0,
-                                    SADMM_MOST_DIRECT_POINTS = 128]; 0: none; default 0. It costs what the iterations
+                                    SADMM_MOST_NCP_POINTS = 128]; 0: none; default 0. It costs what the iterations
                                     leave to do: little where they leave less than 1e-9 m/s, else 0.1 to 0.5 ms a robot
                                     of ten points on one core, and some 10 ms an island that nothing solves (links deep
                                     in a table). On CUDA such steps go through the host */

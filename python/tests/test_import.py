@@ -568,7 +568,7 @@ def test_fingers_tied_on_a_hand_that_moves(left, right, polycoef, wheel):
     for n in range(50):
         robot.world.step(5)
         l, r = robot.joints["l"].position, robot.joints["r"].position
-        if n > 20:  # what it is off at the start has been drawn in; locks give by 1e-9 of what would move their bodies
+        if n > 20:  # what it is off at the start has been drawn in; regularised locks yield by 1e-9 of their load
             assert l == pytest.approx(a0 + a1 * r, abs=2e-6)
     assert abs(l - a0) > 1e-3 and abs(robot.joints["shoulder"].position) > 0.1  # all of it has moved
 
@@ -633,7 +633,7 @@ def test_contact_that_no_joint_can_part_is_left_out():
     settings = held.world.settings
     settings.certify = True
     held.world.settings = settings
-    held.world.step(10)  # its weight times a billionth, which locks give, is 2e-11 m/s
+    held.world.step(10)  # its weight times the locks' regularisation of 1e-9 is 2e-11 m/s
     assert held.world.report.contacts == 0 and held.world.report.certificate.ncp_max < 1e-10
     free = subadmm.load(mujoco.MjModel.from_xml_string(text.replace("JOINT", '<joint type="slide" axis="0 0 1"/>')))
     assert not [note for note in free.report if "overlap" in note.reason]
@@ -662,7 +662,7 @@ def test_urdf_moments_that_no_solid_has_are_mended_and_the_base_stays_a_body(tmp
     assert any("'base'" in note.element and "'hand'" in note.element and "left out" in note.reason for note in robot.report)
 
 
-def test_locks_of_carriers_give_as_those_of_their_bodies():
+def test_locks_of_carriers_are_regularised_as_those_of_their_bodies():
     """The second body has two hinges, with a carrier of 1e-4 of its mass: a billionth of what its weight would move the
     carrier by is 2e-7 m/s, of what it would move the bodies by 1e-11."""
     text = """
@@ -680,7 +680,7 @@ def test_locks_of_carriers_give_as_those_of_their_bodies():
     robot = subadmm.load(mujoco.MjModel.from_xml_string(text))
     assert len(robot.carriers) == 1
     settings = robot.world.settings
-    settings.certify, settings.direct_points = True, 0
+    settings.certify, settings.ncp_points = True, 0
     robot.world.settings = settings
     worst = 0
     for _ in range(50):
@@ -707,8 +707,8 @@ def test_feet_of_robots_are_solved_to_rounding():
     for points in (64, 0):
         robot = subadmm.load(mujoco.MjModel.from_xml_string(text), backend="cpu")
         settings = robot.world.settings
-        assert settings.direct_points == 64
-        settings.certify, settings.direct_points = True, points
+        assert settings.ncp_points == 64
+        settings.certify, settings.ncp_points = True, points
         robot.world.settings = settings
         maps = []
         for _ in range(200):
@@ -722,4 +722,4 @@ def test_feet_of_robots_are_solved_to_rounding():
 
 def test_a_device_keeps_its_worlds():
     source = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
-    assert settings_of(source, "cuda").direct_points == 0 and settings_of(source, "auto").direct_points == 64
+    assert settings_of(source, "cuda").ncp_points == 0 and settings_of(source, "auto").ncp_points == 64

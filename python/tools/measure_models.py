@@ -192,8 +192,8 @@ def set_iterations(world, iterations, given):
     settings.certify, settings.iterations, settings.dt = True, iterations, min(settings.dt, 0.005)
     if given.dt is not None:
         settings.dt = given.dt
-    if given.direct_points is not None:
-        settings.direct_points = given.direct_points
+    if given.ncp_points is not None:
+        settings.ncp_points = given.ncp_points
     world.settings = settings
 
 
@@ -269,7 +269,7 @@ def main():
     parser.add_argument("--backend", default="cpu")
     parser.add_argument("--precision", default="f64")
     parser.add_argument("--dt", type=float, help="time step, s, in place of the file's or 5 ms")
-    parser.add_argument("--direct-points", type=int, help="in place of the model's: 0: contacts by iteration alone")
+    parser.add_argument("--ncp-points", type=int, help="instead of the model's; 0: contacts by iteration alone")
     parser.add_argument("--iterations", type=int, action="append", help="of the runs, in place of the table's")
     parser.add_argument("--worst", action="store_true",
                         help="of steps above 1e-6 m/s: how many by a contact that sticks, slips or is open, or a row")

@@ -111,9 +111,9 @@ struct row_weight {
     double weight, along, response, scale;
 };
 
-/* An island under contacts of which no static pair is known to hold it (math/momentum.h). */
-struct cpu_loose {
-    int32_t first_body, end_body, first_pair, end_pair; /* in loose_bodies, loose_pairs */
+/* A floating island: under contacts, none of whose static pairs is known to anchor it (math/momentum.h). */
+struct cpu_floating {
+    int32_t first_body, end_body, first_pair, end_pair; /* in floating_bodies, floating_pairs */
     struct momentum_motions motions;
     double slow_down; /* the factor of its velocities, but for those motions */
 };
@@ -186,12 +186,12 @@ struct sadmm_context {
     /* Islands; without constraints and limits of worlds in the method `paper`: none */
     int32_t *label;             /* bodies: the smallest body of its island */
     _Atomic int32_t *touch;     /* bodies: bits (math/trapezoid.h), of the body and, at labels, of the island */
-    int32_t *loose_of;          /* bodies, used at labels: index in `loose`, negative: held */
-    struct cpu_loose *loose;
-    int32_t *loose_bodies, *loose_pairs; /* by island, ascending; of pairs the static ones */
-    int32_t loose_count;
-    size_t label_capacity, touch_capacity, loose_of_capacity, loose_capacity, loose_body_capacity,
-        loose_pair_capacity;
+    int32_t *floating_of;       /* bodies, used at labels: index in `floating`, negative: anchored */
+    struct cpu_floating *floating;
+    int32_t *floating_bodies, *floating_pairs; /* by island, ascending; of pairs the static ones */
+    int32_t floating_count;
+    size_t label_capacity, touch_capacity, floating_of_capacity, floating_capacity, floating_body_capacity,
+        floating_pair_capacity;
 
     /* fast */
     bool fast;
@@ -261,11 +261,11 @@ sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
 void CPU(add_up_imbalance)(struct sadmm_context *, int thread, int threads);
 void CPU(update_weight_scales)(struct sadmm_context *);
 sadmm_status CPU(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
-/* begin: islands, and which are loose (cpu_islands.c); false when memory runs out. */
+/* begin: islands, and which are floating (cpu_islands.c); false when memory runs out. */
 bool CPU(find_islands)(struct sadmm_context *);
-/* Motions of the loose islands; then their velocities, slowed down but for these (cpu_momentum.c). */
+/* Motions of the floating islands; then their velocities, slowed down but for these (cpu_momentum.c). */
 void CPU(find_motions)(struct sadmm_context *);
-void CPU(move_loose)(struct sadmm_context *);
+void CPU(move_floating)(struct sadmm_context *);
 sadmm_status CPU(factorize)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_velocity)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *);

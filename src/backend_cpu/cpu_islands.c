@@ -1,46 +1,46 @@
-/* begin: islands of the step, and which of them are loose: those that no static pair is known to hold
- * (momentum_is_held), and in which no bodies roll on each other. Most are held, which one of their pairs decides; lists
- * are made for the others alone. */
+/* begin: islands of the step, and which of them are floating: those that no static pair is known to anchor
+ * (momentum_is_anchored), and in which no bodies roll on each other. Most are anchored, which one of their pairs
+ * decides; lists are made for floating ones alone. */
 #include "core/base/memory.h"
 #include "core/math/momentum.h"
 #include "core/model/islands.h"
 #include "cpu.h"
 
 /* Of an island, in place of an index. */
-enum { UNTOUCHED = -3, HELD = -2, TOUCHED = -1 };
+enum { UNTOUCHED = -3, ANCHORED = -2, TOUCHED = -1 };
 
 static bool is_static(const struct sadmm_contact_pair *pair) { return pair->body_a < 0 || pair->body_b < 0; }
 
-static bool holds(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+static bool anchors(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
 {
     const struct sadmm_contact_point *points = &c->system->contacts->points[pair->first];
     struct arm_sums arms = {0};
     if (!is_static(pair)) return sadmm_pair_rolls(pair, points);
     if (pair->count < 3 || !(pair->friction > 0)) return false;
     for (int32_t k = 0; k < pair->count; ++k) add_arm(&arms, pair->body_a >= 0 ? points[k].arm_a : points[k].arm_b, 1);
-    return momentum_is_held(pair->friction, &arms);
+    return momentum_is_anchored(pair->friction, &arms);
 }
 
 static int32_t *island_of(const struct sadmm_context *c, int32_t body_a, int32_t body_b)
 {
-    return &c->loose_of[c->label[body_a >= 0 ? body_a : body_b]];
+    return &c->floating_of[c->label[body_a >= 0 ? body_a : body_b]];
 }
 
-/* Returns how many static pairs loose islands may have. */
-static size_t mark_held(struct sadmm_context *c)
+/* Returns how many static pairs floating islands may have. */
+static size_t mark_anchored(struct sadmm_context *c)
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
     size_t pairs = 0;
-    for (int32_t i = 0; i < c->bodies; ++i) c->loose_of[i] = UNTOUCHED;
+    for (int32_t i = 0; i < c->bodies; ++i) c->floating_of[i] = UNTOUCHED;
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
         int32_t *island = island_of(c, pair->body_a, pair->body_b);
-        if (*island == HELD) continue;
-        *island = holds(c, pair) ? HELD : TOUCHED;
+        if (*island == ANCHORED) continue;
+        *island = anchors(c, pair) ? ANCHORED : TOUCHED;
         pairs += is_static(pair);
     }
     for (size_t k = 0; k < sadmm_row_constraint_count(c->system); ++k) /* left alone */
-        *island_of(c, c->system->rows->constraints[k].body_a, c->system->rows->constraints[k].body_b) = HELD;
+        *island_of(c, c->system->rows->constraints[k].body_a, c->system->rows->constraints[k].body_b) = ANCHORED;
     return pairs;
 }
 
@@ -50,46 +50,48 @@ static void list_members(struct sadmm_context *c)
     const struct sadmm_contact_set *contacts = c->system->contacts;
     int32_t bodies = 0, pairs = 0;
     for (int32_t i = 0; i < c->bodies; ++i)
-        if (c->loose_of[c->label[i]] >= 0) ++c->loose[c->loose_of[c->label[i]]].end_body;
+        if (c->floating_of[c->label[i]] >= 0) ++c->floating[c->floating_of[c->label[i]]].end_body;
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const int32_t island = *island_of(c, contacts->pairs[p].body_a, contacts->pairs[p].body_b);
-        if (island >= 0 && is_static(&contacts->pairs[p])) ++c->loose[island].end_pair;
+        if (island >= 0 && is_static(&contacts->pairs[p])) ++c->floating[island].end_pair;
     }
-    for (int32_t k = 0; k < c->loose_count; ++k) {
-        struct cpu_loose *loose = &c->loose[k];
-        const int32_t of_bodies = loose->end_body, of_pairs = loose->end_pair;
-        loose->first_body = loose->end_body = bodies;
-        loose->first_pair = loose->end_pair = pairs;
+    for (int32_t k = 0; k < c->floating_count; ++k) {
+        struct cpu_floating *floating = &c->floating[k];
+        const int32_t of_bodies = floating->end_body, of_pairs = floating->end_pair;
+        floating->first_body = floating->end_body = bodies;
+        floating->first_pair = floating->end_pair = pairs;
         bodies += of_bodies, pairs += of_pairs;
     }
     for (int32_t i = 0; i < c->bodies; ++i)
-        if (c->loose_of[c->label[i]] >= 0) c->loose_bodies[c->loose[c->loose_of[c->label[i]]].end_body++] = i;
+        if (c->floating_of[c->label[i]] >= 0)
+            c->floating_bodies[c->floating[c->floating_of[c->label[i]]].end_body++] = i;
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const int32_t island = *island_of(c, contacts->pairs[p].body_a, contacts->pairs[p].body_b);
-        if (island >= 0 && is_static(&contacts->pairs[p])) c->loose_pairs[c->loose[island].end_pair++] = (int32_t)p;
+        if (island >= 0 && is_static(&contacts->pairs[p]))
+            c->floating_pairs[c->floating[island].end_pair++] = (int32_t)p;
     }
 }
 
 bool CPU(find_islands)(struct sadmm_context *c)
 {
     const size_t n = (size_t)c->bodies;
-    c->loose_count = 0;
+    c->floating_count = 0;
     if (!c->fast && !c->plan.momentum) return true;
     if (!sadmm_grow_empty(&c->label, &c->label_capacity, n, sizeof(int32_t))) return false;
     sadmm_islands(c->system, c->label);
     if (!c->plan.momentum) return true;
     if (!sadmm_grow_empty(&c->touch, &c->touch_capacity, n, sizeof(int32_t)) ||
-        !sadmm_grow_empty(&c->loose_of, &c->loose_of_capacity, n, sizeof(int32_t)))
+        !sadmm_grow_empty(&c->floating_of, &c->floating_of_capacity, n, sizeof(int32_t)))
         return false;
-    const size_t pairs = mark_held(c);
+    const size_t pairs = mark_anchored(c);
     for (size_t i = 0; i < n; ++i)
-        if (c->label[i] == (int32_t)i && c->loose_of[i] == TOUCHED) c->loose_of[i] = c->loose_count++;
-    if (c->loose_count == 0) return true;
-    if (!sadmm_grow_empty(&c->loose, &c->loose_capacity, (size_t)c->loose_count, sizeof *c->loose) ||
-        !sadmm_grow_empty(&c->loose_bodies, &c->loose_body_capacity, n, sizeof(int32_t)) ||
-        !sadmm_grow_empty(&c->loose_pairs, &c->loose_pair_capacity, pairs, sizeof(int32_t)))
+        if (c->label[i] == (int32_t)i && c->floating_of[i] == TOUCHED) c->floating_of[i] = c->floating_count++;
+    if (c->floating_count == 0) return true;
+    if (!sadmm_grow_empty(&c->floating, &c->floating_capacity, (size_t)c->floating_count, sizeof *c->floating) ||
+        !sadmm_grow_empty(&c->floating_bodies, &c->floating_body_capacity, n, sizeof(int32_t)) ||
+        !sadmm_grow_empty(&c->floating_pairs, &c->floating_pair_capacity, pairs, sizeof(int32_t)))
         return false;
-    for (int32_t k = 0; k < c->loose_count; ++k) c->loose[k].end_body = c->loose[k].end_pair = 0;
+    for (int32_t k = 0; k < c->floating_count; ++k) c->floating[k].end_body = c->floating[k].end_pair = 0;
     list_members(c);
     return true;
 }

@@ -70,9 +70,9 @@ static bool any_suspect(struct sadmm_context *c, bool bounces)
         sum->limit.free += c->body_sums[BODY_SUMS * i + 1];
         sum->along += c->body_sums[BODY_SUMS * i + 2];
     }
-    for (int32_t k = 0; k < c->loose_count; ++k) {
-        const struct momentum_energies rigid = momentum_energies_of(&c->loose[k].motions);
-        struct cpu_island *island = &c->islands[c->label[c->loose_bodies[c->loose[k].first_body]]];
+    for (int32_t k = 0; k < c->floating_count; ++k) {
+        const struct momentum_energies rigid = momentum_energies_of(&c->floating[k].motions);
+        struct cpu_island *island = &c->islands[c->label[c->floating_bodies[c->floating[k].first_body]]];
         limit_take_rigid(&island->limit, &island->along, &rigid);
     }
     for (size_t p = 0; c->system->kinematic_count > 0 && p < c->system->contacts->pair_count; ++p) {
@@ -171,11 +171,11 @@ static void limit_energies(struct sadmm_context *c, int32_t *limited)
     add_impulses(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         const double factor = factor_of(c, i, bounces);
-        const int32_t loose = c->loose_of[c->label[i]];
+        const int32_t floating = c->floating_of[c->label[i]];
         if (factor == 1) continue;
         *limited += c->label[i] == i;
         if (!c->fast) continue;
-        if (loose >= 0) c->loose[loose].slow_down = factor;
+        if (floating >= 0) c->floating[floating].slow_down = factor;
         else
             for (int k = 0; k < 6; ++k) c->state[(size_t)i * ROW + (size_t)k] *= (real)factor;
     }
@@ -188,8 +188,8 @@ sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, stru
     CPU(find_motions)(c);
     if (!c->fast) prepare_paper(c);
     limit_energies(c, limited);
-    CPU(move_loose)(c);
+    CPU(move_floating)(c);
     /* residuals are recomputed, should anything follow */
-    if (c->fast && (*limited > 0 || c->loose_count > 0)) c->exact_since = RELAX_RESIDUAL_PERIOD;
+    if (c->fast && (*limited > 0 || c->floating_count > 0)) c->exact_since = RELAX_RESIDUAL_PERIOD;
     return SADMM_OK;
 }

@@ -1,5 +1,5 @@
-/* After the last iteration: momentum of loose islands that no contact may change (math/momentum.h). In double, from the
- * system's raw data and this precision's b and v; an island's sums go in the order of its bodies and pairs. */
+/* After the last iteration: momentum of floating islands that no contact may change (math/momentum.h). In double, from
+ * the system's raw data and this precision's b and v; an island's sums go in the order of its bodies and pairs. */
 #include "cpu_rows.h"
 
 /* Where body i is from the body that names its island. */
@@ -21,11 +21,11 @@ static void add_pair(const struct sadmm_context *c, const struct sadmm_contact_p
     }
 }
 
-static void find_motions(struct sadmm_context *c, struct cpu_loose *island)
+static void find_motions(struct sadmm_context *c, struct cpu_floating *island)
 {
     struct momentum_sums sums = {0};
     for (int32_t k = island->first_body; k < island->end_body; ++k) {
-        const size_t i = (size_t)c->loose_bodies[k];
+        const size_t i = (size_t)c->floating_bodies[k];
         double d[3], v[6], b[6];
         place_of(c, (int32_t)i, d);
         cpu_load_v(c, i, v);
@@ -33,17 +33,17 @@ static void find_motions(struct sadmm_context *c, struct cpu_loose *island)
         momentum_add_body(&sums, d, &c->A[i * PACKED6], v, b);
     }
     for (int32_t k = island->first_pair; k < island->end_pair; ++k)
-        add_pair(c, &c->system->contacts->pairs[c->loose_pairs[k]], sums.gram);
+        add_pair(c, &c->system->contacts->pairs[c->floating_pairs[k]], sums.gram);
     momentum_find_motions(&sums, &island->motions);
     island->slow_down = 1;
 }
 
-static void move(struct sadmm_context *c, const struct cpu_loose *island)
+static void move(struct sadmm_context *c, const struct cpu_floating *island)
 {
     double q[6];
     momentum_restoring(&island->motions, island->slow_down, q);
     for (int32_t k = island->first_body; k < island->end_body; ++k) {
-        const size_t i = (size_t)c->loose_bodies[k];
+        const size_t i = (size_t)c->floating_bodies[k];
         double d[3], v[6];
         place_of(c, (int32_t)i, d);
         cpu_load_v(c, i, v);
@@ -56,24 +56,24 @@ static void find_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
-    sadmm_share((size_t)c->loose_count, thread, threads, &begin, &end);
-    for (size_t k = begin; k < end; ++k) find_motions(c, &c->loose[k]);
+    sadmm_share((size_t)c->floating_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k) find_motions(c, &c->floating[k]);
 }
 
 static void move_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
-    sadmm_share((size_t)c->loose_count, thread, threads, &begin, &end);
-    for (size_t k = begin; k < end; ++k) move(c, &c->loose[k]);
+    sadmm_share((size_t)c->floating_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k) move(c, &c->floating[k]);
 }
 
 void CPU(find_motions)(struct sadmm_context *c)
 {
-    if (c->loose_count > 0) cpu_parallel(c, find_share, c);
+    if (c->floating_count > 0) cpu_parallel(c, find_share, c);
 }
 
-void CPU(move_loose)(struct sadmm_context *c)
+void CPU(move_floating)(struct sadmm_context *c)
 {
-    if (c->loose_count > 0) cpu_parallel(c, move_share, c);
+    if (c->floating_count > 0) cpu_parallel(c, move_share, c);
 }

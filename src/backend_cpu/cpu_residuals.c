@@ -1,4 +1,4 @@
-/* The method `fast`: what the momentum of bodies misses, r = b - A v + J^T lambda, before iterations change it by what
+/* The method `fast`: the momentum residual of bodies, r = b - A v + J^T lambda, before iterations change it by what
  * v and lambda change. In double, from this precision's b, v and lambda, in the order of a body's records. */
 #include "cpu_rows.h"
 

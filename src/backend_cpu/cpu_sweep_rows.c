@@ -49,13 +49,13 @@ static lanes inverse_weight(const struct sadmm_context *c, const struct row_bloc
     return out;
 }
 
-/* lambda^ of a contact's three rows and the change, by what is missing of x + e = 0 (math/contact.h). */
-static inline void solve_cone(const struct row_block *block, const struct row_slot *slots, const lanes missing[6],
+/* lambda^ of a contact's three rows and the change, by the residual of x + e = 0 (math/contact.h). */
+static inline void solve_cone(const struct row_block *block, const struct row_slot *slots, const lanes residual[6],
                               bool changes, lanes delta[6], lanes lambda[6])
 {
     lanes step[3], y[3];
     for (int r = 0; r < 3; ++r) {
-        step[r] = missing[r] * block->inv_s;
+        step[r] = residual[r] * block->inv_s;
         y[r] = slots[r].lambda - step[r];
     }
     const struct lane_law law = lane_law_of(y[0], y[1] * y[1] + y[2] * y[2], block->friction);
@@ -68,14 +68,14 @@ static inline void solve_cone(const struct row_block *block, const struct row_sl
 }
 
 /* The same of scalar rows (math/row.h). */
-static inline void solve_scalars(const struct row_block *block, const struct row_slot *slots, const lanes missing[6],
+static inline void solve_scalars(const struct row_block *block, const struct row_slot *slots, const lanes residual[6],
                                  lanes delta[6], lanes lambda[6])
 {
     lanes along = {0};
-    for (int r = 0; r < block->slots; ++r) along += slots[r].along * missing[r];
+    for (int r = 0; r < block->slots; ++r) along += slots[r].along * residual[r];
     for (int r = 0; r < block->slots; ++r) {
         const struct row_slot *slot = &slots[r];
-        lanes change = -(slot->step * missing[r] + slot->along * along), next = slot->lambda + change;
+        lanes change = -(slot->step * residual[r] + slot->along * along), next = slot->lambda + change;
         lambda[r] = pick(next < slot->lo, slot->lo, pick(next > slot->hi, slot->hi, next));
         delta[r] = pick((next < slot->lo) | (next > slot->hi), lambda[r] - slot->lambda, change);
     }
@@ -93,7 +93,7 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
         return;
     }
     const row8 *state = (const row8 *)c->state;
-    lanes va[ROW], vb[ROW], missing[6], delta[6], lambda[6], largest = {0};
+    lanes va[ROW], vb[ROW], residual[6], delta[6], lambda[6], largest = {0};
 #define ROW_A(l) state[block->body_a[l]]
 #define ROW_B(l) state[block->body_b[l]]
     LOAD_ROWS(va, ROW_A);
@@ -104,10 +104,10 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
     for (int r = 0; r < count; ++r) {
         const struct row_slot *slot = &slots[r];
         lanes x = row_velocity(slot, va, vb);
-        missing[r] = cone ? x + slot->bias : slot->gain * x + slot->bias + slot->compliance * slot->lambda;
+        residual[r] = cone ? x + slot->bias : slot->gain * x + slot->bias + slot->compliance * slot->lambda;
     }
-    if (cone) solve_cone(block, slots, missing, cpu_sweep_passes_changes(sweep), delta, lambda);
-    else solve_scalars(block, slots, missing, delta, lambda);
+    if (cone) solve_cone(block, slots, residual, cpu_sweep_passes_changes(sweep), delta, lambda);
+    else solve_scalars(block, slots, residual, delta, lambda);
     for (int r = 0; r < count; ++r) {
         struct row_slot *slot = &slots[r];
         if (cpu_sweep_measures(sweep)) largest = larger(largest, magnitude(delta[r]) * inverse_weight(c, block, r));

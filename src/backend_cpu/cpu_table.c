@@ -15,8 +15,8 @@ void CPU(destroy)(struct sadmm_context *c)
                       c->H_columns, c->pair_blocks, c->slots, c->pair_order, c->row_blocks, c->row_slots, c->row_order,
                       c->row_weights, c->general_of, c->general_bodies, c->general_lanes, c->wrenches, c->change,
                       c->offsets, c->incident, c->thread_max, c->label, c->islands, c->A_inverse, c->pair_response,
-                      c->pair_weight, c->pair_violation, c->body_sums, c->loose_of, c->loose, c->loose_bodies,
-                      c->loose_pairs, c->touch, c->trapezoids, c->pair_arms};
+                      c->pair_weight, c->pair_violation, c->body_sums, c->floating_of, c->floating, c->floating_bodies,
+                      c->floating_pairs, c->touch, c->trapezoids, c->pair_arms};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(c);
 }

@@ -1,5 +1,5 @@
-/* The method `fast`: weight scales of the islands (math/weight.h), from what contacts and momentum miss. In double;
- * sums over an island go in the order of pairs and of bodies. */
+/* The method `fast`: weight scales of the islands (math/weight.h), from the residuals of contacts and momentum. In
+ * double; sums over an island go in the order of pairs and of bodies. */
 #include "core/math/array3.h"
 #include "core/math/weight.h"
 #include "cpu_rows.h"
@@ -35,7 +35,7 @@ void CPU(add_up_imbalance)(struct sadmm_context *c, int thread, int threads)
         if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0) c->pair_violation[k] = pair_violation(c, k);
 }
 
-static void add_up_misses(struct sadmm_context *c)
+static void add_up_residuals(struct sadmm_context *c)
 {
     for (int32_t i = 0; i < c->bodies; ++i)
         c->islands[c->label[i]].sums.momentum_residual += c->body_sums[BODY_SUMS * i + 3];
@@ -48,7 +48,7 @@ static void add_up_misses(struct sadmm_context *c)
 
 void CPU(update_weight_scales)(struct sadmm_context *c)
 {
-    add_up_misses(c);
+    add_up_residuals(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct cpu_island *island = &c->islands[i];
         if (c->label[i] == i && !island->rows) island->rescale = weight_rescale(&island->weights, &island->sums);

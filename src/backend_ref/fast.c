@@ -177,10 +177,10 @@ static double pair_violation(const struct sadmm_context *c, const struct sadmm_c
     double w = pair_response(c, pair), sum = 0;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct ref_constraint *constraint = &c->constraints[k];
-        double u[6] = {0}, missing[3];
+        double u[6] = {0}, residual[3];
         slip(c, constraint, u);
-        contact_missing_rows(constraint->lambda, u, constraint->mu, w, missing);
-        for (int r = 0; r < constraint->rows; ++r) sum += w * missing[r] * missing[r];
+        contact_residual_rows(constraint->lambda, u, constraint->mu, w, residual);
+        for (int r = 0; r < constraint->rows; ++r) sum += w * residual[r] * residual[r];
     }
     return sum;
 }

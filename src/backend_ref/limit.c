@@ -57,7 +57,7 @@ static double factor_of(struct ref_body *island, bool bounces)
 {
     const struct momentum_energies rigid = momentum_energies_of(&island->motions);
     if (island->rows) return 1; /* the energies are those of contacts alone */
-    if (island->loose) limit_take_rigid(&island->limit, &island->along, &rigid);
+    if (island->floating) limit_take_rigid(&island->limit, &island->along, &rigid);
     double factor = limit_factor(&island->limit, DBL_EPSILON);
     if (bounces) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
     return factor;

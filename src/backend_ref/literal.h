@@ -56,7 +56,7 @@ struct ref_body {
     /* of the island that it names, in either method */
     struct momentum_sums momentum;
     struct momentum_motions motions;
-    bool loose;                      /* it has contacts, and none is known to hold it */
+    bool floating;                   /* it has contacts, and none is known to anchor it */
     double slow_down;                /* the factor of its velocities, but for those motions */
     double impulse[6];               /* sums over the body's constraints */
     double correction[6];            /* its own correction (math/trapezoid.h) */

@@ -63,24 +63,24 @@ static void add_static_rows(struct sadmm_context *c, const struct ref_constraint
     }
 }
 
-/* Islands that have contacts and no more, none of which is known to hold them. */
-static void find_loose(struct sadmm_context *c)
+/* Islands that have contacts and no more, none of which is known to anchor them. */
+static void find_floating(struct sadmm_context *c)
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
-    for (int32_t i = 0; i < c->system->body_count; ++i) c->bodies[i].loose = false;
-    for (size_t k = 0; k < contacts->point_count; ++k) island_of(c, &c->constraints[k])->loose = true;
+    for (int32_t i = 0; i < c->system->body_count; ++i) c->bodies[i].floating = false;
+    for (size_t k = 0; k < contacts->point_count; ++k) island_of(c, &c->constraints[k])->floating = true;
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
         struct arm_sums arms = {0};
         if (sadmm_pair_rolls(pair, &contacts->points[pair->first]))
-            island_of(c, &c->constraints[pair->first])->loose = false;
+            island_of(c, &c->constraints[pair->first])->floating = false;
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
             add_arm(&arms, pair->body_a >= 0 ? contacts->points[k].arm_a : contacts->points[k].arm_b, 1);
-        if ((pair->body_a < 0 || pair->body_b < 0) && momentum_is_held(pair->friction, &arms))
-            island_of(c, &c->constraints[pair->first])->loose = false;
+        if ((pair->body_a < 0 || pair->body_b < 0) && momentum_is_anchored(pair->friction, &arms))
+            island_of(c, &c->constraints[pair->first])->floating = false;
     }
     for (size_t k = contacts->point_count; k < c->constraint_count; ++k)
-        island_of(c, &c->constraints[k])->loose = false;
+        island_of(c, &c->constraints[k])->floating = false;
 }
 
 void sadmm_ref_find_motions(struct sadmm_context *c)
@@ -89,7 +89,7 @@ void sadmm_ref_find_motions(struct sadmm_context *c)
         memset(&c->bodies[i].momentum, 0, sizeof c->bodies[i].momentum);
         c->bodies[i].motions.count = 0;
     }
-    find_loose(c);
+    find_floating(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) add_body(c, i);
     for (size_t k = 0; k < c->constraint_count; ++k) {
         const struct ref_constraint *constraint = &c->constraints[k];
@@ -98,7 +98,7 @@ void sadmm_ref_find_motions(struct sadmm_context *c)
     }
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
-        if (body->label == i && body->loose) momentum_find_motions(&body->momentum, &body->motions);
+        if (body->label == i && body->floating) momentum_find_motions(&body->momentum, &body->motions);
     }
 }
 
@@ -108,7 +108,7 @@ void sadmm_ref_move_island(struct sadmm_context *c, int32_t i, double factor)
     const struct ref_body *island = &c->bodies[body->label];
     double G[36], q[6], step[6];
     for (int j = 0; j < 6; ++j) body->v[j] *= factor;
-    if (!island->loose) return;
+    if (!island->floating) return;
     rigid_motion(c, i, G);
     momentum_restoring(&island->motions, factor, q);
     dense6_mul(G, q, step);

@@ -18,7 +18,7 @@
 
 enum {
     OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_SUBSTEPS, OPTION_METHOD,
-    OPTION_ITERATIONS, OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_DIRECT_POINTS, OPTION_PENALTY_PERIOD,
+    OPTION_ITERATIONS, OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_NCP_POINTS, OPTION_PENALTY_PERIOD,
     OPTION_THREADS, OPTION_SET, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP, OPTION_QUIET
 };
 
@@ -33,7 +33,7 @@ static const struct cli_option options[] = {
     [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's for the method)"},
     [OPTION_TOLERANCE] = {"tolerance", "T",
                           "end a step's iterations once its true error is below T, m/s (default never)"},
-    [OPTION_DIRECT_POINTS] = {"direct-points", "N", "joints: islands of at most N contact points are solved directly, 0 = none"},
+    [OPTION_NCP_POINTS] = {"ncp-points", "N", "joints: dense contact solve of islands of at most N contact points"},
     [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between convergence checks (default 10)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "paper: iterations between penalty updates, 0 = never"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads at most, 0 = as many as pay (default)"},
@@ -63,7 +63,7 @@ struct run_options {
     sadmm_method method;
     long steps, iterations, penalty_period, threads; /* -1: the scene's */
     long check_period, substeps;                     /* 0: the scene's */
-    long direct_points;                              /* -1: the scene's */
+    long ncp_points;                                 /* -1: the scene's */
     double dt, tolerance;                            /* 0: the scene's */
     long device;
     bool no_warm_start, certify, explain, quiet, precision_given, method_given;
@@ -125,8 +125,8 @@ static int set_option(void *target, size_t index, const char *value)
         break;
     case OPTION_ITERATIONS: ok = cli_read_int("--iterations", value, 1, 1000000, &o->iterations); break;
     case OPTION_TOLERANCE: ok = cli_read_real("--tolerance", value, 0, 1, &o->tolerance); break;
-    case OPTION_DIRECT_POINTS:
-        ok = cli_read_int("--direct-points", value, 0, SADMM_MOST_DIRECT_POINTS, &o->direct_points);
+    case OPTION_NCP_POINTS:
+        ok = cli_read_int("--ncp-points", value, 0, SADMM_MOST_NCP_POINTS, &o->ncp_points);
         break;
     case OPTION_CHECK_PERIOD: ok = cli_read_int("--check-period", value, 1, 1000000, &o->check_period); break;
     case OPTION_PENALTY_PERIOD: ok = cli_read_int("--penalty-period", value, 0, 1000000, &o->penalty_period); break;
@@ -154,7 +154,7 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     if (o->substeps > 0) s->substeps = (int)o->substeps;
     if (o->iterations >= 0) s->iterations = (int)o->iterations;
     if (o->tolerance > 0) s->certificate_tolerance = o->tolerance;
-    if (o->direct_points >= 0) s->direct_points = (int)o->direct_points;
+    if (o->ncp_points >= 0) s->ncp_points = (int)o->ncp_points;
     if (o->check_period > 0) s->check_period = (int)o->check_period;
     /* rounding alone is more than the default in single precision */
     if (o->tolerance > 0 && scene->def.precision == SADMM_F32) s->certificate_momentum_tolerance = 1e-5;
@@ -354,7 +354,7 @@ static int check_options(const struct run_options *o, const struct sadmm_scene *
 static int run(int argc, char **argv)
 {
     struct run_options o = {
-        .steps = -1, .iterations = -1, .penalty_period = -1, .threads = -1, .direct_points = -1};
+        .steps = -1, .iterations = -1, .penalty_period = -1, .threads = -1, .ncp_points = -1};
     struct sadmm_scene scene;
     struct sadmm_error error = {0};
     struct output *json, *trace;

@@ -343,13 +343,13 @@ SADMM_CALLED bool convex_rim_crossing(const struct convex_meeting *m, const stru
     r = v3_scale(v3_madd(e2, -v3_dot(a->normal, e2) / tilt, m->n), b->radius);
     for (step = 0; step < STEPS; ++step) {
         const vec3 y = v3_madd(v3_madd(p, c, q), s, r);
-        const real miss = v3_norm2(y) - wanted, slope = 2 * v3_dot(y, v3_sub(v3_scale(r, c), v3_scale(q, s)));
+        const real residual = v3_norm2(y) - wanted, slope = 2 * v3_dot(y, v3_sub(v3_scale(r, c), v3_scale(q, s)));
         real turn, length, old = c;
-        if (real_abs(miss) <= close) {
+        if (real_abs(residual) <= close) {
             *on_b = v3_madd(v3_madd(b->centre, c * b->radius, e1), s * b->radius, e2);
             return true;
         }
-        turn = miss / slope;
+        turn = residual / slope;
         if (!(real_abs(turn) < (real)0.5)) return false; /* they touch, or pass */
         c += s * turn;
         s -= old * turn;

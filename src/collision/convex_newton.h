@@ -222,7 +222,7 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
     struct convex_active now = *active, best = *active;
     const struct difference_point zero = {{0, 0, 0}, 0, 0};
     vec3 at = *n, best_at = *n;
-    real s, least_reach = -(*separation + convex_radii(pair)), length = 2, last = 2, first = 0, miss = 0;
+    real s, least_reach = -(*separation + convex_radii(pair)), length = 2, last = 2, first = 0, residual = 0;
     bool certain = false, failed = false, singular = true; /* until a step has said what the Hessian is */
     int step, ended = 0, back = 0;
     for (step = 0;; ++step) {
@@ -263,8 +263,8 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
         lack = reach - mean;
         off = real_sqrt(off0 * off0 + off1 * off1);
         certain = lack + convex_gain(off, mean, length) <= 8 * pair->slack && !(singular && mean > 8 * pair->slack);
-        miss = lack + off;
-        if (step == 0) first = miss;
+        residual = lack + off;
+        if (step == 0) first = residual;
         if (step == CONVEX_STEPS || (certain && off <= pair->slack)) break;
         if (length <= 16 * SADMM_EPSILON || (length >= last / 2 && length < (real)1e-3)) { /* rounding ends it */
             if (convex_is_active(&now, &next) && (!certain || ++ended == 3)) break;
@@ -331,7 +331,8 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
         s = convex_separation(pair, at);
     }
     if (!(s >= *separation - pair->slack / 4)) return false;
-    if (!certain && s <= *separation + pair->slack && miss > first) return false; /* the points were better before */
+    /* the points were better before */
+    if (!certain && s <= *separation + pair->slack && residual > first) return false;
     *active = now;
     *n = at;
     *separation = s;

@@ -393,7 +393,7 @@ static sadmm_status set_settings(struct machine *m)
     case 3: s.substeps = take_choice(&m->in, 4); break;
     case 4: s.certify = take_choice(&m->in, 2); break;
     case 5: s.correction_speed = take_number(&m->in, 0, 1e3); break;
-    case 6: s.direct_points = take_byte(&m->in); break; /* some beyond the range */
+    case 6: s.ncp_points = take_byte(&m->in); break; /* some beyond the range */
     default: take_vector(&m->in, -20, 20, s.gravity); break;
     }
     return sadmm_world_set_settings(m->world, &s);

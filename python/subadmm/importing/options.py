@@ -5,7 +5,7 @@ import numpy as np
 from .model import element
 
 
-DIRECT_POINTS = 64  # contact points of an island that is solved directly, at most
+NCP_POINTS = 64  # contact points of an island that takes the dense contact solve, at most
 
 
 def disabled(source, flag):
@@ -16,12 +16,12 @@ def disabled(source, flag):
 
 
 def settings_of(source, backend):
-    """The file's. Contacts of the robots are solved directly, but on a device, where that would bring every step to the host."""
+    """The file's. Contacts of robots: dense contact solve, but on a device, where the host would make every step."""
     from .. import Settings
 
     gravity = [0.0, 0, 0] if disabled(source, "GRAVITY") else list(source.opt.gravity)
-    points = 0 if backend == "cuda" else DIRECT_POINTS
-    return Settings(dt=float(np.clip(source.opt.timestep, 1e-6, 1)), gravity=gravity, iterations=60, direct_points=points)
+    points = 0 if backend == "cuda" else NCP_POINTS
+    return Settings(dt=float(np.clip(source.opt.timestep, 1e-6, 1)), gravity=gravity, iterations=60, ncp_points=points)
 
 
 def report_options(source, report):

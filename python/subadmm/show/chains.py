@@ -145,15 +145,15 @@ class Finger:
             place, now, joints = self.at(values)
             size = max(max(np.linalg.norm(place - point) for point, _ in joints), 1e-6)
             turned = multiply(turn, now * [1, -1, -1, -1])
-            missing = np.concatenate([goal - place, 2 * size * np.copysign(1, turned[0]) * turned[1:]])
-            if np.linalg.norm(missing) < _REACH * size:
+            residual = np.concatenate([goal - place, 2 * size * np.copysign(1, turned[0]) * turned[1:]])
+            if np.linalg.norm(residual) < _REACH * size:
                 break
             columns = [np.concatenate([np.cross(axis, place - point), size * axis]) if joint.is_angle
                        else np.concatenate([axis, np.zeros(3)])
                        for joint, (point, axis) in zip(self.chain.joints, joints)]
             matrix = np.array(columns).T
             square = matrix.T @ matrix + (_DAMPING * size) ** 2 * np.eye(len(values))
-            values = np.clip(values + np.linalg.solve(square, matrix.T @ missing), low, high)
+            values = np.clip(values + np.linalg.solve(square, matrix.T @ residual), low, high)
         return values
 
 

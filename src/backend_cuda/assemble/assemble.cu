@@ -25,7 +25,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         v.push.units[i] = 0;
     }
     if (args.paper && ENERGIES) {
-        v.islands.info[i].held = v.islands.info[i].rows = 0;
+        v.islands.info[i].anchored = v.islands.info[i].rows = 0;
         v.islands.info[i].slow_down = 1;
     }
     const bool stiffened = JOINTS && stiffen_body(v, i, false);
@@ -42,8 +42,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     } else {
         sadmm_system_body(&v.raw.system, &settings, i, A, b);
     }
-    if (stiffened) take_joined_body(stiffened_body(v, i), A, b);
-    if (JOINTS && v.joints.is_direct[i]) v.joints.bodies[i] = joined_body_of(A, b);
+    if (stiffened) take_articulation_body(stiffened_body(v, i), A, b);
+    if (JOINTS && v.joints.is_articulated[i]) v.joints.bodies[i] = articulation_body_of(A, b);
     put_body<ENERGIES>(v, i, A, b);
 }
 
@@ -109,10 +109,11 @@ static __device__ __noinline__ int32_t store_kinematic(const cuda_view &v, const
     return row;
 }
 
-static __device__ __forceinline__ bool touches_joined(const joint_view &joints, const struct sadmm_contact_pair *pair)
+static __device__ __forceinline__ bool touches_articulation(const joint_view &joints,
+                                                            const struct sadmm_contact_pair *pair)
 {
-    return (pair->body_a >= 0 && joints.is_direct[pair->body_a]) ||
-           (pair->body_b >= 0 && joints.is_direct[pair->body_b]);
+    return (pair->body_a >= 0 && joints.is_articulated[pair->body_a]) ||
+           (pair->body_b >= 0 && joints.is_articulated[pair->body_b]);
 }
 
 /* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST:
@@ -126,7 +127,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);
     const struct sadmm_contact_pair *pair = wide_at(v.raw.pairs, live ? (size_t)p : 0);
-    if (v.joints.count > 0 && live && lane == 0 && touches_joined(v.joints, pair)) v.step.control->joints.together = 1;
+    if (v.joints.count > 0 && live && lane == 0 && touches_articulation(v.joints, pair))
+        v.step.control->joints.together = 1;
     if (!FAST && !live) return;
     /* Those that count are fetched here, not where they are needed. */
     const struct sadmm_settings settings = *v.model.settings;

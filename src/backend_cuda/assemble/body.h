@@ -67,13 +67,15 @@ static __device__ __forceinline__ void put_body(const cuda_view &v, int32_t i, c
 
 /* ---- of bodies with joints --------------------------------------------------------------------------------------- */
 
-static __device__ __forceinline__ struct cuda_joined_body joined_body_of(const double A[36], const double b[6])
+static __device__ __forceinline__ struct cuda_articulation_body articulation_body_of(const double A[36],
+                                                                                     const double b[6])
 {
-    const struct cuda_joined_body body = {A[0],  {A[21], A[28], A[35], A[22], A[23], A[29]},
-                                          {b[0], b[1], b[2], b[3], b[4], b[5]}};
+    const struct cuda_articulation_body body = {A[0],  {A[21], A[28], A[35], A[22], A[23], A[29]},
+                                                {b[0], b[1], b[2], b[3], b[4], b[5]}};
     return body;
 }
-static __device__ __forceinline__ void take_joined_body(const struct cuda_joined_body &body, double A[36], double b[6])
+static __device__ __forceinline__ void take_articulation_body(const struct cuda_articulation_body &body, double A[36],
+                                                              double b[6])
 {
     for (int k = 0; k < 36; ++k) A[k] = 0;
     A[0] = A[7] = A[14] = body.mass;
@@ -83,18 +85,18 @@ static __device__ __forceinline__ void take_joined_body(const struct cuda_joined
 }
 
 /* A and b of body i with what joints stiffen it by. */
-static __device__ __noinline__ struct cuda_joined_body stiffened_body(const cuda_view &v, int32_t i)
+static __device__ __noinline__ struct cuda_articulation_body stiffened_body(const cuda_view &v, int32_t i)
 {
     const struct sadmm_settings settings = *v.model.settings;
     const struct sadmm_rigid body = stiffened_rigid(v, i);
     const struct spin_system spin = spin_of_system(&body, settings.dt);
     double A[36], b[6];
     sadmm_system_rigid(&v.raw.system, &settings, &body, &spin, i, A, b);
-    return joined_body_of(A, b);
+    return articulation_body_of(A, b);
 }
 
-/* Force of joint j on the body at its side s. found: by the multipliers of the direct solve, else by those that the step
- * starts with. */
+/* Force of joint j on the body at its side s. found: by the multipliers of the block direct solve, else by those that
+ * the step starts with. */
 static __device__ __forceinline__ vec3 joint_force(const cuda_view &v, int32_t j, int s, bool found, double dt)
 {
     const int32_t first = v.joints.first[j], constraints = v.joints.joints[j].constraints;

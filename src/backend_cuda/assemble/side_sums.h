@@ -10,9 +10,9 @@
 
 #include "core/math/momentum.h"
 
-/* Numbers of side_wrench: force and torque, then the force's size, and 1 where the pair holds its island
+/* Numbers of side_wrench: force and torque, then the force's size, and 1 where the pair anchors its island
  * (math/momentum.h), as a solve begins; ROW in all. */
-enum { SIDE_PUSH = 6, SIDE_HOLDS };
+enum { SIDE_PUSH = 6, SIDE_ANCHORS };
 /* Those of side_arms (device/view.h) are in this precision, and sums only where contacts have three rows: else C
  * depends on normals. */
 static_assert(sizeof(struct arm_sums) == SIDE_ARMS * sizeof(double), "numbers are taken one by one");
@@ -122,7 +122,7 @@ struct side_numbers {
 
 /* share: 1 / count. The response, which needs both sides, is stored by store_sides. */
 static __device__ __forceinline__ void store_side(const weight_view &weights, int32_t p, int32_t side, int32_t count,
-                                                  double share, bool first, bool holds, const struct pair_sums *sums)
+                                                  double share, bool first, bool anchors, const struct pair_sums *sums)
 {
     const double sign = side ? 1 : -1, *f = sums->force;
     const size_t at = (size_t)(2 * p + side);
@@ -134,7 +134,7 @@ static __device__ __forceinline__ void store_side(const weight_view &weights, in
         wrench.of[j + 3] = sign * sums->torque[j];
     }
     wrench.of[SIDE_PUSH] = length3(f);
-    wrench.of[SIDE_HOLDS] = holds;
+    wrench.of[SIDE_ANCHORS] = anchors;
     store_row(wrench, weights.side_wrench, at);
     if (!first) {
         weights.side_arms[at * SIDE_NUMBERS + SIDE_LOAD] = load;
@@ -156,16 +156,16 @@ static __device__ __forceinline__ int32_t side_of_lane(const contact_view &conta
     return contacts.lanes == 1 ? -1 : lane;
 }
 
-/* Does the pair hold its island, one of its bodies being static? */
-static __device__ __forceinline__ bool pair_holds(const model_view &model, int32_t count, const pair_bodies &joined,
-                                                  double friction, const struct pair_sums *sums)
+/* Does the pair anchor its island, one of its bodies being static? */
+static __device__ __forceinline__ bool pair_anchors(const model_view &model, int32_t count, const pair_bodies &joined,
+                                                    double friction, const struct pair_sums *sums)
 {
     if (count < 3 || model.contact_rows == 1) return false;
     if (joined.body_a < model.bodies && joined.body_b < model.bodies) return false;
     struct arm_sums arms = {(double)count, {sums->r[0], sums->r[1], sums->r[2]}, {}};
 #pragma unroll
     for (int j = 0; j < 6; ++j) arms.rr[j] = sums->rr[j];
-    return momentum_is_held(friction, &arms);
+    return momentum_is_anchored(friction, &arms);
 }
 
 /* The records of a pair from its lanes' sums. `first`: also what depends on arms alone; rolls: sadmm_pair_rolls.
@@ -183,13 +183,13 @@ static __device__ __forceinline__ void store_sides(const model_view &model, cons
     sum_pair<0, LOAD_SUMS>(contacts, sums);
     if (first && model.contact_rows == 3) sum_pair<LOAD_SUMS, ARM_END>(contacts, sums);
     if (first && model.contact_rows == 1) sum_pair<ARM_END, PAIR_SUMS>(contacts, sums);
-    const bool holds = first && live && (rolls || pair_holds(model, count, joined, friction, sums));
+    const bool anchors = first && live && (rolls || pair_anchors(model, count, joined, friction, sums));
 #pragma unroll
     for (int32_t side = 0; side < 2; ++side) {
         const int32_t body = side ? joined.body_b : joined.body_a;
         if (side) shift_sums(sums, count, d);
         if (!live || body >= model.bodies || (own >= 0 && own != side)) continue;
-        store_side(weights, p, side, count, share, first, holds, sums);
+        store_side(weights, p, side, count, share, first, anchors, sums);
         if (!first) continue;
         response += side_response(model, bodies, side, body, count,
                                   own < 0 && bodies.rigid ? inverse_of_body(bodies, body) : inverse, sums);

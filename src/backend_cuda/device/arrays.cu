@@ -133,7 +133,7 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
     v->iteration.barrier = (unsigned *)(v->iteration.residual + 4); /* a sector of its own */
     v->islands.stop = (cuda_stop *)(v->iteration.residual + 8);
     v->islands.moved = (int32_t *)(v->iteration.residual + 11);
-    v->islands.loose = v->islands.moved + 1;
+    v->islands.floating = v->islands.moved + 1;
     v->islands.again = v->islands.moved + 2;
     v->raw.out = (double *)b[BUFFER_OUT].data;
     CUDA_CALL(c, cudaMemsetAsync(v->iteration.residual, 0, SCALAR_BYTES, c->stream), "cudaMemsetAsync(scalars)");

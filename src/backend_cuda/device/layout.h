@@ -40,7 +40,7 @@ struct cuda_live {
 
 /* Of the constraint graph; in device memory, copied to the host on demand. */
 struct cuda_graph_statistics {
-    int32_t islands;         /* bodies joined by constraints; a lone body is one; 0: not counted */
+    int32_t islands;         /* bodies connected by constraints; a lone body is one; 0: not counted */
     int32_t island_bodies, island_sides; /* of the largest (each maximum separately) */
     int32_t sides;          /* all */
     int32_t degree;          /* most sides of one body */

@@ -6,7 +6,7 @@
  *                 (where there are kinematic bodies A and b wait for the layout: step/kinematic.cu)
  *     admit       do they fit? Then they are this step's (cuda_live)
  *     statistics  of the constraint graph; islands (graph/layout.cu)
- *     layout      slots, sides, parts; beside it contacts in the solver's form (fast: behind joined bodies)
+ *     layout      slots, sides, parts; beside it contacts in the solver's form (fast: behind articulations)
  *     penalties   C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
  *     iterate     (15), new weights where asked for (the kernel table's own kernels); fast: convergence checks
  *     limit       fast: islands that have more energy than they may
@@ -20,9 +20,9 @@
  * (step_state). Each sub-step has a plan of its own; the first one's is known beforehand, those of others are taken to
  * be like it until the report of a step that failed says what they are.
  *
- * Joined bodies (step/joined.cu) are solved beside `layout`, or behind it where parts are large, and once more beside
- * `finish`. Where they are apart (cuda_step_guess) all about joints is a branch from `start` to `finish`, and whether
- * the step was one for that is known when it has come to its end.
+ * Articulations (step/articulation.cu) are solved beside `layout`, or behind it where parts are large, and once more
+ * beside `finish`. Where they are apart (cuda_step_guess) all about joints is a branch from `start` to `finish`, and
+ * whether the step was one for that is known when it has come to its end.
  *
  * Whether an island is pushed apart without a velocity (core/solve/push.h) is known when the step has been solved: its
  * contacts say so in `finish`. A step in which one is has a graph of its own: there they say so behind the layout, e of
@@ -69,8 +69,8 @@ struct cuda_step_totals {
 /* Joints and couplings that take part, constraints of their rows, those that start with a multiplier other than 0. */
 struct cuda_joint_counts {
     int32_t joints, couplings, constraints, warm;
-    int32_t together; /* not 0: bodies that they join have to iterate with the others: a contact touches them, they
-                         could not be solved directly, or a joint has no rows at the time */
+    int32_t together; /* not 0: bodies that they join have to iterate with the others: a contact touches them, an
+                         articulation could not be solved, or a joint has no rows at the time */
     int32_t sides;    /* of pairs, at such bodies, that are listed */
     unsigned long long drift; /* bits of the largest error of a locked translation that is left, m */
 };
@@ -114,8 +114,8 @@ struct cuda_step_guess {
     int32_t point_slots;
     int32_t warm;         /* most pairs, and constraints of joints, carry an impulse; -1: does not matter */
     int32_t rows;         /* there are constraints of joints; -1: there are no joints */
-    int32_t apart;        /* bodies that joints join do not iterate: they are solved directly, beside what else the
-                             step does */
+    int32_t apart;        /* articulations do not iterate: their block direct solve runs beside what else the step
+                             does */
 };
 
 struct cuda_step_view {

@@ -81,12 +81,13 @@ struct alignas(16) real4 {
     solver_real x, y, z, w;
 };
 
-/* Of an island, at its label. paper: slow_down and held alone, in worlds. */
+/* Of an island, at its label. paper: slow_down and anchored alone, in worlds. */
 struct cuda_island {
     struct weight_island weights;
     double rescale;      /* not 0: weights of pairs are those taken last, times this */
     double slow_down;    /* math/limit.h: the factor of its velocities */
-    int32_t held;        /* not loose (math/momentum.h): some pair holds it, nothing touches it, or there are rows */
+    int32_t anchored;    /* not floating (math/momentum.h): some pair anchors it, nothing touches it, or there are
+                            rows */
     int32_t rows;        /* there are constraints given by rows: the weight scale stays 1, energies have no limit; and,
                             once iterations have ended, a kinematic body pushes */
     int32_t stopped;     /* iterations after which a check found the tolerances met; 0: not yet */
@@ -104,7 +105,7 @@ struct cuda_stop {
 #define CLUSTER_ARCH 900
 
 enum { TERMS = 6 }; /* of a body, in sums over islands */
-/* The same of islands that are not held (iterate/motions.h): seven numbers a lane. */
+/* The same of floating islands (iterate/motions.h): seven numbers a lane. */
 enum { MOTION_NUMBERS = 7, MOTION_TERMS = MOTION_NUMBERS * LANES };
 
 /* Numbers of a side in side_arms (assemble/side_sums.h): sums over arms, as in arm_sums, then these. */
@@ -209,8 +210,8 @@ struct island_view {
     int32_t *touch;               /* worlds with contacts: bodies: bits (math/trapezoid.h), of the body and, at labels,
                                      of the island; else NULL */
     int32_t *again;               /* worlds: whether bodies have to be moved again; enum cuda_again */
-    int32_t *suspects;            /* not 0: some island that is held may have to be */
-    int32_t *loose;               /* fast: not 0: there are islands that are not held */
+    int32_t *suspects;            /* not 0: some anchored island may have to be */
+    int32_t *floating;            /* fast: not 0: there are floating islands */
     cuda_stop *stop;
 };
 
@@ -240,8 +241,8 @@ struct raw_view {
     double *out; /* results */
 };
 
-/* A and b of a body that is solved directly. */
-struct cuda_joined_body {
+/* A and b of a body of an articulation. */
+struct cuda_articulation_body {
     double mass, inertia[6], b[6]; /* xx, yy, zz, xy, xz, yz */
 };
 
@@ -259,19 +260,19 @@ struct cuda_closed_body {
     int32_t closed, unused;
 };
 
-/* A part of bodies that joints join: where the numbers of its structure begin, how many these are, and its work. */
-struct cuda_joined_part {
+/* An articulation, a part: where the numbers of its structure begin, how many these are, and its work. */
+struct cuda_articulation_part {
     int64_t first_number, first_work;
-    int32_t numbers, label; /* label: as in joint_view.is_direct */
+    int32_t numbers, label; /* label: as in joint_view.is_articulated */
     int32_t first_body, body_count; /* in joint_view.members */
-    int32_t loop, unused;           /* joined_has_loop */
+    int32_t loop, unused;           /* articulation_has_loop */
 };
 
 /* A side of a pair: code 2 pair + side, the number of its body in its part, points of the pair; and those of a part. */
-struct cuda_joined_side {
+struct cuda_articulation_side {
     int32_t code, entry, first, count;
 };
-struct cuda_joined_range {
+struct cuda_articulation_range {
     int32_t first, count;
 };
 
@@ -294,20 +295,21 @@ struct joint_view {
     const double *gear_before;      /* gears: force along the first coordinate, of the last (sub-)step; */
     double *gear_after;             /* of this one */
     int32_t apart;                  /* as in cuda_step_guess */
-    const int32_t *is_direct;       /* bodies: solved directly (step/joined.cu): 1 + the first body of its part; else 0.
-                                       Then constraints: not 0. Those: */
-    struct cuda_joined_body *bodies; /* bodies */
-    const struct cuda_joined_part *parts;
-    const int32_t *structures;      /* (core/model/joined.h) */
+    const int32_t *is_articulated;  /* bodies: of articulations (step/articulation.cu) 1 + the first body of its part;
+                                       else 0. Then constraints: not 0. Those: */
+    struct cuda_articulation_body *bodies; /* bodies */
+    const struct cuda_articulation_part *parts;
+    const int32_t *structures;      /* (core/model/articulation.h) */
     double *work;
     int32_t *folds;                 /* parts: a loop may fold (core/model/joint_close.h); */
     int32_t *kept;                  /* solved before the iterations; */
     uint8_t *kept_state;            /* rows: their state then */
     const int32_t *entry;           /* bodies: number in their part */
     const int32_t *members;         /* bodies of parts, ascending */
-    int32_t *pair_parts;            /* sides of pairs: as is_direct of the body. By it small parts find their contacts: */
-    struct cuda_joined_range *ranges; /* parts, into */
-    struct cuda_joined_side *sides;   /* part by part, ascending in a part; parts as they come */
+    int32_t *pair_parts;            /* sides of pairs: as is_articulated of the body. By it small parts find their
+                                       contacts: */
+    struct cuda_articulation_range *ranges; /* parts, into */
+    struct cuda_articulation_side *sides; /* part by part, ascending in a part; parts as they come */
     const int32_t *first_at, *joints_at; /* bodies + 1: joints at a body, ascending: 2 joint + its side */
     struct cuda_stiffening *stiffening; /* bodies: in the (sub-)step at hand */
     const int32_t *closing;         /* constraints: the joint whose locks are closed by its rows; -1: none */
@@ -419,7 +421,7 @@ static __device__ __forceinline__ int32_t live_rows(const model_view &model, con
 static __device__ __forceinline__ void clear_counts(const island_view &islands)
 {
     const cuda_stop none = {};
-    *islands.limited = *islands.suspects = *islands.loose = *islands.moved = 0;
+    *islands.limited = *islands.suspects = *islands.floating = *islands.moved = 0;
     for (int k = 0; k < AGAIN_WHYS; ++k) islands.again[k] = 0;
     *islands.stop = none;
 }

@@ -77,7 +77,7 @@ static __device__ __forceinline__ double factor_of(const struct limit_energies &
     return bounces ? min_of(allowed, limit_bounce_factor(&energies, along, SOLVER_EPSILON)) : allowed;
 }
 
-/* What follows from their sums over an island that is held; !slows: it is counted, no more. One thread of it. */
+/* What follows from their sums over an anchored island; !slows: it is counted, no more. One thread of it. */
 static __device__ __forceinline__ void limit_island(const island_view &islands, cuda_island *island,
                                                     const double sum[TERMS], bool bounces, bool slows)
 {

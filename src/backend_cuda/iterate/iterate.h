@@ -21,7 +21,7 @@ sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *, int done, s
  * iterations have found out whether any is. */
 /* Before the limit: islands that kinematic bodies push are left alone, if there are any. */
 sadmm_status CUDA(enqueue_pushed)(struct sadmm_context *, struct sadmm_error *error);
-/* motions: once it is known what is held; before the limit. */
+/* motions: once it is known what is anchored; before the limit. */
 sadmm_status CUDA(enqueue_motions)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct sadmm_error *error);
 

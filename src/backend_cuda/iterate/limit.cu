@@ -1,16 +1,16 @@
 /* After the last iteration: momentum that no contact may change is restored (iterate/motions.h), and in the method
  * `fast` energies are limited (math/limit.h). In double, from this precision's data; once a step, eight lanes a body.
  *
- *   motions   of islands that are not held: which may be restored (beside the iterations, where these do not find out
- *             themselves what is held)
- *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does that is
- *             held. Persistent kernels test that themselves, those of tier BLOCK see to the rest too
+ *   motions   of floating islands: which may be restored (beside the iterations, where these do not find out
+ *             themselves what is anchored)
+ *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no anchored island does.
+ *             Persistent kernels test that themselves, those of tier BLOCK see to the rest too
  *   limit     energies and work, sums over islands (weight/island_sums.h), the factor of each island's velocities: of
- *             islands that are held, if there is such a body; of the others in any case, and the rigid motion that
+ *             anchored islands, if there is such a body; of floating ones in any case, and the rigid motion that
  *             restores their momentum. Whole steps apply both where they move bodies (step/move.h)
  *
- * paper: if there is such a body, islands with too much energy are counted, and left as they are; those that are not
- * held get that motion in any case.
+ * paper: if there is such a body, islands with too much energy are counted, and left as they are; floating ones get
+ * that motion in any case.
  */
 #include <string.h>
 
@@ -49,9 +49,9 @@ static __device__ __forceinline__ double energies_in_lanes(const cuda_view &v, c
     return v.bodies.rigid ? energies_of_body<true>(v, t, on) : general_energies(v, t, on);
 }
 
-/* Islands of bodies that are `on`, which are held. Every lane of the warp comes here. */
-static __device__ __forceinline__ void limit_held(const cuda_view &v, const cuda_args &args, const body_thread &t,
-                                                  bool on, double term)
+/* Anchored islands of bodies that are `on`. Every lane of the warp comes here. */
+static __device__ __forceinline__ void limit_anchored(const cuda_view &v, const cuda_args &args, const body_thread &t,
+                                                      bool on, double term)
 {
     double total[TERMS];
     if (add_up_island<add_terms>(v.graph, v.islands, t, on, term, total) && t.lane == 0)
@@ -63,9 +63,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 {
     wait_for_stream();
     let_next_begin(v.model.bodies);
-    if (!args.paper && !*v.islands.loose) return; /* paper does not ask */
+    if (!args.paper && !*v.islands.floating) return; /* paper does not ask */
     const body_thread t = body_of_thread(v.model, v.graph);
-    find_motions(v, t, is_loose(v, t));
+    find_motions(v, t, is_floating(v, t));
 }
 
 /* So many blocks have registers on a multiprocessor at once: large scenes run in waves of them. */
@@ -78,13 +78,14 @@ static __global__ void __launch_bounds__(BODY_THREADS, LIMIT_BLOCKS)
     const int32_t label = t.live ? v.graph.label[t.body] : 0;
     wait_for_stream();
     let_next_begin(v.model.bodies);
-    const bool loose = v.islands.motions && t.live && !v.islands.info[label].held; /* neither waits for the other */
-    const bool suspected = *v.islands.suspects != 0, held = t.live && suspected && !loose;
-    if (__ballot_sync((unsigned)ALL_LANES, loose || held) == 0) return;
+    /* neither waits for the other */
+    const bool floating = v.islands.motions && t.live && !v.islands.info[label].anchored;
+    const bool suspected = *v.islands.suspects != 0, anchored = t.live && suspected && !floating;
+    if (__ballot_sync((unsigned)ALL_LANES, floating || anchored) == 0) return;
     const bool energies = suspected || !args.paper;
-    const double term = energies ? energies_in_lanes(v, t, loose || held) : 0;
-    if (suspected) limit_held(v, args, t, held, term);
-    if (v.islands.motions) restore_islands(v, t, loose, energies, term, args.bounces, !args.paper);
+    const double term = energies ? energies_in_lanes(v, t, floating || anchored) : 0;
+    if (suspected) limit_anchored(v, args, t, anchored, term);
+    if (v.islands.motions) restore_islands(v, t, floating, energies, term, args.bounces, !args.paper);
 }
 
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)

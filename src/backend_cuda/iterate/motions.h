@@ -1,4 +1,4 @@
-/* The momentum of islands that are not held (math/momentum.h), and by what their other motions are slowed down: sums
+/* The momentum of floating islands (math/momentum.h), and by what their other motions are slowed down: sums
  * over the bodies of an island, and the rigid motion that restores its momentum. In double, from the raw contacts and
  * this precision's b and v; eight lanes a body.
  *
@@ -23,10 +23,10 @@ static_assert(sizeof(struct momentum_sums) == MOMENTUM_SUMS * sizeof(double), "n
 static_assert((int)MOTION_SUMS <= (int)MOTION_TERMS, "there is memory for them");
 static_assert(1 + 36 + 6 <= (int)MOMENTUM_SUMS, "and for motions in the place of sums");
 
-/* Is the body one of an island that is not held? */
-static __device__ __forceinline__ bool is_loose(const cuda_view &v, const body_thread &t)
+/* Is the body one of a floating island? */
+static __device__ __forceinline__ bool is_floating(const cuda_view &v, const body_thread &t)
 {
-    return t.live && !v.islands.info[v.graph.label[t.body]].held;
+    return t.live && !v.islands.info[v.graph.label[t.body]].anchored;
 }
 
 /* Adds a static pair on `side`, its body at d. */

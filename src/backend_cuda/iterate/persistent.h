@@ -127,7 +127,7 @@ static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v,
     if constexpr (PROLOGUE) {
         if (suspected) block.flags[FLAG_SUSPECTED] = 1;
         block_barrier<SIZE>();
-        if (block.flags[FLAG_SUSPECTED] || block.flags[FLAG_LOOSE])
+        if (block.flags[FLAG_SUSPECTED] || block.flags[FLAG_FLOATING])
             limit_in_block(v, args.bounces, block, [] { block_barrier<SIZE>(); });
     }
 }
@@ -150,10 +150,10 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     const auto barrier = [] { block_barrier<SIZE>(); };
     const block_part block = part.for_prologue();
     const bool begins = PROLOGUE && args.begin;
-    /* islands that are not held: this kernel finds them out as it begins, or an earlier one has */
+    /* floating islands: this kernel finds them out as it begins, or an earlier one has */
     if (PROLOGUE && threadIdx.x == 0) {
         block.flags[FLAG_SUSPECTED] = 0;
-        block.flags[FLAG_LOOSE] = begins || args.limit != LIMIT_WHOLE ? 0 : *v.islands.loose;
+        block.flags[FLAG_FLOATING] = begins || args.limit != LIMIT_WHOLE ? 0 : *v.islands.floating;
     }
     if constexpr (PROLOGUE)
         if (begins) store_first_terms(v, block, part.found);
@@ -161,7 +161,8 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     if constexpr (PROLOGUE)
         if (begins) {
             weigh_in_block(v, args, block, part.found, barrier);
-            if (threadIdx.x == 0 && block.flags[FLAG_LOOSE]) *v.islands.loose = 1; /* for kernels after this one */
+            /* for kernels after this one */
+            if (threadIdx.x == 0 && block.flags[FLAG_FLOATING]) *v.islands.floating = 1;
             stamp_assembled(v.step);
         }
     const real relaxation = FAST ? (real)v.model.settings->relaxation : (real)1; /* on its way with what is loaded */

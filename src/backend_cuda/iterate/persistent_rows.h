@@ -95,14 +95,15 @@ __device__ __forceinline__ void row_lane::update(const body_motion &mine, const 
                                                  real delta[COUNT]) const
 {
     const unsigned all = (unsigned)ALL_LANES;
-    real missing[COUNT], push = 0;
+    real residual[COUNT], push = 0;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         real own[6], other[6];
         jacobian(j, ROW_OWN, own);
         jacobian(j, ROW_OTHER, other);
-        missing[j] = row_missing(law(j), row_velocity(own, mine) + row_velocity(other, others), number(j, ROW_LAMBDA));
-        push = j == 0 ? law(j).along * missing[j] : fused(law(j).along, missing[j], push);
+        residual[j] = law_residual(law(j), row_velocity(own, mine) + row_velocity(other, others),
+                                   number(j, ROW_LAMBDA));
+        push = j == 0 ? law(j).along * residual[j] : fused(law(j).along, residual[j], push);
     }
     if (FAST) {
         push += __shfl_xor_sync(all, push, 1);
@@ -111,7 +112,7 @@ __device__ __forceinline__ void row_lane::update(const body_motion &mine, const 
     }
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
-        const row_change change = change_row(law(j), missing[j], FAST ? push : (real)0, number(j, ROW_LAMBDA));
+        const row_change change = change_row(law(j), residual[j], FAST ? push : (real)0, number(j, ROW_LAMBDA));
         next[j] = change.lambda;
         delta[j] = change.delta;
     }
@@ -119,7 +120,7 @@ __device__ __forceinline__ void row_lane::update(const body_motion &mine, const 
     real old[3], step[3], projected[3], change[3];
     for (int32_t r = 0; r < 3; ++r) {
         old[r] = __shfl_sync(all, number(0, ROW_LAMBDA), r, QUAD);
-        step[r] = __shfl_sync(all, law(0).step * missing[0], r, QUAD);
+        step[r] = __shfl_sync(all, law(0).step * residual[0], r, QUAD);
     }
     change_cone<FAST>(old, step, friction, projected, change);
     const int32_t lane = (int32_t)threadIdx.x % QUAD;

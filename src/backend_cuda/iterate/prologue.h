@@ -10,8 +10,8 @@
 #include "backend_cuda/weight/island_sums.h"
 #include "backend_cuda/weight/weigh.h"
 
-/* Of a part, in any of its islands: one is not held; one is; a body has too much energy. */
-enum part_flags { FLAG_LOOSE, FLAG_HELD, FLAG_SUSPECTED, PART_FLAGS };
+/* Of a part, in any of its islands: one is floating; one is anchored; a body has too much energy. */
+enum part_flags { FLAG_FLOATING, FLAG_ANCHORED, FLAG_SUSPECTED, PART_FLAGS };
 
 /* Whole steps of worlds: no row blocks, at least a warp, and blocks whose threads have registers enough. */
 struct block_part {
@@ -74,24 +74,25 @@ static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const 
         if (!t.live) return;
         if (i == first && t.lane == 0) {
             v.islands.info[v.graph.label[t.body]] = island;
-            part.flags[island.held] = 1; /* FLAG_LOOSE or FLAG_HELD: a choice would take registers */
+            part.flags[island.anchored] = 1; /* FLAG_FLOATING or FLAG_ANCHORED: a choice would take registers */
         }
         factor_rigid(v.bodies, t.body, t.lane, C);
     });
     barrier();
 }
 
-/* What bodies add to their islands' momentum, of those that are not held, added up at an island's first body; as by
+/* What bodies add to their islands' momentum, of floating ones, added up at an island's first body; as by
  * powers (weight/island_sums.h). */
 template <class Barrier>
 static __device__ __forceinline__ void add_up_momentum(const cuda_view &v, const block_part &part,
                                                        const body_thread &own, Barrier barrier)
 {
-    for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t) { store_momentum(v, t, is_loose(v, t), true); });
+    for_each_body(v.graph, part, own,
+                  [&](const body_thread &t, int32_t) { store_momentum(v, t, is_floating(v, t), true); });
     for (int32_t apart = 1; apart < part.bodies; apart *= SPREAD) {
         barrier();
         for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t i) {
-            if (!is_loose(v, t)) return;
+            if (!is_floating(v, t)) return;
             const island_range island = part.range[i];
             const int32_t rank = i - island.first, places = (island.bodies - rank + apart - 1) / apart;
             if (rank % (apart * SPREAD) == 0 && places > 1)
@@ -111,7 +112,7 @@ static __device__ __noinline__ void find_motion(const island_view &islands, cuda
     restore_island(islands, island, motions, term, bounces, slows, place);
 }
 
-/* The limit of energies, where some body of the part was suspected, and the momentum of islands that are not held. */
+/* The limit of energies, where some body of the part was suspected, and the momentum of floating islands. */
 template <class Barrier>
 static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool bounces, const block_part &part,
                                                    Barrier barrier)
@@ -120,16 +121,16 @@ static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool boun
                                          (int32_t)threadIdx.x / LANES < part.bodies);
     const bool suspected = part.flags[FLAG_SUSPECTED] != 0;
     store_terms(v.graph, part, own, [&](const body_thread &t) {
-        const bool loose = is_loose(v, t), on = suspected || loose;
+        const bool floating = is_floating(v, t), on = suspected || floating;
         return __ballot_sync((unsigned)ALL_LANES, on) != 0 ? energies_of_body<true>(v, t, on) : 0;
     });
-    if (part.flags[FLAG_LOOSE]) add_up_momentum(v, part, own, barrier);
+    if (part.flags[FLAG_FLOATING]) add_up_momentum(v, part, own, barrier);
     add_up_in_block<add_terms>(part.bodies, part.range, part.terms, barrier);
     for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t i) {
         if (!t.live || t.lane > 0 || i != part.range[i].first) return;
         cuda_island *island = &v.islands.info[v.graph.label[t.body]];
         const double *energies = part.terms + i * TERMS;
-        if (!island->held) find_motion(v.islands, island, motion_place(v, t.slot), energies, bounces, true);
+        if (!island->anchored) find_motion(v.islands, island, motion_place(v, t.slot), energies, bounces, true);
         else if (suspected) limit_island(v.islands, island, energies, bounces, true);
     });
 }

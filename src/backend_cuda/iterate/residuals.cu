@@ -1,4 +1,4 @@
-/* The method `fast`: what the momentum of bodies misses, b - A v + J^T lambda: recomputed where it was updated by
+/* The method `fast`: the momentum residual of bodies, b - A v + J^T lambda: recomputed where it was updated by
  * changes for long (math/relax.h), and (17). In double, from this precision's data; eight lanes a body. The first of a
  * solve comes with the sums over islands (weight/weights.cu). */
 #include "backend_cuda/weight/constraint.h"

@@ -34,26 +34,26 @@ CUDA_INLINE real row_velocity(const real row[6], const body_motion &motion)
     return fused_dot(linear_of(row), motion.linear) + fused_dot(angular_of(row), motion.angular);
 }
 
-/* What is missing of the row's equation. */
-CUDA_INLINE real row_missing(const row_law &law, real x, real lambda)
+/* The residual of the row's equation. */
+CUDA_INLINE real law_residual(const row_law &law, real x, real lambda)
 {
     return fused(law.gain, x, fused(law.compliance, lambda, law.bias));
 }
 
-/* lambda^ and lambda^ - lambda of a scalar row. push: of all rows of the constraint, the sum of along times what is
- * missing, over the number of dynamic bodies. */
+/* lambda^ and lambda^ - lambda of a scalar row. push: of all rows of the constraint, the sum of along times the
+ * residual, over the number of dynamic bodies. */
 struct row_change {
     real lambda, delta;
 };
-CUDA_INLINE row_change change_row(const row_law &law, real missing, real push, real old)
+CUDA_INLINE row_change change_row(const row_law &law, real residual, real push, real old)
 {
     row_change out;
-    out.delta = -fused(law.along, push, law.step * missing);
+    out.delta = -fused(law.along, push, law.step * residual);
     out.lambda = row_bounded(old, law.lo, law.hi, &out.delta);
     return out;
 }
 
-/* The same of a contact's three rows; step: law.step times what is missing. */
+/* The same of a contact's three rows; step: law.step times the residual. */
 template <bool FAST>
 CUDA_INLINE void change_cone(const real old[3], const real step[3], real friction, real lambda[3], real delta[3])
 {
@@ -84,26 +84,26 @@ CUDA_INLINE void update_rows(const row_data *rows, const row_constraint &constra
 {
     const real share = share_of_body(both);
     row_law law[SADMM_MAX_ROWS];
-    real missing[SADMM_MAX_ROWS], push[QUAD];
+    real residual[SADMM_MAX_ROWS], push[QUAD];
     for (int r = 0; r < SADMM_MAX_ROWS; ++r) {
         const row_data row = rows[r];
         law[r] = law_of_row(row, FAST ? share * row.weight : weight);
-        missing[r] =
-            row_missing(law[r], row_velocity(row.jacobian[0], a) + row_velocity(row.jacobian[1], b), row.lambda);
+        residual[r] =
+            law_residual(law[r], row_velocity(row.jacobian[0], a) + row_velocity(row.jacobian[1], b), row.lambda);
     }
     for (int q = 0; q < QUAD; ++q) {
-        push[q] = law[q].along * missing[q];
-        if (q + QUAD < SADMM_MAX_ROWS) push[q] = fused(law[q + QUAD].along, missing[q + QUAD], push[q]);
+        push[q] = law[q].along * residual[q];
+        if (q + QUAD < SADMM_MAX_ROWS) push[q] = fused(law[q + QUAD].along, residual[q + QUAD], push[q]);
     }
     const real pushed = FAST ? share * ((push[0] + push[1]) + (push[2] + push[3])) : (real)0;
     for (int r = 0; r < SADMM_MAX_ROWS; ++r) {
-        const row_change change = change_row(law[r], missing[r], pushed, rows[r].lambda);
+        const row_change change = change_row(law[r], residual[r], pushed, rows[r].lambda);
         lambda[r] = change.lambda;
         delta[r] = change.delta;
     }
     if (!constraint.cone) return;
     const real old[3] = {rows[0].lambda, rows[1].lambda, rows[2].lambda},
-               step[3] = {law[0].step * missing[0], law[1].step * missing[1], law[2].step * missing[2]};
+               step[3] = {law[0].step * residual[0], law[1].step * residual[1], law[2].step * residual[2]};
     change_cone<FAST>(old, step, constraint.friction, lambda, delta);
 }
 

@@ -27,7 +27,7 @@ static __device__ __forceinline__ void body_place(const cuda_view &v, int32_t bo
     for (int k = 0; k < 3; ++k) d[k] = rigid[body].position[k] - rigid[label].position[k];
 }
 
-/* The factor of body i's velocities, where its island is held. */
+/* The factor of body i's velocities, where its island is anchored. */
 static __device__ __forceinline__ solver_real slow_down(const graph_view &graph, const island_view &islands, int32_t i)
 {
     return *islands.limited > 0 ? (solver_real)islands.info[graph.label[i]].slow_down : (solver_real)1;
@@ -44,7 +44,7 @@ static __device__ __forceinline__ void end_velocity(const cuda_view &v, int32_t 
     if (!moved) return;
     const int32_t label = v.graph.label[i];
     const cuda_island *island = &v.islands.info[label];
-    if (island->held) return;
+    if (island->anchored) return;
     const double *motion = v.islands.motions + (size_t)v.graph.slot_of[label] * MOTION_TERMS;
     double d[3], wide[6];
     body_place(v, i, label, d);

@@ -19,10 +19,10 @@
 /* Of a contact in its frame, with u = x + e and the response w. */
 static __device__ double map_of_contact(const double lambda[3], const double u[3], double friction, double w)
 {
-    double missing[3], missed = 0;
-    contact_missing_rows(lambda, u, friction, w, missing);
-    for (int i = 0; i < 3; ++i) missed += missing[i] * missing[i];
-    return w * sqrt(missed);
+    double residual[3], residual2 = 0;
+    contact_residual_rows(lambda, u, friction, w, residual);
+    for (int i = 0; i < 3; ++i) residual2 += residual[i] * residual[i];
+    return w * sqrt(residual2);
 }
 
 /* The largest natural map of a pair's points, m/s. BOUNCES: it may have restitution. */

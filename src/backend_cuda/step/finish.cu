@@ -34,13 +34,13 @@ struct finish_shared {
 
 /* ---- bodies ---------------------------------------------------------------------------------------------------- */
 
-/* What its contacts say of a body; of its island where that is not held, so that what holds as a rule may not
+/* What its contacts say of a body; of its island where that is floating, so that what holds as a rule may not
  * (move.h). */
-static __device__ __forceinline__ void tell_touch(const island_view &islands, int32_t body, int32_t label, bool held,
-                                                  int touch)
+static __device__ __forceinline__ void tell_touch(const island_view &islands, int32_t body, int32_t label,
+                                                  bool anchored, int touch)
 {
-    add_touch(islands, body, label, held ? touch & TOUCH_OF_BODY : touch);
-    if (!held) islands.again[AGAIN] = 1;
+    add_touch(islands, body, label, anchored ? touch & TOUCH_OF_BODY : touch);
+    if (!anchored) islands.again[AGAIN] = 1;
     if (!(touch & TOUCH_SUPPORTED)) islands.again[AGAIN_UNPRESSED] = 1;
 }
 
@@ -70,12 +70,12 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     const int32_t label = touched ? v.graph.label[body] : 0;
     touching_begun begun = begin_touching(v, t.begin + t.lane, t.end);
     trapezoid_speeds own = {};
-    bool held = true;
+    bool anchored = true;
     wait_for_stream();
     let_next_begin();
     if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
     if (touched) {
-        held = v.islands.info[label].held;
+        anchored = v.islands.info[label].anchored;
         own = load_trapezoid_speeds<true>(v, body);
     }
     contact_sums sums = sum_touching<true>(v, own, &begun);
@@ -83,7 +83,7 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     if (t.begin < t.end && v.model.wrenches) add_owed(v, body, t.lane, sums.wrench);
     if (t.begin < t.end && v.model.wrenches)
         add_wrench(sums.wrench, t.lane, v.step.substep, v.step.substeps, v.step.wrench + 6 * t.body);
-    if (touched && t.lane == 0) tell_touch(v.islands, body, label, held, sums.touch);
+    if (touched && t.lane == 0) tell_touch(v.islands, body, label, anchored, sums.touch);
 }
 
 /* A body on its way: both places that there are as a rule. */

@@ -87,13 +87,13 @@ static __global__ void __launch_bounds__(GEAR_THREADS)
     const struct sadmm_row_constraint *row = &v.raw.constraints[constraint];
     const size_t slot = (size_t)constraint * SADMM_MAX_ROWS;
     if (row->count == 0) return;
-    const bool direct = v.joints.is_direct[v.model.bodies + constraint];
-    const double lambda = direct ? v.joints.solution[slot] : (double)v.rows.data[slot].lambda;
+    const bool articulated = v.joints.is_articulated[v.model.bodies + constraint];
+    const double lambda = articulated ? v.joints.solution[slot] : (double)v.rows.data[slot].lambda;
     const int32_t named = row->body_b;
     v.joints.solution[slot] = lambda;
     v.joints.gear_after[g] = lambda / v.model.settings->dt;
-    atomicOr(&v.joints.touch[joined_label(v, named)],
-             ISLAND_JOINED | (row->body_a < 0 || row->body_b < 0 ? ISLAND_MOORED : 0));
+    atomicOr(&v.joints.touch[articulation_label(v, named)],
+             ISLAND_ARTICULATED | (row->body_a < 0 || row->body_b < 0 ? ISLAND_MOORED : 0));
     if (!(lambda - lambda == 0)) atomicMin(&v.step.control->offending_body, 2 * v.model.bodies + named);
 }
 

@@ -145,7 +145,7 @@ static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen,
 bool CUDA(may_be_apart)(const struct sadmm_context *c)
 {
     const struct cuda_step *s = c->step;
-    return s->joints > 0 && s->all_joined && s->kinematic == 0 && c->settings.warm_start && !c->plan.residuals &&
+    return s->joints > 0 && s->all_articulated && s->kinematic == 0 && c->settings.warm_start && !c->plan.residuals &&
            !stop_rule_checked(c);
 }
 
@@ -173,7 +173,7 @@ sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error
     TRY(CUDA(reserve_layout)(c, error));
     TRY(tighten(c, &seen, error));
     TRY(CUDA(reserve_solver)(c, error));
-    TRY(CUDA(reserve_joined)(c, error));
+    TRY(CUDA(reserve_articulations)(c, error));
     TRY(CUDA(reserve_push)(c, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
     s->planned = true;

@@ -1,11 +1,11 @@
 /* What is locked, closed at the end of a (sub-)step (core/model/joint_close.h) by the rule of the host
  * (core/world/joint_close.c): a thread block a part, which leaves at once where no loop of it folds and its islands may
- * not be opened by more than the order of the step. Bodies get their place where they are moved (move_joined.h), once their island has paid
- * for it (joint_momentum.cu). */
+ * not be opened by more than the order of the step. Bodies get their place where they are moved (move_articulated.h),
+ * once their island has paid for it (joint_momentum.cu). */
 #include "backend_cuda/device/double.h"
 
+#include "articulation_block.h"
 #include "core/model/joint_close.h"
-#include "joined_block.h"
 #include "joint_bodies.h"
 #include "joint_place.h"
 #include "world.h"
@@ -20,7 +20,7 @@ struct close_shared {
  * add to them here is not asked for. */
 static __device__ __forceinline__ int32_t bits_of(const cuda_view &v, int32_t body)
 {
-    return v.joints.touch[joined_label(v, body)];
+    return v.joints.touch[articulation_label(v, body)];
 }
 
 /* Joint j as its bodies' places have it; is it to be closed? folds: it is of a part that does. */
@@ -45,18 +45,19 @@ static __device__ __noinline__ bool closing_of(const cuda_view &v, int32_t j, bo
            out->share > JOINT_CLOSE_FROM;
 }
 
-/* Rows of a place: of the joint that has its first constraint there; is that to be closed? */
-static __device__ __forceinline__ bool load_place(const cuda_view &v, const joined_view &p, int32_t place, bool folds)
+/* Rows of a column: of the joint that has its first constraint there; is that to be closed? */
+static __device__ __forceinline__ bool load_constraint(const cuda_view &v, const articulation_view &p, int32_t column,
+                                                       bool folds)
 {
-    const int32_t j = v.joints.closing[p.s.constraint[place]];
+    const int32_t j = v.joints.closing[p.s.constraint[column]];
     const bool closes = j >= 0 && joint_closes(v.joints, j);
     struct joint_closing c;
     bool open = false;
     c.count = 0;
     if (closes) open = closing_of(v, j, folds, &c);
-    for (int i = 0; i < JOINED_ROWS; ++i) {
-        const int32_t r = JOINED_ROWS * place + i;
-        struct joined_row row = {};
+    for (int i = 0; i < SADMM_MAX_ROWS; ++i) {
+        const int32_t r = SADMM_MAX_ROWS * column + i;
+        struct articulation_row row = {};
         for (int s = 0; i < c.count && s < 2; ++s)
             if (v.joints.joints[j].body[s] >= 0) joint_closing_row(&c, i, s, row.jacobian[s]);
         if (i < c.count) { /* hard */
@@ -64,21 +65,21 @@ static __device__ __forceinline__ bool load_place(const cuda_view &v, const join
             row.lo = -INFINITY, row.hi = INFINITY;
         }
         p.rows[r] = row;
-        joined_put_row(&p, r, i < c.count);
+        articulation_put_row(&p, r, i < c.count);
     }
     return open;
 }
 
 /* Rows of the part's joints for displacements of its bodies; is any of them to be closed? */
-static __device__ __forceinline__ bool load_closing(const cuda_view &v, const joined_view &p, bool folds,
+static __device__ __forceinline__ bool load_closing(const cuda_view &v, const articulation_view &p, bool folds,
                                                     int32_t *shared_flag)
 {
     if (threadIdx.x == 0) *shared_flag = 0;
     __syncthreads();
-    each(p.s.places, [&](int32_t place) {
-        if (load_place(v, p, place, folds)) *shared_flag = 1;
+    each(p.s.columns, [&](int32_t column) {
+        if (load_constraint(v, p, column, folds)) *shared_flag = 1;
     });
-    each(6 * p.s.bodies, [&](int32_t k) { p.velocity[k] = p.missing[k] = 0; });
+    each(6 * p.s.bodies, [&](int32_t k) { p.velocity[k] = p.residual[k] = 0; });
     load_inertia(v, p);
     __syncthreads();
     const bool any = *shared_flag != 0;
@@ -98,17 +99,18 @@ static __device__ __noinline__ void add_energy(const cuda_view &v, int32_t i, bo
 }
 
 /* Velocities of what folds, along what its joints leave it at the end, as on the host. */
-static __device__ __noinline__ void turn_speeds(const cuda_view &v, const joined_view &p, struct close_shared *shared)
+static __device__ __noinline__ void turn_speeds(const cuda_view &v, const articulation_view &p,
+                                                struct close_shared *shared)
 {
     load_closing(v, p, true, &shared->flag);
-    each(p.s.places * JOINED_ROWS, [&](int32_t r) { p.rows[r].bias = 0; });
+    each(p.s.columns * SADMM_MAX_ROWS, [&](int32_t r) { p.rows[r].bias = 0; });
     each(6 * p.s.bodies, [&](int32_t k) { p.velocity[k] = v.joints.closed[p.s.body[k / 6]].place[7 + k % 6]; });
     __syncthreads();
     if (!solve_part<true>(p, nullptr, &shared->flag, &shared->most)) return;
     each(6 * p.s.bodies, [&](int32_t k) { v.joints.closed[p.s.body[k / 6]].place[7 + k % 6] += p.dv[k]; });
 }
 
-static __device__ __forceinline__ bool close_part(const cuda_view &v, const joined_view &p, bool folds,
+static __device__ __forceinline__ bool close_part(const cuda_view &v, const articulation_view &p, bool folds,
                                                   struct close_shared *shared)
 {
     bool any = false;
@@ -131,7 +133,7 @@ static __device__ __forceinline__ bool close_part(const cuda_view &v, const join
 }
 
 template <bool SMALL>
-static __global__ void __launch_bounds__(JOINED_THREADS)
+static __global__ void __launch_bounds__(ARTICULATION_THREADS)
     joint_close_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     CUDA_DYNAMIC_SHARED(memory);
@@ -139,7 +141,7 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     wait_for_stream();
     let_next_begin();
     if (v.model.live->abort_code) return;
-    const struct cuda_joined_part part = v.joints.parts[blockIdx.x];
+    const struct cuda_articulation_part part = v.joints.parts[blockIdx.x];
     const bool folds = v.joints.folds[blockIdx.x];
     if (threadIdx.x == 0) shared->flag = folds;
     __syncthreads();
@@ -150,24 +152,24 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     const bool looks = shared->flag;
     __syncthreads();
     if (!looks) return;
-    const joined_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
+    const articulation_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
     if (!close_part(v, p, folds, shared) && !folds) return;
     each(p.s.bodies, [&](int32_t e) { add_energy(v, p.s.body[e], true); });
     __syncthreads();
     if (folds) turn_speeds(v, p, shared);
-    each(p.s.bodies, [&](int32_t e) { atomicOr(&v.joints.touch[joined_label(v, p.s.body[e])], ISLAND_CLOSED); });
+    each(p.s.bodies, [&](int32_t e) { atomicOr(&v.joints.touch[articulation_label(v, p.s.body[e])], ISLAND_CLOSED); });
 }
 
 sadmm_status CUDA(launch_joint_close)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = {};
     struct cuda_partition blocks = {};
-    if (c->view.joints.count == 0 || c->step->joined_parts == 0) return SADMM_OK;
-    blocks.parts = c->step->joined_parts;
+    if (c->view.joints.count == 0 || c->step->articulations == 0) return SADMM_OK;
+    blocks.parts = c->step->articulations;
     blocks.cluster = 1;
-    blocks.threads = JOINED_THREADS;
-    blocks.shared = sizeof(struct close_shared) + c->step->joined_bytes; /* less than that of joined bodies */
-    return CUDA(launch_partition)(c, joined_is_small(c) ? joint_close_kernel<true> : joint_close_kernel<false>,
+    blocks.threads = ARTICULATION_THREADS;
+    blocks.shared = sizeof(struct close_shared) + c->step->articulation_bytes; /* less than that of articulations */
+    return CUDA(launch_partition)(c, articulations_are_small(c) ? joint_close_kernel<true> : joint_close_kernel<false>,
                                   "joints that close", &blocks, &args, error);
 }
 

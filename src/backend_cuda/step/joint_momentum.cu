@@ -1,13 +1,13 @@
 /* Momentum and energy of islands with joints (core/model/joint_momentum.h) on the device. A thread block an island, once
  * it is known where its joints let it go: what closing has cost, which it pays; then what each body adds, then sums over
  * the bodies, in the order of the host (core/world/joint_momentum.c). Bodies get what restores it where they are moved
- * (move_joined.h). Beside them a thread a joint: how far that is off. */
+ * (move_articulated.h). Beside them a thread a joint: how far that is off. */
 #include <algorithm>
 
 #include "backend_cuda/device/double.h"
 
 #include "backend_cuda/assemble/stiffened.h"
-#include "core/model/joined.h"
+#include "core/model/articulation.h"
 #include "core/model/joint_close.h"
 #include "core/model/joint_momentum.h"
 #include "joint_bodies.h"
@@ -20,7 +20,7 @@ enum { ISLAND_THREADS = 128, ISLAND_BLOCKS = 1024, FETCHED = 8 /* at once, of a 
 struct joint_island {
     int32_t label, count;
     const int32_t *body;
-    const struct joined_structure *part;
+    const struct articulation_structure *part;
     int32_t bits; /* core/model/joint_trapezoid.h */
 };
 
@@ -29,7 +29,7 @@ static __device__ __forceinline__ bool is_static(const struct sadmm_contact_pair
     return pair->body_a < 0 || pair->body_b < 0;
 }
 
-static __device__ __forceinline__ bool holds(const cuda_view &v, int32_t body)
+static __device__ __forceinline__ bool anchors(const cuda_view &v, int32_t body)
 {
     const int32_t slot = v.graph.slot_of[body];
     for (int32_t at = v.graph.offsets[slot]; at < v.graph.offsets[slot + 1]; ++at) {
@@ -40,7 +40,7 @@ static __device__ __forceinline__ bool holds(const cuda_view &v, int32_t body)
         if (!is_static(pair)) continue;
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
             add_arm(&arms, code & 1 ? v.raw.points[k].arm_b : v.raw.points[k].arm_a, 1);
-        if (momentum_is_held(pair->friction, &arms)) return true;
+        if (momentum_is_anchored(pair->friction, &arms)) return true;
     }
     return false;
 }
@@ -77,8 +77,9 @@ static __device__ __forceinline__ void add_sides(const cuda_view &v, int32_t i, 
 }
 
 /* By the part, where there are no contacts: rows, the next one each time. */
-static __device__ __forceinline__ void add_part_rows(const cuda_view &v, const struct joined_structure *part, int32_t i,
-                                                     const struct sadmm_rigid *body, const double origin[3], double dt,
+static __device__ __forceinline__ void add_part_rows(const cuda_view &v, const struct articulation_structure *part,
+                                                     int32_t i, const struct sadmm_rigid *body, const double origin[3],
+                                                         double dt,
                                                      struct joint_momentum *sums)
 {
     const int32_t e = v.joints.entry[i], first = part->first_around[e], end = part->first_around[e + 1];
@@ -158,9 +159,9 @@ static __device__ __forceinline__ void restore_island(const cuda_view &v, const 
     double *to = (double *)&v.joints.momentum[island.label];
     __syncthreads(); /* all have seen its bits */
     for (int32_t k = t; k < island.count && !island.part; k += ISLAND_THREADS)
-        if (holds(v, island.body[k])) atomicOr(&v.joints.touch[island.label], ISLAND_HELD);
+        if (anchors(v, island.body[k])) atomicOr(&v.joints.touch[island.label], ISLAND_ANCHORED);
     __syncthreads();
-    if (__ldcg(&v.joints.touch[island.label]) & ISLAND_HELD) return;
+    if (__ldcg(&v.joints.touch[island.label]) & ISLAND_ANCHORED) return;
     for (int32_t k = t; k < island.count; k += ISLAND_THREADS) store_body(v, island, island.body[k]);
     __syncthreads();
     for (int32_t n = t; n < JOINT_MOMENTUM_SUMS; n += ISLAND_THREADS) {
@@ -194,7 +195,7 @@ static __device__ __noinline__ double drift_of(const cuda_view &v, int32_t j)
         double place[PLACE];
         if (body >= 0 && v.joints.closed[body].closed)
             for (int k = 0; k < 7; ++k) place[k] = v.joints.closed[body].place[k];
-        else if (body >= 0) joint_place(v, body, v.joints.touch[joined_label(v, body)], place);
+        else if (body >= 0) joint_place(v, body, v.joints.touch[articulation_label(v, body)], place);
         end[s] = joint_end_after(v, j, s, place);
     }
     return joint_opening(&joint->def, end);
@@ -217,10 +218,10 @@ static __global__ void __launch_bounds__(ISLAND_THREADS)
         return find_drift(v, ((int32_t)blockIdx.x - blocks) * ISLAND_THREADS + (int32_t)threadIdx.x);
     for (int32_t k = (int32_t)blockIdx.x; k < count; k += blocks) {
         struct joint_island island = {k, 0, nullptr, nullptr, 0};
-        struct joined_structure structure = {};
+        struct articulation_structure structure = {};
         if (v.joints.apart) {
-            const struct cuda_joined_part part = v.joints.parts[k];
-            structure = joined_structure_at(v.joints.structures + part.first_number);
+            const struct cuda_articulation_part part = v.joints.parts[k];
+            structure = articulation_structure_at(v.joints.structures + part.first_number);
             island.label = part.label - 1;
             island.count = part.body_count;
             island.body = v.joints.members + part.first_body;
@@ -231,14 +232,14 @@ static __global__ void __launch_bounds__(ISLAND_THREADS)
         }
         island.bits = v.joints.touch[island.label];
         if (island.count > 0 && island.bits & ISLAND_CLOSED) pay_island(v, island);
-        if (island.count > 0 && joint_island_is_loose(island.bits)) restore_island(v, island);
+        if (island.count > 0 && joint_island_is_floating(island.bits)) restore_island(v, island);
     }
 }
 
 sadmm_status CUDA(launch_joint_momentum)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.count = c->step->joined_parts;
+    args.count = c->step->articulations;
     const int64_t islands = c->view.joints.apart ? args.count : c->view.model.bodies;
     args.most_bodies = (int32_t)std::min<int64_t>(islands, ISLAND_BLOCKS);
     return CUDA(launch_of)(c, joint_momentum_kernel, "momentum of joints",

@@ -16,7 +16,7 @@
 #include "core/model/coupling_law.h"
 #include "core/model/joint_trapezoid.h"
 #include "joint_bodies.h"
-#include "move_joined.h"
+#include "move_articulated.h"
 #include "world.h"
 
 /* What the end of a sub-step needs of a joint's geometry in its middle. */
@@ -185,7 +185,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
 static __device__ __forceinline__ struct joint_trapezoid trapezoid_of(const cuda_view &v, int32_t body)
 {
     double velocity[6] = {};
-    if (body >= 0 && v.joints.is_direct[body])
+    if (body >= 0 && v.joints.is_articulated[body])
         for (size_t k = 0; k < 6; ++k) velocity[k] = v.joints.velocity[6 * (size_t)body + k];
     else if (body >= 0) load_end_velocity(v, body, velocity);
     return joint_trapezoid_of(body >= 0 ? &v.step.before[body] : nullptr, velocity, v.model.settings->dt);
@@ -193,7 +193,7 @@ static __device__ __forceinline__ struct joint_trapezoid trapezoid_of(const cuda
 
 static __device__ __forceinline__ int32_t *island_of(const cuda_view &v, int32_t a, int32_t b)
 {
-    return &v.joints.touch[joined_label(v, a >= 0 ? a : b)];
+    return &v.joints.touch[articulation_label(v, a >= 0 ? a : b)];
 }
 
 /* joint: what the coupling's has given; NULL: it did not take part. */
@@ -222,13 +222,13 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
     }
     struct sadmm_joint_memory memory = v.joints.after[j];
     const struct joint_trapezoid bodies[2] = {trapezoid_of(v, joint->body[0]), trapezoid_of(v, joint->body[1])};
-    int bits = ISLAND_JOINED;
+    int bits = ISLAND_ARTICULATED;
     double finite = 0;
     for (int32_t c = 0; c < joint->constraints; ++c) {
         int moorings = 0;
         const int32_t count = v.raw.constraints[first + c].count;
         const size_t slots = (size_t)(first + c) * SADMM_MAX_ROWS;
-        const bool direct = v.joints.is_direct[v.model.bodies + first + c];
+        const bool articulated = v.joints.is_articulated[v.model.bodies + first + c];
         /* All rows are fetched before the first is looked at: one wait for memory, not one a row. */
         struct sadmm_joint_source source[SADMM_MAX_ROWS];
         double lambda[SADMM_MAX_ROWS];
@@ -236,20 +236,21 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
         for (int r = 0; r < SADMM_MAX_ROWS; ++r) {
             if (r >= count) continue;
             source[r] = v.joints.sources[slots + (size_t)r];
-            lambda[r] = direct ? v.joints.solution[slots + (size_t)r] : (double)v.rows.data[slots + (size_t)r].lambda;
+            lambda[r] = articulated ? v.joints.solution[slots + (size_t)r]
+                                    : (double)v.rows.data[slots + (size_t)r].lambda;
         }
 #pragma unroll
         for (int r = 0; r < SADMM_MAX_ROWS; ++r) {
             if (r >= count) continue;
             const struct raw_row *row = &v.raw.rows[slots + (size_t)r];
             finite += lambda[r] - lambda[r];
-            if (!direct) v.joints.solution[slots + (size_t)r] = lambda[r];
+            if (!articulated) v.joints.solution[slots + (size_t)r] = lambda[r];
             joint_keep_row(&memory, middle->axis, source[r].role, source[r].coordinate,
                            source[r].sign * lambda[r] / settings.dt);
             moorings |= joint_mooring(&source[r], lambda[r], bodies);
             bits |= joint_row_touches(&source[r], lambda[r], row->jacobian[0], row->jacobian[1], bodies, &settings);
         }
-        if (moorings == JOINT_MOORED_WHOLLY) bits |= ISLAND_HELD;
+        if (moorings == JOINT_MOORED_WHOLLY) bits |= ISLAND_ANCHORED;
     }
     joint_end_wrench(&memory, &joint->def, middle->frame);
     v.joints.after[j] = memory;
@@ -307,7 +308,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     follow_if(all_early(v.model.bodies));
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x);
     if (v.model.live->abort_code) return;
-    if (i < v.model.bodies && moves_apart(v, i)) move_joined(v, i);
+    if (i < v.model.bodies && moves_apart(v, i)) move_articulated(v, i);
     end_joints(v, i);
 }
 
@@ -491,8 +492,8 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
         {BUFFER_JOINT_MOMENTUM, (size_t)s->bodies * sizeof(struct joint_momentum)},
     };
     TRY(reserve_all(c, wanted, error));
-    /* Rows that a constraint does not have are fetched, too, beside the number of those that it has (joined.cu); and
-     * structures are copied with what lies between their members. */
+    /* Rows that a constraint does not have are fetched, too, beside the number of those that it has (articulation.cu);
+     * and structures are copied with what lies between their members. */
     CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_JOINT_ROWS), 0, 2 * row_set_bytes(s), c->stream),
               "cudaMemsetAsync(rows of joints)");
     CUDA_CALL(c, cudaMemsetAsync(memory_of(c, 0), 0, 3 * n * sizeof(struct sadmm_joint_memory), c->stream),
@@ -548,14 +549,15 @@ static sadmm_status take_velocities(struct sadmm_context *c, double *velocity, s
     if (!s->last.apart) return SADMM_OK;
     const struct sadmm_rigid *last = buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)(1 - s->into) * n;
     struct sadmm_rigid *rigid = (struct sadmm_rigid *)sadmm_alloc(n + 1, sizeof *rigid);
-    int32_t *direct = (int32_t *)sadmm_alloc(n + 1, sizeof *direct);
-    sadmm_status status = rigid && direct ? SADMM_OK : sadmm_fail_memory(error, "the joints' rows");
+    int32_t *articulated = (int32_t *)sadmm_alloc(n + 1, sizeof *articulated);
+    sadmm_status status = rigid && articulated ? SADMM_OK : sadmm_fail_memory(error, "the joints' rows");
     if (status == SADMM_OK) status = CUDA(get)(c, rigid, last, n * sizeof *rigid, error);
-    if (status == SADMM_OK) status = CUDA(get)(c, direct, c->view.joints.is_direct, n * sizeof *direct, error);
+    if (status == SADMM_OK)
+        status = CUDA(get)(c, articulated, c->view.joints.is_articulated, n * sizeof *articulated, error);
     for (size_t i = 0; i < n && status == SADMM_OK; ++i)
-        if (!direct[i]) memcpy(velocity + 6 * i, rigid[i].velocity, 6 * sizeof *velocity);
+        if (!articulated[i]) memcpy(velocity + 6 * i, rigid[i].velocity, 6 * sizeof *velocity);
     sadmm_free(rigid);
-    sadmm_free(direct);
+    sadmm_free(articulated);
     return status;
 }
 

@@ -12,7 +12,7 @@
 #include "core/model/kinematic.h"
 
 #include "backend_cuda/device/plan_check.h"
-#include "move_joined.h"
+#include "move_articulated.h"
 #include "world.h"
 
 enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocessors */
@@ -194,7 +194,7 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
 static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
 {
     const int32_t label = v.graph.label[i];
-    const int island = v.islands.touch[label] | (v.islands.info[label].held ? TOUCH_AS_A_RULE : 0),
+    const int island = v.islands.touch[label] | (v.islands.info[label].anchored ? TOUCH_AS_A_RULE : 0),
               own = v.islands.touch[i];
     const enum trapezoid_kind kind = trapezoid_kind_of(island, own);
     if (kind == TRAPEZOID_OWN) return; /* it was moved so: what more is known now can only turn the correction off */
@@ -212,10 +212,10 @@ static __device__ __forceinline__ bool rolls_again(const cuda_view &v)
     return v.step.limits && v.islands.again[AGAIN_ROLLS];
 }
 
-/* Have joints to do with body i's island: ISLAND_JOINED; has its momentum been restored: ISLAND_RESTORED? */
+/* Have joints to do with body i's island: ISLAND_ARTICULATED; has its momentum been restored: ISLAND_RESTORED? */
 static __device__ __forceinline__ bool island_is(const cuda_view &v, int32_t i, int what)
 {
-    return v.joints.count > 0 && !v.joints.apart && v.joints.touch[joined_label(v, i)] & what;
+    return v.joints.count > 0 && !v.joints.apart && v.joints.touch[articulation_label(v, i)] & what;
 }
 
 /* What contacts that roll give body i to take along, which has been moved; -1: none. LANES threads a body, each with
@@ -245,16 +245,16 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
     }
     sum_lanes<13>(sums);
     if (i >= 0 && lane == 0)
-        rolling_keep(&v.step.after[i], v.step.before[i].position, dt, island_is(v, i, ISLAND_JOINED) || *round == 0,
-                     owed, stiffness);
+        rolling_keep(&v.step.after[i], v.step.before[i].position, dt,
+                     island_is(v, i, ISLAND_ARTICULATED) || *round == 0, owed, stiffness);
 }
 
 /* Body i, where its island has joints as they let it go; else again, if need be. */
-static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_t i, bool again, bool joined)
+static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_t i, bool again, bool articulated)
 {
-    const int32_t bits = joined ? v.joints.touch[joined_label(v, i)] : 0;
-    if (joined && !v.joints.is_direct[i]) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
-    if (bits & ISLAND_JOINED) move_joined(v, i);
+    const int32_t bits = articulated ? v.joints.touch[articulation_label(v, i)] : 0;
+    if (articulated && !v.joints.is_articulated[i]) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
+    if (bits & ISLAND_ARTICULATED) move_articulated(v, i);
     else if (again) move_again(v, i);
 }
 
@@ -294,8 +294,8 @@ static __global__ void __launch_bounds__(TURN_THREADS)
 {
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)TURN_THREADS + threadIdx.x);
     if (i >= v.model.bodies || v.model.live->abort_code || !as_planned(v.model, v.step)) return;
-    const bool again = moves_again(v), joined = v.joints.count > 0 && !v.joints.apart;
-    if (again || joined) move_once_more(v, i, again, joined);
+    const bool again = moves_again(v), articulated = v.joints.count > 0 && !v.joints.apart;
+    if (again || articulated) move_once_more(v, i, again, articulated);
 }
 
 /* Has the step no need of a second problem, or one that fits (step/push.h)? Once all contacts have spoken. */
@@ -356,11 +356,11 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
     const int32_t lane = (int32_t)(t % START_LANES);
     struct cuda_step_control *control = v.step.control;
     if (v.model.live->abort_code) return;
-    const bool joined = v.joints.count > 0 && !v.joints.apart, again = moves_again(v),
-               settles = (again || joined) && !v.push.planned, any = settles || rolls_again(v);
+    const bool articulated = v.joints.count > 0 && !v.joints.apart, again = moves_again(v),
+               settles = (again || articulated) && !v.push.planned, any = settles || rolls_again(v);
     if (settles && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
-        move_once_more(v, (int32_t)own, again, joined);
-    if (joined) end_joints(v, (int32_t)t);
+        move_once_more(v, (int32_t)own, again, articulated);
+    if (articulated) end_joints(v, (int32_t)t);
     if (any) __syncthreads(); /* threads of a block start bodies that others of it have moved */
     if (rolls_again(v)) {
         keep_rolling(v, lane < LANES && body_rolls(v, (int32_t)i) ? (int32_t)i : -1, lane % LANES);
@@ -387,11 +387,12 @@ static __device__ double double_of(unsigned long long bits) { return __longlong_
  * rolls, one. */
 static __host__ __device__ inline int32_t commit_lanes(int32_t bodies) { return all_early(bodies) ? LANES : 1; }
 
-static __device__ __forceinline__ void commit_bodies(const cuda_view &v, int32_t thread, bool joined)
+static __device__ __forceinline__ void commit_bodies(const cuda_view &v, int32_t thread, bool articulated)
 {
     const int32_t lanes = commit_lanes(v.model.bodies), i = thread / lanes, lane = thread % lanes;
     const bool again = moves_again(v), rolls = rolls_again(v);
-    if (lane == 0 && (again || joined) && !v.push.planned && i < v.model.bodies) move_once_more(v, i, again, joined);
+    if (lane == 0 && (again || articulated) && !v.push.planned && i < v.model.bodies)
+        move_once_more(v, i, again, articulated);
     if (!rolls) return;
     if (lanes == 1) return keep_rolling_of_warp(v, i);
     __syncwarp(0xffffffffu);
@@ -409,12 +410,12 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     wait_for_stream();
     if (!reports) {
         /* Blocks that begin late may see what the report says of the step: only where what they move is of no use. */
-        const bool on = !aborted && planned, joined = on && v.joints.count > 0 && !v.joints.apart;
+        const bool on = !aborted && planned, articulated = on && v.joints.count > 0 && !v.joints.apart;
         if ((int32_t)blockIdx.x >= body_blocks) {
-            if (joined) end_joints(v, i - body_blocks * STEP_THREADS);
+            if (articulated) end_joints(v, i - body_blocks * STEP_THREADS);
             return;
         }
-        if (on) commit_bodies(v, i, joined);
+        if (on) commit_bodies(v, i, articulated);
         return;
     }
     if (threadIdx.x > 0) return;

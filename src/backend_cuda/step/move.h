@@ -1,7 +1,7 @@
 /* Bodies as a step ends: moved by their velocity less their trapezoid correction (math/trapezoid.h). What holds for an
- * island is known once all of its bodies have been visited. So a body is moved as if its island were held by friction
- * and no contact would penetrate, which is so wherever bodies rest; the next kernel moves those again for which that
- * was wrong. */
+ * island is known once all of its bodies have been visited. So a body is moved as if its island were anchored by
+ * friction and no contact would penetrate, which is so wherever bodies rest; the next kernel moves those again for
+ * which that was wrong. */
 #ifndef SADMM_CUDA_STEP_MOVE_H
 #define SADMM_CUDA_STEP_MOVE_H
 
@@ -34,15 +34,16 @@ static __device__ __forceinline__ body_before fetch_body(const cuda_step_view &s
 }
 
 /* What joints say of a body's island is at: its label; or, where they are solved apart, its part's first body. */
-static __device__ __forceinline__ int32_t joined_label(const cuda_view &v, int32_t body)
+static __device__ __forceinline__ int32_t articulation_label(const cuda_view &v, int32_t body)
 {
-    return v.joints.apart ? v.joints.is_direct[body] - 1 : v.graph.label[body];
+    return v.joints.apart ? v.joints.is_articulated[body] - 1 : v.graph.label[body];
 }
 
 /* Do its joints move it, beside the rest of the step (step/joints.cu)? Known once they have. */
 static __device__ __forceinline__ bool moves_apart(const cuda_view &v, int32_t body)
 {
-    return v.joints.apart && v.joints.is_direct[body] && (v.joints.touch[joined_label(v, body)] & ISLAND_JOINED);
+    return v.joints.apart && v.joints.is_articulated[body] &&
+           (v.joints.touch[articulation_label(v, body)] & ISLAND_ARTICULATED);
 }
 
 /* v of body i as the step ends. */

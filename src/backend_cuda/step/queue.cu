@@ -102,10 +102,10 @@ static void learn(struct sadmm_context *c, int64_t first, const struct cuda_step
     learned->substep = std::max(learned->substep, report->substep);
 }
 
-/* A step was done. Where joined bodies were left alone for a while it is planned that they are; the longer that takes
- * the more often they were not, since a plan costs what many steps do. The outcome is the same to the last bit: the
- * part's direct solution, whatever the iterations. */
-static void see_joined(struct sadmm_context *c, const struct cuda_step_report *report)
+/* A step was done. Where articulations were left alone for a while it is planned that they are; the longer that takes
+ * the more often they were not, since a plan costs what many steps do. The outcome is the same to the last bit: that of
+ * the block direct solve, whatever the iterations. */
+static void see_articulations(struct sadmm_context *c, const struct cuda_step_report *report)
 {
     struct cuda_step *s = c->step;
     if (s->apart) return;
@@ -218,7 +218,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     ++s->seen;
     ++s->done;
     if (s->careful > 0 && --s->careful == 0) s->planned = false;
-    see_joined(c, &report);
+    see_articulations(c, &report);
     see_pushes(c, &report);
     see_hits(c, &report);
     /* A plan with far too large capacities wastes launches. */

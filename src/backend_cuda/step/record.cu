@@ -115,14 +115,14 @@ static sadmm_status record_joint_rows(struct sadmm_context *c, struct sadmm_erro
     return SADMM_OK;
 }
 
-/* Those in the solver's form. Where joined bodies are apart, all that is to be done about them. */
+/* Those in the solver's form. Where articulations are apart, all that is to be done about them. */
 static sadmm_status record_joints(struct sadmm_context *c, struct sadmm_error *error)
 {
     side_branch side(c, c->joint_side);
     CUDA_CALL(c, side.code, "a branch of the step");
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent"); /* A and b */
     if (c->view.joints.apart) {
-        TRY(CUDA(launch_joined)(c, false, error));
+        TRY(CUDA(launch_articulations)(c, false, error));
         TRY(CUDA(launch_joint_solution)(c, error));
         TRY(CUDA(launch_joint_move)(c, error));
     } else {
@@ -132,14 +132,14 @@ static sadmm_status record_joints(struct sadmm_context *c, struct sadmm_error *e
     return SADMM_OK;
 }
 
-/* Joined bodies before the iterations, beside what the main stream does then; what they leave of their inertia
+/* Articulations before the iterations, beside what the main stream does then; what they leave of their inertia
  * (core/model/stiffening.h) is that which rows respond by. */
-static sadmm_status record_joined(struct sadmm_context *c, struct sadmm_error *error)
+static sadmm_status record_articulations(struct sadmm_context *c, struct sadmm_error *error)
 {
     side_branch side(c, c->joint_side);
     CUDA_CALL(c, side.code, "a branch of the step");
-    if (joined_is_small(c)) TRY(CUDA(launch_pair_parts)(c, error));
-    if (c->settings.warm_start) TRY(CUDA(launch_joined)(c, false, error));
+    if (articulations_are_small(c)) TRY(CUDA(launch_pair_parts)(c, error));
+    if (c->settings.warm_start) TRY(CUDA(launch_articulations)(c, false, error));
     if (c->fast) TRY(CUDA(enqueue_row_responses)(c, error));
     CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
     return SADMM_OK;
@@ -171,14 +171,14 @@ static sadmm_status record_kinematic_plan(struct sadmm_context *c, struct sadmm_
     if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error));
     if (c->view.joints.count > 0) {
         TRY(CUDA(assemble_rows)(c, error));
-        TRY(record_joined(c, error));
+        TRY(record_articulations(c, error));
         TRY(wait_for_joints(c, error));
     }
     return CUDA(assemble_contacts)(c, error);
 }
 
-/* Contacts in the solver's form, beside what the main stream does; after joined bodies, where these say what they respond
- * by. */
+/* Contacts in the solver's form, beside what the main stream does; after articulations, where these say what they
+ * respond by. */
 static sadmm_status record_contacts(struct sadmm_context *c, bool late, struct sadmm_error *error)
 {
     side_branch side(c, c->side);
@@ -189,27 +189,28 @@ static sadmm_status record_contacts(struct sadmm_context *c, bool late, struct s
     return SADMM_OK;
 }
 
-/* Graph statistics and layout; beside them contacts in the solver's form, what weights take from pairs, and joined
- * bodies that do not wait for the layout. */
+/* Graph statistics and layout; beside them contacts in the solver's form, what weights take from pairs, and
+ * articulations that do not wait for the layout. */
 static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
     if (c->view.kinematic.count > 0) return record_kinematic_plan(c, error);
-    const bool together = c->view.joints.count > 0 && !c->view.joints.apart, beside = together && joined_is_small(c),
-               late = together && c->fast && c->settings.warm_start, /* joined bodies' inertia is not known before */
+    const bool together = c->view.joints.count > 0 && !c->view.joints.apart,
+               beside = together && articulations_are_small(c),
+               late = together && c->fast && c->settings.warm_start, /* inertia of articulations is not known before */
                side = !c->view.push.planned && (!late || beside);
     if (together) TRY(wait_for_joints(c, error)); /* the graph is of their rows, too */
-    if (beside) TRY(record_joined(c, error));
+    if (beside) TRY(record_articulations(c, error));
     if (side) TRY(record_contacts(c, late, error));
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error)); /* it says what contacts are */
-    if (together && !beside) TRY(record_joined(c, error));
+    if (together && !beside) TRY(record_articulations(c, error));
     if (together) TRY(wait_for_joints(c, error));
     return side ? SADMM_OK : CUDA(assemble_contacts)(c, error);
 }
 
-/* Which motions of loose islands may be restored, beside the iterations; where those find out themselves what is held,
- * after them. */
+/* Which motions of floating islands may be restored, beside the iterations; where those find out themselves what is
+ * anchored, after them. */
 static bool motions_beside(const struct sadmm_context *c) { return c->plan.momentum && !c->prologue; }
 
 static sadmm_status record_motions(struct sadmm_context *c, struct sadmm_error *error)
@@ -231,15 +232,15 @@ static sadmm_status record_limit(struct sadmm_context *c, bool suspected, struct
 
 /* What joints keep, once their bodies have been solved after the iterations; beside that the end of the step, which
  * takes less. */
-static sadmm_status record_joined_finish(struct sadmm_context *c, struct sadmm_error *error)
+static sadmm_status record_articulation_finish(struct sadmm_context *c, struct sadmm_error *error)
 {
     {
         side_branch side(c, c->joint_side);
         CUDA_CALL(c, side.code, "a branch of the step");
-        TRY(CUDA(launch_finish)(c, c->step->joined_parts == 0, error));
+        TRY(CUDA(launch_finish)(c, c->step->articulations == 0, error));
         CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
     }
-    TRY(CUDA(launch_joined)(c, true, error));
+    TRY(CUDA(launch_articulations)(c, true, error));
     TRY(wait_for_joints(c, error));
     return CUDA(launch_joint_solution)(c, error);
 }
@@ -255,7 +256,7 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
     if (joints && apart) TRY(wait_for_joints(c, error));
-    TRY(joints && !apart ? record_joined_finish(c, error) : CUDA(launch_finish)(c, true, error));
+    TRY(joints && !apart ? record_articulation_finish(c, error) : CUDA(launch_finish)(c, true, error));
     TRY(CUDA(launch_kinematic_finish)(c, error));
     if (takes_hits(c) && c->view.model.wrenches)
         TRY(COLLISION(give_hits)(c->step->collision, c->stream, &c->step->hits, error));

@@ -49,7 +49,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     c->view.raw.migrations = set.migrations;
     CUDA(view_kinematic)(c, into);
     CUDA(view_joints)(c, into, substep);
-    CUDA(view_joined)(c);
+    CUDA(view_articulations)(c);
     CUDA(view_push)(c);
 }
 
@@ -180,7 +180,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(CUDA(wait)(c, error));
     TRY(CUDA(load_kinematic)(c, world, error));
     TRY(CUDA(load_joints)(c, world, error));
-    TRY(CUDA(load_joined)(c, world, error));
+    TRY(CUDA(load_articulations)(c, world, error));
     CUDA(view_counts)(c, 0);
     TRY(CUDA(reserve_layout)(c, error)); /* live is needed from here on */
     TRY(CUDA(clear_abort)(c, error));

@@ -6,7 +6,7 @@
  *   queue.cu   run steps and see what became of them; repeat those whose plan did not hold
  *   read.cu    bring the world and the report back
  *   push.cu    islands that are pushed apart by a second problem
- *   kinematic.cu, joints.cu, gears.cu, joined.cu   kinematic bodies, joints, gears, and bodies joined by them
+ *   kinematic.cu, joints.cu, gears.cu, articulation.cu   kinematic bodies, joints, gears, and articulations
  */
 #ifndef SADMM_CUDA_STEP_WORLD_H
 #define SADMM_CUDA_STEP_WORLD_H
@@ -44,7 +44,7 @@ struct learned {
     struct cuda_graph_statistics statistics; /* the most of any */
 };
 
-/* Steps that joined bodies are left alone until it is planned that they are; twice as many each time they were not. */
+/* Steps that articulations are left alone until it is planned that they are; twice as many each time they were not. */
 enum { LEAST_PATIENCE = 16, MOST_PATIENCE = 1 << 16 };
 /* Steps without a push until they are planned to have none: to plan takes what a second problem's empty kernels do in as
  * many. */
@@ -57,11 +57,11 @@ struct cuda_step {
     int32_t bodies, slots, kinematic;
     int32_t joints, joint_constraints, couplings, gears;
     bool tables;                /* some joint has one of a spring */
-    int32_t joined_parts;       /* of bodies that are solved directly (joined.cu); */
-    size_t joined_numbers, joined_work; /* of all their structures and work, */
-    size_t joined_bytes;        /* the most that one has of both, where blocks have that in their own memory; else 0 */
+    int32_t articulations;      /* how many (articulation.cu); */
+    size_t articulation_numbers, articulation_work; /* of all their structures and work, */
+    size_t articulation_bytes;  /* the most that one has of both, where blocks have that in their own memory; else 0 */
 
-    bool all_joined;            /* every constraint is of one */
+    bool all_articulated;       /* all constraints are of articulations */
     bool apart;                 /* they are planned to be solved beside the rest (cuda_step_guess) */
     int32_t untouched,
         patience; /* steps that could have been so since one could not; that it takes for it to be tried */
@@ -210,19 +210,20 @@ sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *, struct sadmm_error 
 sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_joint_momentum)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_joint_move)(struct sadmm_context *, struct sadmm_error *error);
-/* joined_memory.cu: the same for bodies that joints join; what depends on the number of pairs. */
-sadmm_status CUDA(load_joined)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);
-void CUDA(view_joined)(struct sadmm_context *);
-sadmm_status CUDA(reserve_joined)(struct sadmm_context *, struct sadmm_error *error);
-/* joined.cu: they are solved directly, before the iterations and after them. Where parts are small they find their
- * contacts themselves, once pair_parts has run; else by the layout. */
-sadmm_status CUDA(launch_joined)(struct sadmm_context *, bool after, struct sadmm_error *error);
+/* articulation_memory.cu: the same for articulations; what depends on the number of pairs. */
+sadmm_status CUDA(load_articulations)(struct sadmm_context *, const struct sadmm_resident_world *,
+                                      struct sadmm_error *error);
+void CUDA(view_articulations)(struct sadmm_context *);
+sadmm_status CUDA(reserve_articulations)(struct sadmm_context *, struct sadmm_error *error);
+/* articulation.cu: their block direct solve, before the iterations and after them. Where parts are small they find
+ * their contacts themselves, once pair_parts has run; else by the layout. */
+sadmm_status CUDA(launch_articulations)(struct sadmm_context *, bool after, struct sadmm_error *error);
 sadmm_status CUDA(launch_pair_parts)(struct sadmm_context *, struct sadmm_error *error);
-cudaError_t CUDA(joined_allow)(int shared_limit); /* once a device */
+cudaError_t CUDA(articulation_allow)(int shared_limit); /* once a device */
 /* joint_close.cu: parts whose joints are off by more than they may be are closed, once their islands are known. */
 sadmm_status CUDA(launch_joint_close)(struct sadmm_context *, struct sadmm_error *error);
 cudaError_t CUDA(joint_close_allow)(int shared_limit);
-size_t CUDA(joined_shared_size)(void); /* of a block, beside the part's own */
-static inline bool joined_is_small(const struct sadmm_context *c) { return c->step->joined_bytes > 0; }
+size_t CUDA(articulation_shared_size)(void); /* of a block, beside the part's own */
+static inline bool articulations_are_small(const struct sadmm_context *c) { return c->step->articulation_bytes > 0; }
 
 #endif

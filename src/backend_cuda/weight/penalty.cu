@@ -38,39 +38,39 @@ static __device__ void add_pair(const model_view &model, const raw_view &raw, co
     }
 }
 
-/* Does a pair hold the island of its body on `side`? Few pairs are static; the others should not pay in registers. */
-static __device__ __noinline__ bool static_pair_holds(const raw_view &raw, const struct sadmm_contact_pair *pair,
-                                                      int side)
+/* Does a pair anchor the island of its body on `side`? Few pairs are static; the others should not pay in registers. */
+static __device__ __noinline__ bool static_pair_anchors(const raw_view &raw, const struct sadmm_contact_pair *pair,
+                                                        int side)
 {
     arm_sums arms = {};
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
         add_arm(&arms, side ? raw.points[k].arm_b : raw.points[k].arm_a, 1);
-    return momentum_is_held(pair->friction, &arms);
+    return momentum_is_anchored(pair->friction, &arms);
 }
 
 /* C of a body with B = 1, in all lanes: each adds up every eighth side. From the raw contacts. Marks islands that are
- * held. Every lane of the warp comes here. */
+ * anchored. Every lane of the warp comes here. */
 static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const body_thread &t, double C[PACKED])
 {
     arm_sums sums = {};
-    bool holds = t.begin == t.end; /* nothing touches it */
+    bool anchors = t.begin == t.end; /* nothing touches it */
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t record = v.graph.incident[at] / 2, side = v.graph.incident[at] & 1;
         if (record < v.contacts.pair_capacity) {
             const struct sadmm_contact_pair *pair = wide_at(v.raw.pairs, (size_t)record);
             add_pair(v.model, v.raw, pair, side, &sums, C);
-            if (!holds && v.islands.info)
-                holds = (side ? pair->body_a : pair->body_b) < 0 ? static_pair_holds(v.raw, pair, side)
-                                                                 : sadmm_pair_rolls(pair, &v.raw.points[pair->first]);
+            if (!anchors && v.islands.info)
+                anchors = (side ? pair->body_a : pair->body_b) < 0 ? static_pair_anchors(v.raw, pair, side)
+                                                                   : sadmm_pair_rolls(pair, &v.raw.points[pair->first]);
         } else {
             add_rows(v.rows, record - v.contacts.pair_capacity, side, C);
-            holds = true; /* left alone */
+            anchors = true; /* left alone */
             if (v.islands.info) v.islands.info[v.graph.label[t.body]].rows = 1;
             if (v.push.bits) v.push.bits[v.graph.label[t.body]] = PUSH_ROWS;
         }
     }
-    if (t.live && holds && v.islands.info) v.islands.info[v.graph.label[t.body]].held = 1;
+    if (t.live && anchors && v.islands.info) v.islands.info[v.graph.label[t.body]].anchored = 1;
     if (v.model.contact_rows == 1 || v.rows.count > 0) sum_lanes<PACKED>(C);
     sum_lanes<sizeof sums / sizeof(double)>(&sums.count);
     add_arm_sums(C, &sums);

@@ -8,7 +8,7 @@
 
 #include "core/math/weight.h"
 
-/* What the contacts of a pair miss. */
+/* The residual of a pair's contacts, as an energy. */
 static inline __device__ double violation_of(const body_view &bodies, const contact_view &contacts,
                                              const weight_view &weights, int32_t p)
 {
@@ -29,8 +29,8 @@ static inline __device__ double violation_of(const body_view &bodies, const cont
     return sum;
 }
 
-/* Of the terms of a body before there are weight scales: what holds its island. */
-enum { TERM_HELD = 4 };
+/* Of the terms of a body before there are weight scales: what anchors its island. */
+enum { TERM_ANCHORED = 4 };
 
 /* What follows from the sums over an island. */
 template <bool SCALES>
@@ -39,7 +39,7 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
     static_assert(sizeof(struct weight_sums) == TERMS * sizeof(double), "a term for each");
     const struct weight_sums sums = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5]};
     /* while there are no scales, the terms of these are others */
-    const cuda_island fresh = {weight_new_island(), 0, 1, !SCALES && sum[TERM_HELD] > 0, 0, 0};
+    const cuda_island fresh = {weight_new_island(), 0, 1, !SCALES && sum[TERM_ANCHORED] > 0, 0, 0};
     if (args.start) *island = fresh;
     weight_update_speed(&island->weights, &sums, args.warm, args.factor);
     if (!SCALES || island->rows) return;
@@ -62,8 +62,8 @@ static inline __device__ double row_side_number(const contact_view &contacts, co
     return sum;
 }
 
-/* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes, in lane SIDE_HOLDS how many
- * sides hold it. ROWS: there may be row blocks; then every lane of the warp comes here. */
+/* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes, in lane SIDE_ANCHORS how
+ * many sides anchor it. ROWS: there may be row blocks; then every lane of the warp comes here. */
 template <bool ROWS>
 static __device__ __forceinline__ double sum_sides(const graph_view &graph, const contact_view &contacts,
                                                    const row_view &rows, const weight_view &weights,
@@ -101,12 +101,12 @@ static __device__ __forceinline__ double sum_sides(const graph_view &graph, cons
 template <bool SCALES, bool RIGID, bool ROWS>
 static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const body_thread &t)
 {
-    double missed = 0, term[TERMS] = {};
+    double violation = 0, term[TERMS] = {};
     for (int32_t at = t.begin + t.lane; SCALES && at < t.end; at += LANES) {
         const int32_t code = v.graph.incident[at], p = code / 2;
         if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.bodies[p].body_a)))
             continue; /* counted there */
-        missed += violation_of(v.bodies, v.contacts, v.weights, p);
+        violation += violation_of(v.bodies, v.contacts, v.weights, p);
     }
     const wide_row<RIGID> row = row_of_body<RIGID>(v.bodies, t);
     const double sum = sum_sides<ROWS>(v.graph, v.contacts, v.rows, v.weights, t), g = t.lane < 6 ? sum : 0,
@@ -119,12 +119,12 @@ static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const
     if (t.live) v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)(t.lane < 6 ? r : 0);
     if (!SCALES) {
         /* a body that nothing touches moves as it should */
-        const double holds = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_HOLDS, LANES);
-        term[TERM_HELD] = t.live && t.begin == t.end ? 1 : holds;
+        const double anchors = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_ANCHORS, LANES);
+        term[TERM_ANCHORED] = t.live && t.begin == t.end ? 1 : anchors;
     } else {
-        sum_lanes<1>(&missed);
+        sum_lanes<1>(&violation);
         term[4] = dot_lanes(r, product(r, row.a_inverse));
-        term[5] = missed;
+        term[5] = violation;
     }
     return own_number(term, t.lane);
 }

@@ -58,7 +58,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     if (add_up_island<add_terms>(v.graph, v.islands, t, t.live, term, total) && t.lane == 0) {
         cuda_island *island = &v.islands.info[v.graph.label[t.body]];
         weigh_island<SCALES>(island, total, args);
-        if (!SCALES && args.start && !island->held) *v.islands.loose = 1;
+        if (!SCALES && args.start && !island->anchored) *v.islands.floating = 1;
     }
 }
 
@@ -103,7 +103,7 @@ static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, co
     let_next_begin(v.model.bodies);
     if (about.rows == 0) return; /* a joint may have fewer than there is room for */
     cuda_island *island = &v.islands.info[label];
-    if (args.start) island->rows = island->held = 1; /* left alone */
+    if (args.start) island->rows = island->anchored = 1; /* left alone */
     if (args.start && v.push.bits) v.push.bits[label] = PUSH_ROWS;
     const double share = weight_share(&island->weights, sums.load2);
     for (int r = 0; r < about.rows; ++r) {

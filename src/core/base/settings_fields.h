@@ -31,8 +31,8 @@
     F(X, REAL, NUMBER, penalty_ratio_limit, 4, 1, 1e6, CLOSED, "'paper': alpha of eq. (15).")                           \
     F(X, FLAG, PLAN, penalty_update_warm, false, 0, 1, ANY, "'paper': also update in steps that start warm.")           \
     F(X, FLAG, PLAN, warm_start, true, 0, 1, ANY, "Start from the last step's impulses and velocities.")                \
-    F(X, WHOLE, PLAN, direct_points, 0, 0, 128, CLOSED,                                                                 \
-      "Islands with joints and at most so many contact points are solved directly; 0: none.")                          \
+    F(X, WHOLE, PLAN, ncp_points, 0, 0, 128, CLOSED,                                                                    \
+      "Islands with joints and at most so many contact points: dense contact solve (NCP); 0: none.")                     \
     F(X, REAL, PLAN, residual_tolerance, 0, 0, 0, FROM, "Stop when both residuals are at most this; 0: never.")         \
     F(X, REAL, NUMBER, certificate_tolerance, 0, 0, 0, FROM,                                                            \
       "Stop when the natural map, m/s, is at most this; 0: never.")                                                     \

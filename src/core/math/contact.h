@@ -82,16 +82,16 @@ SADMM_INLINE int contact_project_rows(const real in[3], real mu, real out[3])
     return law.moves;
 }
 
-/* What a contact misses, in its frame: lambda - Pi_C(lambda - u/w), with u = x + e n and w its response. Its size times
- * w is the natural map, m/s. */
-SADMM_INLINE void contact_missing_rows(const real lambda[3], const real u[3], real mu, real w, real missing[3])
+/* The residual of a contact, in its frame: lambda - Pi_C(lambda - u/w), with u = x + e n and w its response. Its size
+ * times w is the natural map, m/s. */
+SADMM_INLINE void contact_residual_rows(const real lambda[3], const real u[3], real mu, real w, real residual[3])
 {
     real y[3], projected[3];
     SADMM_UNROLL
     for (int k = 0; k < 3; ++k) y[k] = lambda[k] - u[k] / w;
     contact_project_rows(y, mu, projected);
     SADMM_UNROLL
-    for (int k = 0; k < 3; ++k) missing[k] = lambda[k] - projected[k];
+    for (int k = 0; k < 3; ++k) residual[k] = lambda[k] - projected[k];
 }
 
 /* The same as an energy, w |lambda - Pi_C(lambda - u/w)|^2, J. In the world frame, and in double in every precision:
@@ -113,8 +113,8 @@ SADMM_INLINE double contact_violation(const double lambda[3], const double u[3],
     law = contact_law_double_of(normal, tangential2, mu);
     SADMM_UNROLL
     for (int k = 0; k < 3; ++k) {
-        const double missing = lambda[k] - law.push * n[k] - law.shrink * tangential[k];
-        sum += missing * missing;
+        const double residual = lambda[k] - law.push * n[k] - law.shrink * tangential[k];
+        sum += residual * residual;
     }
     return w * sum;
 }

@@ -56,8 +56,8 @@ SADMM_INLINE struct joint_table_way joint_table_go(const struct joint_table *t, 
                                                    double C)
 {
     struct joint_table_way way;
-    double missing = C - A * from - B * joint_table_load(t, from), at = from, area = 0, step;
-    const int ahead = missing > 0;
+    double residual = C - A * from - B * joint_table_load(t, from), at = from, area = 0, step;
+    const int ahead = residual > 0;
     int i = joint_table_segment(t, from), last;
     way.rise = way.steepest = way.steep_length = way.steep_rise = way.points = way.steep_points = 0;
     do {
@@ -65,7 +65,7 @@ SADMM_INLINE struct joint_table_way joint_table_go(const struct joint_table *t, 
         double to_point;
         last = ahead ? i >= t->count - 2 : i <= 0;
         to_point = last ? 0 : t->position[ahead ? i + 1 : i] - at;
-        step = under > 0 ? missing / under : to_point;
+        step = under > 0 ? residual / under : to_point;
         if (!last && (under <= 0 || fabs(step) > fabs(to_point))) step = to_point;
         else last = 1;
         if (slope > way.steepest) {
@@ -75,7 +75,7 @@ SADMM_INLINE struct joint_table_way joint_table_go(const struct joint_table *t, 
         }
         area += step * (way.rise + slope * step / 2);
         way.rise += slope * step;
-        missing -= under * step;
+        residual -= under * step;
         at += step;
         way.mean = slope; /* the mean of a way of no length */
         way.points += !last;

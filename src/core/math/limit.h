@@ -18,7 +18,7 @@
  * so that v ends on or in the sphere that has 0 and v_f at opposite ends, but for W. Few iterations in a step that
  * starts warm are held to that, too, with all of W: what too large a W allows is limited by the above.
  *
- * What contacts cannot change is left alone. Of a loose island, which may move in ways no static contact feels
+ * What contacts cannot change is left alone. Of a floating island, which may move in ways no static contact feels
  * (math/momentum.h), energies are those of the rest of v and v_f, and the rest alone is slowed down. */
 #ifndef SADMM_MATH_LIMIT_H
 #define SADMM_MATH_LIMIT_H
@@ -45,7 +45,7 @@ SADMM_INLINE int limit_is_rounding(const struct limit_energies *e, double epsilo
     return e->now <= LIMIT_RIGID_ROUNDING * epsilon * e->rigid;
 }
 
-/* Of a loose island: the energies of the rest. `along`: as below. */
+/* Of a floating island: the energies of the rest. `along`: as below. */
 SADMM_INLINE void limit_take_rigid(struct limit_energies *e, double *along, const struct momentum_energies *rigid)
 {
     e->now -= rigid->now;

@@ -7,7 +7,7 @@
  *     gram = sum over static rows of (J G)^T J G
  *
  * and along them the momentum of a solution is known, whatever the multipliers: m . G^T (A v - b) = 0. An iteration
- * that is cut short misses it. With the motions m_k of that space, orthonormal by G^T A G,
+ * that is cut short does not reach it. With the motions m_k of that space, orthonormal by G^T A G,
  *
  *     v <- v + G sum_k m_k (m_k . G^T (b - A v))
  *
@@ -19,12 +19,12 @@
 #include "array3.h"
 #include "packed6.h"
 
-/* A pair holds its island if it has friction and three points that are no line, by 1 % or so: no motion is left then.
- * `arms` are of the pair's points on either body. Twice the area of triangles of points, squared, against squares of
- * lengths: sums of both over all pairs of points are invariants of the points' scatter. */
+/* A pair anchors its island if it has friction and three points that are not on a line, by 1 % or so: no motion is left
+ * then. `arms` are of the pair's points on either body. Twice the area of triangles of points, squared, against squares
+ * of lengths: sums of both over all pairs of points are invariants of the points' scatter. */
 #define MOMENTUM_NO_LINE 1e-4
 
-SADMM_INLINE int momentum_is_held(double friction, const struct arm_sums *arms)
+SADMM_INLINE int momentum_is_anchored(double friction, const struct arm_sums *arms)
 {
     const double *r = arms->r, *rr = arms->rr, share = arms->count > 0 ? 1 / arms->count : 0;
     const double xx = rr[0] - share * r[0] * r[0], yy = rr[1] - share * r[1] * r[1], zz = rr[2] - share * r[2] * r[2],
@@ -113,7 +113,7 @@ SADMM_INLINE void momentum_add_row(double gram[PACKED6 + 1], const double jacobi
 
 /* The motions, and the momentum along each. */
 struct momentum_motions {
-    int count; /* 0: the island is held */
+    int count; /* 0: the island is anchored */
     double motion[6][6];
     double now[6], free[6]; /* m . G^T A v, m . G^T b; square roots of twice an energy */
 };
@@ -216,7 +216,7 @@ SADMM_INLINE int momentum_inverse_root(const struct momentum_sums *s, const doub
     return 1;
 }
 
-/* Of an island in the air, which is what most are that are not held: the centre of mass moves, and the island turns
+/* Of an island in the air, as most floating ones are: the centre of mass moves, and the island turns
  * about it, either without the other. False where the inertia is lost to rounding. */
 SADMM_INLINE int momentum_find_free(const struct momentum_sums *s, struct momentum_motions *out)
 {
@@ -288,9 +288,9 @@ SADMM_INLINE void momentum_measure(struct momentum_motions *motions, const doubl
     for (int k = 0; k < motions->count; ++k) motions->now[k] = dense6_dot(motions->motion[k], now);
 }
 
-/* Energies of the rigid part, J: of v, of A^-1 b, of both together; of what v misses. */
+/* Energies of the rigid part, J: of v, of A^-1 b, of both together; of the residual. */
 struct momentum_energies {
-    double now, free, along, missing;
+    double now, free, along, residual;
 };
 
 SADMM_INLINE struct momentum_energies momentum_energies_of(const struct momentum_motions *motions)
@@ -298,11 +298,11 @@ SADMM_INLINE struct momentum_energies momentum_energies_of(const struct momentum
     struct momentum_energies e = {0, 0, 0, 0};
     SADMM_ROLLED
     for (int k = 0; k < motions->count; ++k) {
-        const double now = motions->now[k], free = motions->free[k], miss = free - now;
+        const double now = motions->now[k], free = motions->free[k], residual = free - now;
         e.now += now * now / 2;
         e.free += free * free / 2;
         e.along += now * free / 2;
-        e.missing += miss * miss / 2;
+        e.residual += residual * residual / 2;
     }
     return e;
 }

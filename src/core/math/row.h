@@ -26,7 +26,7 @@
 
 #include "real.h"
 
-/* What is missing of the equation. */
+/* The residual of the equation. */
 SADMM_INLINE real row_residual(real gain, real bias, real compliance, real x, real lambda)
 {
     return gain * x + bias + compliance * lambda;
@@ -49,12 +49,12 @@ SADMM_INLINE real row_bounded(real lambda, real lo, real hi, real *change)
  * row alone, times w, m/s. */
 SADMM_INLINE real row_natural_map(real gain, real bias, real compliance, real lo, real hi, real x, real lambda, real w)
 {
-    const real missing = row_residual(gain, bias, compliance, x, lambda), under = compliance + gain * w;
-    real change = -missing / under;
+    const real residual = row_residual(gain, bias, compliance, x, lambda), under = compliance + gain * w;
+    real change = -residual / under;
     const real unbounded = change;
     row_bounded(lambda, lo, hi, &change);
     /* w / (gain w) is exactly 1 */
-    return change == unbounded ? real_abs(missing) * (w / under) : real_abs(change) * w;
+    return change == unbounded ? real_abs(residual) * (w / under) : real_abs(change) * w;
 }
 
 #endif

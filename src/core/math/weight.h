@@ -39,7 +39,7 @@ SADMM_INLINE double weight_row_floor(int rigid, int iterations)
 struct weight_sums {
     double energy, mass;                 /* g . A^-1 g, J; kg */
     double kinetic, push;                /* v . A v, J; the sizes of the impulses that the bodies feel, N s */
-    double momentum_residual, violation; /* r . A^-1 r; what contacts miss (math/contact.h); J, for the weight scale */
+    double momentum_residual, violation; /* r . A^-1 r; contact residual (math/contact.h); J, for the weight scale */
 };
 
 /* What the weights of an island's constraints are made of. */
@@ -71,8 +71,8 @@ SADMM_INLINE double weight_mass(double load, double speed, double mass)
  *
  *     q^2 = sum w |lambda - Pi_C(lambda - (x + e n)/w)|^2 / sum r . A^-1 r,      r = A v - b - J^T lambda
  *
- * what the contacts miss over what the momentum misses, both energies in J. Near 0.1 is usual. Where the momentum lags
- * behind (masses that differ by decades, in no order) the weights are too large. Where nothing but the contacts is
+ * the residual of the contacts over that of the momentum, both energies in J. Near 0.1 is usual. Where the momentum
+ * lags behind (masses that differ by decades, in no order) the weights are too large. Where nothing but the contacts is
  * left, impulses move at constant speed along directions that no body feels; then the island stalls, and keeps the
  * weights it has, times what the weight scale rises by: new ones would be felt. */
 enum { WEIGHT_FIRST_SCALE = 6 };
@@ -230,7 +230,7 @@ SADMM_INLINE void weight_add_row(struct weight_row_sums *sums, double lambda, do
  * share lambda_r^2 + phi / w, so that its bounds and its compliance are met by itself; of a contact (cone)
  * share |lambda|^2 + phi / w. A row nobody feels (w = 0) has no weight.
  *
- * An iteration brings a velocity on by a share of about 1 / (1 + w B) of what is missing, so that rows that do not hold
+ * An iteration brings a velocity on by a share of about 1 / (1 + w B) of the residual, so that rows that do not hold
  * their bodies should not weigh on them: one whose multiplier is at a bound (a drive at its largest force, friction
  * that slips, a limit that is not met) has 1 / w, with which it lets go or holds in one iteration by itself; a soft
  * one has no more than some times what it resists with, gain / compliance in kg. */

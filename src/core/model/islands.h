@@ -1,4 +1,4 @@
-/* Islands: bodies joined by constraints. */
+/* Islands: bodies connected by constraints. */
 #ifndef SADMM_CORE_MODEL_ISLANDS_H
 #define SADMM_CORE_MODEL_ISLANDS_H
 

@@ -1,12 +1,12 @@
 /* Momentum and energy of islands with joints (docs/internals/algorithm.md, "Momentum"). Iterations that are cut short
- * miss some of the momentum, weights of the direct solve hold on to more, and bodies without the trapezoid correction
- * go other ways than impulses between them were made for. So it is restored once all of that is known: velocities at
- * the end of the step change by a rigid motion of the whole island about where its bodies are then, which no joint
- * feels and no contact between them. What it should be follows from b, what bodies are halfway, and the impulses'
- * places there: of static contacts, and of rows of joints with what does not move by itself. Where the correction is
- * off, an airborne island is moved as a whole to where its centre of mass gets to by the mean of its velocities: a
- * weight halfway would turn it about any other point. And where rows turn by more than a step resolves it is left with
- * no more energy than in free motion. In double. */
+ * leave some of the momentum out, weights of the block direct solve keep more, and bodies without the trapezoid
+ * correction go other ways than impulses between them were made for. So it is restored once all of that is known:
+ * velocities at the end of the step change by a rigid motion of the whole island about where its bodies are then, which
+ * no joint feels and no contact between them. What it should be follows from b, what bodies are halfway, and the
+ * impulses' places there: of static contacts, and of rows of joints with what does not move by itself. Where the
+ * correction is off, an airborne island is moved as a whole to where its centre of mass gets to by the mean of its
+ * velocities: a weight halfway would turn it about any other point. And where rows turn by more than a step resolves it
+ * is left with no more energy than in free motion. In double. */
 #ifndef SADMM_CORE_MODEL_JOINT_MOMENTUM_H
 #define SADMM_CORE_MODEL_JOINT_MOMENTUM_H
 
@@ -14,12 +14,12 @@
 #include "joint_trapezoid.h"
 #include "system_math.h"
 
-/* Is there something to restore? bits: of an island, but for ISLAND_HELD where that is not known yet. What nothing
+/* Is there something to restore? bits: of an island, but for ISLAND_ANCHORED where that is not known yet. What nothing
  * touches has it already, but where the stiffness of joints holds on to some, or they have been closed; and what hangs on
  * rows that turn by more than a step resolves (joint_law.h) has neither its impulses nor its weight where they act. */
-SADMM_INLINE bool joint_island_is_loose(int bits)
+SADMM_INLINE bool joint_island_is_floating(int bits)
 {
-    if (!(bits & ISLAND_JOINED) || bits & ISLAND_HELD) return false;
+    if (!(bits & ISLAND_ARTICULATED) || bits & ISLAND_ANCHORED) return false;
     if (bits & ISLAND_MOORED) return bits & (ISLAND_TOUCHED | ISLAND_TRAPEZOID_OFF) && !(bits & ISLAND_TURNS);
     return (bits & (ISLAND_TOUCHED | ISLAND_TRAPEZOID_OFF | ISLAND_STRAYS | ISLAND_CLOSED)) != 0;
 }

@@ -10,15 +10,15 @@
 #include "rolling.h"
 #include "spin.h"
 
-/* Of islands. TOUCHED: by a contact; HELD: by one, or by a joint, that leaves it no motion (math/momentum.h); RESTORED: on
- * a device, its momentum is (joint_momentum.h); TURNS: rows of it turn by more than a step resolves; POWERED: springs,
- * drives or armatures act; MOORED: rows hold it to what does not move by itself; STRAYS: joints stiffen its bodies;
- * CLOSED: its joints have been closed. */
+/* Of islands. TOUCHED: by a contact; ANCHORED: by one, or by a joint, that leaves it no motion (math/momentum.h);
+ * RESTORED: on a device, its momentum is (joint_momentum.h); TURNS: rows of it turn by more than a step resolves;
+ * POWERED: springs, drives or armatures act; MOORED: rows hold it to what does not move by itself; STRAYS: joints
+ * stiffen its bodies; CLOSED: its joints have been closed. */
 enum {
-    ISLAND_JOINED = 1,
+    ISLAND_ARTICULATED = 1,
     ISLAND_TRAPEZOID_OFF = 2,
     ISLAND_TOUCHED = 4,
-    ISLAND_HELD = 8,
+    ISLAND_ANCHORED = 8,
     ISLAND_RESTORED = 16,
     ISLAND_TURNS = 32,
     ISLAND_POWERED = 64,

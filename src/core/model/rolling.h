@@ -103,15 +103,15 @@ SADMM_INLINE void rolling_begin(struct sadmm_rigid *body)
     body->rolls = ROLLING_OWES | ROLLING_IS_STIFF;
 }
 
-/* Sums over its contacts, which may be the body's own; from: where it was as the step began; joined: its island has
- * joints, or nothing round rolls. */
-SADMM_INLINE void rolling_keep(struct sadmm_rigid *body, const double from[3], double dt, bool joined, double owed[6],
-                               const double stiffness[6])
+/* Sums over its contacts, which may be the body's own; from: where it was as the step began; articulated: its island
+ * has joints, or nothing round rolls. */
+SADMM_INLINE void rolling_keep(struct sadmm_rigid *body, const double from[3], double dt, bool articulated,
+                               double owed[6], const double stiffness[6])
 {
     int k;
     rolling_moved(from, body->position, owed);
     body->rolls = ROLLING_OWES | (rolling_is_unresolved(body->inertia, dt, stiffness) ? ROLLING_IS_STIFF : 0) |
-                  (joined ? 0 : ROLLING_TURNS_ON);
+                  (articulated ? 0 : ROLLING_TURNS_ON);
     for (k = 0; k < 6; ++k) {
         body->owed[k] = owed[k];
         body->stiffness[k] = stiffness[k];

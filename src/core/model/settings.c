@@ -51,7 +51,7 @@ static sadmm_status check(const struct sadmm_setting *of, double x, struct sadmm
                       of->ends == SADMM_SETTING_ABOVE ? ">" : ">=", of->lo);
 }
 
-_Static_assert((int)SADMM_MOST_SUBSTEPS == 64 && (int)SADMM_MOST_DIRECT_POINTS == 128 && (int)SADMM_MOST_HITS == 64,
+_Static_assert((int)SADMM_MOST_SUBSTEPS == 64 && (int)SADMM_MOST_NCP_POINTS == 128 && (int)SADMM_MOST_HITS == 64,
                "ranges are as in the list");
 
 sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadmm_error *error)

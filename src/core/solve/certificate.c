@@ -92,9 +92,9 @@ static void project_cone(const double r[3], double mu, double out[3])
 /* One contact in its frame: lambda and u = x + e, rows (n, t, t). */
 static double contact_map(struct tally *tally, const double lambda[3], const double u[3], double mu, double w)
 {
-    double missing[3], p[3], error2 = 0;
-    contact_missing_rows(lambda, u, mu, w, missing);
-    for (int i = 0; i < 3; ++i) error2 += square(tally, missing[i]);
+    double residual[3], p[3], error2 = 0;
+    contact_residual_rows(lambda, u, mu, w, residual);
+    for (int i = 0; i < 3; ++i) error2 += square(tally, residual[i]);
 
     /* siconos' fc3d_unitary_compute_and_add_error: natural map with rho = 1 of the modified velocity. */
     double modified[3] = {lambda[0] - u[0] - mu * hypot(u[1], u[2]), lambda[1] - u[1], lambda[2] - u[2]};
@@ -141,11 +141,11 @@ static void certify_pair(struct tally *tally, const struct sadmm_system *system,
 static double row_map(struct tally *tally, const struct sadmm_rows *rows, size_t r, double x, double w)
 {
     const double lambda = rows->lambda[r], gain = rows->gain[r], compliance = rows->compliance[r];
-    const double missing = row_residual(gain, rows->bias[r], compliance, x, lambda);
+    const double residual = row_residual(gain, rows->bias[r], compliance, x, lambda);
     if (sadmm_row_is_coupled(rows, r)) { /* K is the whole line for a hard row: r - P_K(r - u) = u. */
-        tally->u2 += square(tally, missing);
+        tally->u2 += square(tally, residual);
         tally->r2 += square(tally, lambda);
-        tally->map2 += square(tally, missing);
+        tally->map2 += square(tally, residual);
     }
     return row_natural_map(gain, rows->bias[r], compliance, rows->lo[r], rows->hi[r], x, lambda, w);
 }

@@ -16,7 +16,7 @@ struct sadmm_plan {
     int32_t bodies;         /* dynamic */
     int32_t pairs, points;  /* contacts given by geometry */
     int32_t row_constraints; /* constraints given by Jacobian rows */
-    bool rows_apart;         /* they do not iterate: nothing else touches their bodies, which are solved directly */
+    bool rows_apart;         /* they do not iterate: nothing else touches their bodies: block direct solve */
     int contact_rows;       /* rows of a geometric contact: 0 no contact, 1 every mu is 0, 3 otherwise */
     bool rigid;             /* world level: bodies are given by their state, A is (m I, world inertia) */
     bool gyroscopic;        /* some body has unequal principal moments (world level) */

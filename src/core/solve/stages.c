@@ -81,7 +81,7 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
     case SADMM_STAGE_BLOCK_SOLVE_AGAIN:
     case SADMM_STAGE_REACTIONS:
     case SADMM_STAGE_JOINT_MOTION: return s->world && plan->row_constraints > 0;
-    case SADMM_STAGE_NCP_SOLVE: return s->world && plan->row_constraints > 0 && s->settings->direct_points > 0;
+    case SADMM_STAGE_NCP_SOLVE: return s->world && plan->row_constraints > 0 && s->settings->ncp_points > 0;
     case SADMM_STAGE_TURN: return !sadmm_stages_in_last_substep(s);
     case SADMM_STAGE_WRENCHES: return s->world && plan->wrenches;
     case SADMM_STAGE_CERTIFY: return s->world && plan->certificate;

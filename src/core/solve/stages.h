@@ -26,7 +26,7 @@ enum sadmm_stage_kind {
     SADMM_STAGE_JOINT_ROWS,         /* -    rows of joints, gears and couplings */
     SADMM_STAGE_PLAN,               /* -    what this sub-step needs, found from its contacts and rows */
     SADMM_STAGE_PUSH_CHOICE,        /* -    islands that are pushed apart without a velocity (push.h) */
-    SADMM_STAGE_BLOCK_SOLVE,        /* -    bodies with joints, directly (joined.h), and what stiffens them */
+    SADMM_STAGE_BLOCK_SOLVE,        /* -    bodies with joints, directly (articulation.h), and what stiffens them */
     SADMM_STAGE_PREDICT,            /* -    FAST: loads to start from (loads.h) */
     SADMM_STAGE_BODIES,             /* A    A_i, b_i */
     SADMM_STAGE_CONTACTS,           /* B    contacts in the solver's form */
@@ -42,7 +42,7 @@ enum sadmm_stage_kind {
     SADMM_STAGE_PUSH_SOLVE,         /* -    the second problem: velocities that push apart */
     SADMM_STAGE_INTEGRATE,          /* Q states after dt, each body's position correction included (math/trapezoid.h) */
     SADMM_STAGE_BLOCK_SOLVE_AGAIN,  /* -    bodies with joints, beside the contact impulses found */
-    SADMM_STAGE_NCP_SOLVE,          /* -    contacts of small islands with joints, exactly (direct.h) */
+    SADMM_STAGE_NCP_SOLVE,          /* -    contacts of small islands with joints, exactly (ncp.h) */
     SADMM_STAGE_REACTIONS,          /* -    what joints keep and report */
     SADMM_STAGE_KINEMATIC,          /* -    kinematic bodies and the targets of couplings go on */
     SADMM_STAGE_JOINT_MOTION,       /* -    states of bodies with joints after dt: correction, closing, momentum */

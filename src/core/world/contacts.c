@@ -3,7 +3,7 @@
 
 #include "collision/mesh.h"
 #include "core/base/memory.h"
-#include "core/model/joined.h"
+#include "core/model/articulation.h"
 #include "core/model/system_math.h"
 #include "world_internal.h"
 
@@ -245,7 +245,8 @@ void sadmm_world_find_wrenches(sadmm_world *world, const sadmm_settings *setting
                 const struct sadmm_contact_point *point = &world->contacts.points[k];
                 for (int j = 0; j < 6; ++j)
                     world->wrench[6 * (size_t)body + (size_t)j] +=
-                        joined_point_load(side ? point->arm_b : point->arm_a, point->impulse, side, j) / settings->dt;
+                        articulation_point_load(side ? point->arm_b : point->arm_a, point->impulse, side, j) /
+                            settings->dt;
             }
         }
     }

@@ -152,7 +152,7 @@ void sadmm_world_swap_starts(sadmm_world *world)
 struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world, int substep)
 {
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
-    const bool joined = sadmm_pair_table_count(&world->joined_pairs) > 0;
+    const bool jointed = sadmm_pair_table_count(&world->jointed_pairs) > 0;
     struct sadmm_collision_input input = {
         .shapes = world->shapes,
         .shape_count = world->shape_slots,
@@ -167,8 +167,8 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
         .substeps_left = settings.substeps - 1 - substep,
         .margin = world->def.contact_margin,
         .threads = last_threads(world),
-        .disabled_body_pairs = joined ? world->filtered_pairs : world->disabled_pairs.keys,
-        .disabled_body_pair_count = joined ? world->filtered_count : sadmm_pair_table_count(&world->disabled_pairs),
+        .disabled_body_pairs = jointed ? world->filtered_pairs : world->disabled_pairs.keys,
+        .disabled_body_pair_count = jointed ? world->filtered_count : sadmm_pair_table_count(&world->disabled_pairs),
         .friction_pairs = world->friction_pairs.keys,
         .friction_values = world->friction_pairs.values,
         .friction_pair_count = sadmm_pair_table_count(&world->friction_pairs),

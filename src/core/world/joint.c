@@ -202,14 +202,14 @@ static sadmm_status add_pair(sadmm_world *world, const struct sadmm_world_joint 
 {
     uint64_t key;
     if (!leaves_out(joint, &key)) return SADMM_OK;
-    const double *before = sadmm_pair_table_find(&world->joined_pairs, key);
-    return sadmm_pair_table_set(&world->joined_pairs, key, (before ? *before : 0) + 1, &world->error);
+    const double *before = sadmm_pair_table_find(&world->jointed_pairs, key);
+    return sadmm_pair_table_set(&world->jointed_pairs, key, (before ? *before : 0) + 1, &world->error);
 }
 
 static void remove_pair(sadmm_world *world, const struct sadmm_world_joint *joint)
 {
     uint64_t key;
-    if (leaves_out(joint, &key)) sadmm_pair_table_lower(&world->joined_pairs, key);
+    if (leaves_out(joint, &key)) sadmm_pair_table_lower(&world->jointed_pairs, key);
 }
 
 bool sadmm_world_reserve_joints(sadmm_world *world, size_t slots)

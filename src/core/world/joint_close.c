@@ -6,7 +6,7 @@
 #include "core/model/joint_close.h"
 #include "core/model/forces.h"
 #include "core/model/joint_trapezoid.h"
-#include "core/solve/joined.h"
+#include "core/solve/articulation.h"
 #include "world_internal.h"
 
 /* A joint's ends as the step began, and where it has left its bodies; what moves there is of account for its scale. */
@@ -125,11 +125,11 @@ static sadmm_status find_folding(sadmm_world *world, bool *any)
     if (!sadmm_grow_empty(&world->folding, &world->folding_capacity, n, sizeof *world->folding))
         return sadmm_fail_memory(&world->error, "joints that fold");
     memset(world->folding, 0, n);
-    if (!sadmm_joined_has_loops(world->joined)) return SADMM_OK;
+    if (!sadmm_articulations_has_loops(world->articulations)) return SADMM_OK;
     if (!sadmm_grow_empty(&world->row_left, &world->row_left_capacity, rows, sizeof *world->row_left))
         return sadmm_fail_memory(&world->error, "joints that fold");
     memset(world->row_left, 0, rows * sizeof *world->row_left);
-    sadmm_joined_find_left(world->joined, world->joint_constraints, world->row_left);
+    sadmm_articulations_find_left(world->articulations, world->joint_constraints, world->row_left);
     for (size_t r = 0; r < world->joint_rows; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
         struct sadmm_world_joint *joint = &world->joints[source->joint];
@@ -141,7 +141,7 @@ static sadmm_status find_folding(sadmm_world *world, bool *any)
         }
         *was = world->row_left[r];
     }
-    if (*any) sadmm_joined_mark_parts(world->joined, world->folding);
+    if (*any) sadmm_articulations_mark_parts(world->articulations, world->folding);
     return SADMM_OK;
 }
 
@@ -235,8 +235,8 @@ static sadmm_status turn_speeds(sadmm_world *world, const struct sadmm_system *s
     if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
     memset(world->closing.bias, 0, world->closing.row_count * sizeof *world->closing.bias);
     mark_islands(world, world->folding);
-    return sadmm_joined_close(world->joined, system, world->closing_slots, world->joint_constraint_count, settings,
-                              world->folding, true, world->next, &world->error);
+    return sadmm_articulations_close(world->articulations, system, world->closing_slots, world->joint_constraint_count,
+                                     settings, world->folding, true, world->next, &world->error);
 }
 
 sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *settings, double *off)
@@ -254,10 +254,11 @@ sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *
         if (!any && !folding) begin_costs(world, settings);
         any = true;
         if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
-        sadmm_joined_mark_parts(world->joined, world->opened);
+        sadmm_articulations_mark_parts(world->articulations, world->opened);
         mark_islands(world, world->opened);
-        TRY(sadmm_joined_close(world->joined, &system, world->closing_slots, world->joint_constraint_count, settings,
-                               world->opened, false, world->next, &world->error));
+        TRY(sadmm_articulations_close(world->articulations, &system, world->closing_slots,
+                                      world->joint_constraint_count, settings, world->opened, false, world->next,
+                                          &world->error));
     }
     if (!any && !folding) return SADMM_OK;
     end_costs(world, settings);

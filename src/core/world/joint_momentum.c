@@ -6,9 +6,9 @@
 #include "core/model/joint_momentum.h"
 #include "world_internal.h"
 
-static bool is_loose(const sadmm_world *world, int32_t body)
+static bool is_floating(const sadmm_world *world, int32_t body)
 {
-    return joint_island_is_loose(world->joint_touch[world->joint_labels[body]]);
+    return joint_island_is_floating(world->joint_touch[world->joint_labels[body]]);
 }
 
 static struct joint_momentum *sums_of(const sadmm_world *world, int32_t body)
@@ -22,15 +22,15 @@ static const double *origin_of(const sadmm_world *world, int32_t body)
 }
 
 /* The dynamic body of two where it is the only one, and in such an island; -1: else. */
-static int32_t loose_alone(const sadmm_world *world, int32_t a, int32_t b)
+static int32_t floating_alone(const sadmm_world *world, int32_t a, int32_t b)
 {
     const int32_t body = a >= 0 ? a : b;
-    return (a >= 0 && b >= 0) || !is_loose(world, body) ? -1 : body;
+    return (a >= 0 && b >= 0) || !is_floating(world, body) ? -1 : body;
 }
 
 static void add_pair(const sadmm_world *world, const struct sadmm_contact_pair *pair, double dt)
 {
-    const int32_t body = loose_alone(world, pair->body_a, pair->body_b);
+    const int32_t body = floating_alone(world, pair->body_a, pair->body_b);
     if (body < 0) return;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &world->contacts.points[k];
@@ -42,7 +42,7 @@ static void add_pair(const sadmm_world *world, const struct sadmm_contact_pair *
 static void add_rows(const sadmm_world *world, const struct sadmm_row_constraint *constraint, double dt)
 {
     const struct sadmm_rows *rows = &world->start.rows;
-    const int32_t body = loose_alone(world, constraint->body_a, constraint->body_b);
+    const int32_t body = floating_alone(world, constraint->body_a, constraint->body_b);
     if (body < 0) return;
     for (size_t r = (size_t)constraint->first; r < (size_t)(constraint->first + constraint->count); ++r)
         joint_add_static_row(sums_of(world, body),
@@ -54,7 +54,7 @@ static void add_body(const sadmm_world *world, int32_t i, const sadmm_settings *
 {
     const struct sadmm_rigid *next = &world->next[i];
     double halfway[4];
-    if (!is_loose(world, i)) return;
+    if (!is_floating(world, i)) return;
     q_store(spin_turned_halfway(&world->start.rigid[i], settings->dt), halfway);
     joint_add_momentum(sums_of(world, i), &world->start.rigid[i], halfway, next->position, next->orientation,
                        next->velocity, origin_of(world, i), settings);
@@ -64,7 +64,7 @@ static void add_body(const sadmm_world *world, int32_t i, const sadmm_settings *
 static void add_to_island(const sadmm_world *world, int32_t i)
 {
     const int32_t label = world->joint_labels[i];
-    if (!is_loose(world, i) || label == i) return;
+    if (!is_floating(world, i) || label == i) return;
     double *to = (double *)sums_of(world, label);
     const double *from = (const double *)sums_of(world, i);
     for (int k = 0; k < JOINT_MOMENTUM_SUMS; ++k) to[k] += from[k];
@@ -81,11 +81,11 @@ static size_t number_bodies(const sadmm_world *world)
 {
     size_t count = 0;
     for (int32_t i = 0; i < world->dynamic_count; ++i)
-        if (is_loose(world, i)) world->joint_number[i] = (int32_t)count++;
+        if (is_floating(world, i)) world->joint_number[i] = (int32_t)count++;
     return count;
 }
 
-sadmm_status sadmm_world_restore_joined(sadmm_world *world, const sadmm_settings *settings)
+sadmm_status sadmm_world_restore_articulated(sadmm_world *world, const sadmm_settings *settings)
 {
     const int32_t n = world->dynamic_count;
     if (!sadmm_grow_empty(&world->joint_number, &world->joint_number_capacity, (size_t)n, sizeof *world->joint_number))
@@ -103,7 +103,7 @@ sadmm_status sadmm_world_restore_joined(sadmm_world *world, const sadmm_settings
     for (int32_t i = 0; i < n; ++i) add_to_island(world, i);
     for (int32_t i = 0; i < n; ++i) {
         const int32_t label = world->joint_labels[i];
-        if (!is_loose(world, i)) continue;
+        if (!is_floating(world, i)) continue;
         if (label == i) joint_restoring(sums_of(world, i), world->joint_touch[i], settings->dt); /* comes first */
         restore(world, i);
     }

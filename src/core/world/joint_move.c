@@ -27,24 +27,24 @@ static void add_constraint(const sadmm_world *world, const struct sadmm_row_cons
                                               trapezoid_of(world, constraint->body_b, settings->dt)};
     uint16_t *island = island_of(world, constraint->body_a, constraint->body_b);
     int moorings = 0;
-    *island |= ISLAND_JOINED;
+    *island |= ISLAND_ARTICULATED;
     for (int32_t k = 0; k < constraint->count; ++k) {
         const size_t r = (size_t)(constraint->first + k);
         moorings |= joint_mooring(&world->joint_sources[r], rows->lambda[r], bodies);
         *island |= (uint16_t)joint_row_touches(&world->joint_sources[r], rows->lambda[r], rows->jacobian_a + 6 * r,
                                               rows->jacobian_b + 6 * r, bodies, settings);
     }
-    if (moorings == JOINT_MOORED_WHOLLY) *island |= ISLAND_HELD;
+    if (moorings == JOINT_MOORED_WHOLLY) *island |= ISLAND_ANCHORED;
 }
 
 /* A static pair that leaves its island no motion. */
-static bool holds(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
+static bool anchors(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
 {
     struct arm_sums arms = {0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
     if (pair->body_a >= 0 && pair->body_b >= 0) return false;
     for (int32_t p = pair->first; p < pair->first + pair->count; ++p)
         add_arm(&arms, pair->body_a >= 0 ? contacts->points[p].arm_a : contacts->points[p].arm_b, 1);
-    return momentum_is_held(pair->friction, &arms);
+    return momentum_is_anchored(pair->friction, &arms);
 }
 
 static void find_islands(const sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings)
@@ -57,8 +57,8 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
     for (size_t k = 0; k < contacts->pair_count; ++k) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[k];
         uint16_t *island = island_of(world, pair->body_a, pair->body_b);
-        if (!(*island & ISLAND_JOINED)) continue;
-        *island |= ISLAND_TOUCHED | (holds(contacts, pair) ? ISLAND_HELD : 0);
+        if (!(*island & ISLAND_ARTICULATED)) continue;
+        *island |= ISLAND_TOUCHED | (anchors(contacts, pair) ? ISLAND_ANCHORED : 0);
         if (*island & ISLAND_TRAPEZOID_OFF) continue;
         const struct joint_trapezoid bodies[2] = {trapezoid_of(world, pair->body_a, settings->dt),
                                                   trapezoid_of(world, pair->body_b, settings->dt)};
@@ -72,7 +72,7 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
     }
 }
 
-sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *settings, double *off)
+sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settings *settings, double *off)
 {
     const struct sadmm_system system = sadmm_world_system(world);
     const size_t n = (size_t)system.body_count;
@@ -85,7 +85,7 @@ sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *s
         struct sadmm_rigid *next = &world->next[i];
         if (world->start.rigid[i].rolls & ROLLING_IS_STIFFENED)
             world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
-        if (!(island & ISLAND_JOINED)) continue;
+        if (!(island & ISLAND_ARTICULATED)) continue;
         next->mean = !(island & ISLAND_TRAPEZOID_OFF);
         double halfway[4];
         q_store(spin_turned_halfway(&world->start.rigid[i], settings->dt), halfway);
@@ -98,5 +98,5 @@ sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *s
             *island_of(world, constraint->body_a, constraint->body_b) & ISLAND_TRAPEZOID_OFF;
     }
     TRY(sadmm_world_close_joints(world, settings, off));
-    return sadmm_world_restore_joined(world, settings);
+    return sadmm_world_restore_articulated(world, settings);
 }

@@ -125,17 +125,18 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
 /* Both lists, sorted; a pair that is in both stands there twice. */
 static sadmm_status filter_pairs(sadmm_world *world)
 {
-    struct sadmm_pair_table *own = &world->disabled_pairs, *joined = &world->joined_pairs;
-    const size_t of_own = sadmm_pair_table_count(own), of_joined = sadmm_pair_table_count(joined), count = of_own + of_joined;
+    struct sadmm_pair_table *own = &world->disabled_pairs, *jointed = &world->jointed_pairs;
+    const size_t of_own = sadmm_pair_table_count(own), of_jointed = sadmm_pair_table_count(jointed),
+                 count = of_own + of_jointed;
     TRY(sadmm_pair_table_list(own, &world->error));
-    TRY(sadmm_pair_table_list(joined, &world->error));
+    TRY(sadmm_pair_table_list(jointed, &world->error));
     TRY(sadmm_pair_table_list(&world->friction_pairs, &world->error));
-    if (of_joined == 0) return SADMM_OK;
+    if (of_jointed == 0) return SADMM_OK;
     if (!sadmm_grow_empty(&world->filtered_pairs, &world->filtered_capacity, count, sizeof *world->filtered_pairs))
-        return sadmm_fail_memory(&world->error, "pairs of joined bodies");
+        return sadmm_fail_memory(&world->error, "pairs of jointed bodies");
     for (size_t k = 0, i = 0, j = 0; k < count; ++k) {
-        const bool from_own = j == of_joined || (i < of_own && own->keys[i] < joined->keys[j]);
-        world->filtered_pairs[k] = from_own ? own->keys[i++] : joined->keys[j++];
+        const bool from_own = j == of_jointed || (i < of_own && own->keys[i] < jointed->keys[j]);
+        world->filtered_pairs[k] = from_own ? own->keys[i++] : jointed->keys[j++];
     }
     world->filtered_count = count;
     return SADMM_OK;

@@ -30,7 +30,7 @@ bool sadmm_world_may_reside(const sadmm_world *world)
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
     if (fast && !world->stepped) return false;
-    if (s->direct_points > 0 && world->joint_count > 0) return false;
+    if (s->ncp_points > 0 && world->joint_count > 0) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
 }

@@ -30,10 +30,10 @@ static bool is_restored(const sadmm_world *world, const struct sadmm_contact_pai
            joint_island_is_loose(world->joint_touch[world->joint_labels[pair->body_a]]);
 }
 
-static bool is_joined(const sadmm_world *world, int32_t body)
+static bool is_articulated(const sadmm_world *world, int32_t body)
 {
     return world->start.rows.constraint_count > 0 &&
-           world->joint_touch[world->joint_labels[body]] & ISLAND_JOINED;
+           world->joint_touch[world->joint_labels[body]] & ISLAND_ARTICULATED;
 }
 
 void sadmm_world_keep_rolling(sadmm_world *world, double dt)
@@ -47,7 +47,7 @@ void sadmm_world_keep_rolling(sadmm_world *world, double dt)
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_rigid *next = &world->next[i];
         if (next->rolls)
-            rolling_keep(next, world->start.rigid[i].position, dt, is_joined(world, i) || !rolling_turns_on(next),
+            rolling_keep(next, world->start.rigid[i].position, dt, is_articulated(world, i) || !rolling_turns_on(next),
                          next->owed, next->stiffness);
     }
 }

@@ -467,7 +467,7 @@ static void archive_joints(struct sadmm_archive *archive, sadmm_world *world)
     }
     world->joint_slots = slots;
     for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot) archive_joint(archive, world, slot);
-    archive_pair_table(archive, &world->joined_pairs, world->body_slots);
+    archive_pair_table(archive, &world->jointed_pairs, world->body_slots);
 }
 
 /* ---- gears and couplings ----------------------------------------------------------------------------------------- */

@@ -8,7 +8,7 @@ enum { MOVING_TYPES = 1 << SADMM_BODY_DYNAMIC | 1 << SADMM_BODY_KINEMATIC };
 static bool apart(const sadmm_world *world, int32_t a, int32_t b)
 {
     const uint64_t key = sadmm_pair_key((size_t)a, (size_t)b);
-    return sadmm_pair_table_find(&world->disabled_pairs, key) || sadmm_pair_table_find(&world->joined_pairs, key);
+    return sadmm_pair_table_find(&world->disabled_pairs, key) || sadmm_pair_table_find(&world->jointed_pairs, key);
 }
 
 sadmm_status sadmm_world_list_seen(sadmm_world *world, size_t slot, size_t *count)

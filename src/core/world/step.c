@@ -158,40 +158,40 @@ struct host_step {
     int iterations;        /* of all of them */
     bool unconverged;      /* one of them has not met a stop rule */
     int32_t limited;       /* islands, most of any */
-    int32_t direct;        /* islands solved directly in this sub-step */
+    int32_t ncp;           /* islands changed by the dense contact solve in this sub-step */
     int32_t pushed;        /* bodies moved out of overlaps in this sub-step */
     int64_t islands_above; /* likewise, but of the last sub-step; -1: no stop rule */
     double ms[SADMM_PHASE_COUNT];
 };
 
-/* Bodies with joints, directly. */
-static sadmm_status solve_joined(struct host_step *step, const uint8_t *stiffened, bool after)
+/* The block direct solve of articulations. */
+static sadmm_status solve_articulations(struct host_step *step, const uint8_t *stiffened, bool after)
 {
     sadmm_world *world = step->world;
-    if (!world->joined) world->joined = sadmm_joined_create();
-    if (!world->joined) return sadmm_fail_memory(&world->error, "joined bodies");
-    return sadmm_joined_solve(world->joined, &step->system, world->joint_constraints, world->joint_constraint_count,
-                              &step->settings, stiffened, after, &world->error);
+    if (!world->articulations) world->articulations = sadmm_articulations_create();
+    if (!world->articulations) return sadmm_fail_memory(&world->error, "articulations");
+    return sadmm_articulations_solve(world->articulations, &step->system, world->joint_constraints,
+                                     world->joint_constraint_count, &step->settings, stiffened, after, &world->error);
 }
 
 /* Before the iterations; again with the stiffness of the forces that this finds. */
-static sadmm_status begin_joined(struct host_step *step)
+static sadmm_status begin_articulations(struct host_step *step)
 {
     sadmm_world *world = step->world;
     bool stiffened;
-    TRY(solve_joined(step, NULL, false));
+    TRY(solve_articulations(step, NULL, false));
     TRY(sadmm_world_stiffen(world, &step->settings, &stiffened));
-    return stiffened ? solve_joined(step, world->stiffened, false) : SADMM_OK;
+    return stiffened ? solve_articulations(step, world->stiffened, false) : SADMM_OK;
 }
 
-/* What the iterations have left of islands with joints (core/solve/direct.h). */
-static sadmm_status solve_direct(struct host_step *step)
+/* The dense contact solve (NCP) of islands with joints (core/solve/ncp.h). */
+static sadmm_status solve_ncp(struct host_step *step)
 {
     sadmm_world *world = step->world;
-    if (!world->direct) world->direct = sadmm_direct_create();
-    if (!world->direct) return sadmm_fail_memory(&world->error, "islands that are solved directly");
-    return sadmm_direct_solve(world->direct, world->joined, &step->system, world->joint_constraints, &step->settings,
-                              &step->direct, &world->error);
+    if (!world->ncp) world->ncp = sadmm_ncp_create();
+    if (!world->ncp) return sadmm_fail_memory(&world->error, "islands of the dense contact solve");
+    return sadmm_ncp_solve(world->ncp, world->articulations, &step->system, world->joint_constraints, &step->settings,
+                           &step->ncp, &world->error);
 }
 
 /* Which islands are pushed apart without a velocity (core/solve/push.h). */
@@ -233,8 +233,8 @@ static sadmm_status make_plan(struct host_step *step)
     TRY(sadmm_world_enter_support_frame(world, &step->system));
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
-    step->direct = step->pushed = 0;
-    if (world->joined) sadmm_joined_begin(world->joined);
+    step->ncp = step->pushed = 0;
+    if (world->articulations) sadmm_articulations_begin(world->articulations);
     TRY(keep_start(world, &step->depth_now));
     step->depth = step->depth_now > step->depth ? step->depth_now : step->depth;
     return SADMM_OK;
@@ -287,7 +287,7 @@ static sadmm_status find_wrenches(const struct host_step *step)
 {
     sadmm_world *world = step->world;
     sadmm_world_add_kinematic_wrenches(world, &step->settings);
-    if (step->direct == 0) TRY(world->kernels->recover_wrenches(world->context, world->wrench, &world->error));
+    if (step->ncp == 0) TRY(world->kernels->recover_wrenches(world->context, world->wrench, &world->error));
     else sadmm_world_find_wrenches(world, &step->settings); /* by impulses that the backend has not */
     for (size_t i = 0; i < (size_t)world->dynamic_count; ++i)
         for (int k = 0; k < 6; ++k)
@@ -316,14 +316,14 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     case SADMM_STAGE_JOINT_ROWS: return sadmm_world_make_rows(world, settings);
     case SADMM_STAGE_PLAN: return make_plan(step);
     case SADMM_STAGE_PUSH_CHOICE: return choose_pushes(step);
-    case SADMM_STAGE_BLOCK_SOLVE: return begin_joined(step);
+    case SADMM_STAGE_BLOCK_SOLVE: return begin_articulations(step);
     case SADMM_STAGE_PUSH_SOLVE: return solve_pushes(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
-    case SADMM_STAGE_BLOCK_SOLVE_AGAIN: return solve_joined(step, NULL, true);
-    case SADMM_STAGE_NCP_SOLVE: return solve_direct(step);
+    case SADMM_STAGE_BLOCK_SOLVE_AGAIN: return solve_articulations(step, NULL, true);
+    case SADMM_STAGE_NCP_SOLVE: return solve_ncp(step);
     case SADMM_STAGE_REACTIONS: sadmm_world_keep_rows(world, settings); return SADMM_OK;
     case SADMM_STAGE_KINEMATIC: return move_kinematic(step);
-    case SADMM_STAGE_JOINT_MOTION: return sadmm_world_move_joined(world, settings, &step->joint_drift);
+    case SADMM_STAGE_JOINT_MOTION: return sadmm_world_move_articulated(world, settings, &step->joint_drift);
     case SADMM_STAGE_PUSH_MOTION: move_pushed(step); return SADMM_OK;
     case SADMM_STAGE_KEEP: return keep(step);
     case SADMM_STAGE_WRENCHES: return find_wrenches(step);

@@ -57,8 +57,8 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_collision_destroy(world->collision);
     sadmm_contact_set_free(&world->contacts);
     sadmm_certificate_workspace_free(&world->certificate_workspace);
-    sadmm_joined_destroy(world->joined);
-    sadmm_direct_destroy(world->direct);
+    sadmm_articulations_destroy(world->articulations);
+    sadmm_ncp_destroy(world->ncp);
     sadmm_push_destroy(world->push);
     sadmm_rows_free(&world->start.rows);
     sadmm_rows_free(&world->last_start.rows);
@@ -70,7 +70,7 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_world_free_events(world);
     struct sadmm_slot_set *const taken[] = {&world->bodies_taken, &world->shapes_taken, &world->joints_taken,
                                             &world->own_joints, &world->gears_taken, &world->couplings_taken};
-    struct sadmm_pair_table *const pairs[] = {&world->disabled_pairs, &world->joined_pairs, &world->friction_pairs};
+    struct sadmm_pair_table *const pairs[] = {&world->disabled_pairs, &world->jointed_pairs, &world->friction_pairs};
     for (size_t i = 0; i < sizeof taken / sizeof *taken; ++i) sadmm_slots_destroy(taken[i]);
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; ++i) sadmm_pair_table_free(pairs[i]);
     sadmm_world_free_hits(world);

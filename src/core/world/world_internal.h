@@ -28,9 +28,9 @@
 #include "core/model/coupling_law.h"
 #include "core/model/joint_law.h"
 #include "core/model/settings.h"
+#include "core/solve/articulation.h"
 #include "core/solve/certificate.h"
-#include "core/solve/direct.h"
-#include "core/solve/joined.h"
+#include "core/solve/ncp.h"
 #include "core/solve/push.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
@@ -203,7 +203,7 @@ struct sadmm_world {
     size_t coupling_slots, coupling_capacity;
     int32_t coupling_count;
     struct sadmm_slot_set couplings_taken;
-    struct sadmm_pair_table joined_pairs; /* bodies that do not meet for their joints; values: how many joints */
+    struct sadmm_pair_table jointed_pairs; /* bodies that do not meet for their joints; values: how many joints */
     uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
     size_t filtered_count, filtered_capacity;
     struct sadmm_joint_source *joint_sources; /* of the step's rows */
@@ -318,8 +318,8 @@ struct sadmm_world {
     char why[SADMM_WHY_SIZE];
     struct sadmm_certificate_workspace certificate_workspace;
     int64_t certified_step; /* the step that the workspace's contacts are of, as report.step counts; -1: of none */
-    struct sadmm_joined *joined; /* made with the first joint */
-    struct sadmm_direct *direct; /* made with the first island that is solved directly */
+    struct sadmm_articulations *articulations; /* made with the first joint */
+    struct sadmm_ncp *ncp;       /* made with the first dense contact solve */
     struct sadmm_push *push;     /* made with the first overlap */
     sadmm_step_report report;
 };
@@ -430,7 +430,7 @@ void sadmm_world_commit_joints(sadmm_world *world);
 
 /* Bodies of islands with joints as they are after the step, in the place of what the backend made of them, once the
  * others have moved. off: the largest error of a locked translation that is left, m. */
-sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *settings, double *off);
+sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settings *settings, double *off);
 
 /* ---- joint_stiffen.c ---- */
 
@@ -446,7 +446,7 @@ sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *
 /* ---- joint_momentum.c ---- */
 
 /* In `next`: islands with joints that contacts touch, once they have been moved. */
-sadmm_status sadmm_world_restore_joined(sadmm_world *world, const sadmm_settings *settings);
+sadmm_status sadmm_world_restore_articulated(sadmm_world *world, const sadmm_settings *settings);
 
 /* ---- report.c ---- */
 

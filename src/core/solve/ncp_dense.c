@@ -1,11 +1,11 @@
-#include "direct_dense.h"
+#include "ncp_dense.h"
 
 #include <math.h>
 #include <string.h>
 
 /* ---- laws -------------------------------------------------------------------------------------------------------- */
 
-void direct_project(const struct direct_law *law, const double y[3], double to[3], double D[3][3])
+void ncp_project(const struct ncp_law *law, const double y[3], double to[3], double D[3][3])
 {
     memset(D, 0, 9 * sizeof(double));
     if (law->count == 1) {
@@ -30,24 +30,24 @@ void direct_project(const struct direct_law *law, const double y[3], double to[3
     }
 }
 
-void direct_arrive(const struct direct_dense *d, const struct direct_law *law, double y[3])
+void ncp_arrive(const struct ncp_dense *d, const struct ncp_law *law, double y[3])
 {
     for (int32_t k = 0; k < law->count; ++k) y[k] = d->lambda[law->first + k] - d->u[law->first + k] / law->response;
 }
 
-static double map_of(const struct direct_dense *d, const struct direct_law *law)
+static double map_of(const struct ncp_dense *d, const struct ncp_law *law)
 {
     double y[3], to[3], D[3][3], sum = 0;
-    direct_arrive(d, law, y);
-    direct_project(law, y, to, D);
+    ncp_arrive(d, law, y);
+    ncp_project(law, y, to, D);
     for (int32_t k = 0; k < law->count; ++k) {
-        const double missing = d->lambda[law->first + k] - to[k];
-        sum += missing * missing;
+        const double residual = d->lambda[law->first + k] - to[k];
+        sum += residual * residual;
     }
     return sqrt(sum) * law->response;
 }
 
-double direct_natural_map(const struct direct_dense *d)
+double ncp_natural_map(const struct ncp_dense *d)
 {
     double most = 0;
     for (int32_t i = 0; i < d->laws; ++i) {
@@ -57,7 +57,7 @@ double direct_natural_map(const struct direct_dense *d)
     return most;
 }
 
-void direct_respond(const struct direct_dense *d, int32_t number, double x, double *u)
+void ncp_respond(const struct ncp_dense *d, int32_t number, double x, double *u)
 {
     for (int32_t r = 0; r < d->size; ++r) u[r] += d->G[(size_t)r * (size_t)d->size + (size_t)number] * x;
 }
@@ -72,7 +72,7 @@ static void exchange(double *a, double *b, size_t count)
     }
 }
 
-bool direct_factor(double *M, int32_t *pivot, int32_t count)
+bool ncp_factor(double *M, int32_t *pivot, int32_t count)
 {
     const size_t n = (size_t)count;
     for (size_t k = 0; k < n; ++k) {
@@ -94,7 +94,7 @@ bool direct_factor(double *M, int32_t *pivot, int32_t count)
     return true;
 }
 
-void direct_substitute(const double *M, const int32_t *pivot, int32_t count, double *x)
+void ncp_substitute(const double *M, const int32_t *pivot, int32_t count, double *x)
 {
     const size_t n = (size_t)count;
     for (size_t k = 0; k < n; ++k) exchange(x + k, x + pivot[k], (size_t)pivot[k] != k);

@@ -1,10 +1,10 @@
-/* Islands that are solved directly after the iterations (core/solve/direct.h): contacts and rows to rounding, whatever
- * the iterations. */
+/* Islands of the dense contact solve (NCP) after the iterations (core/solve/ncp.h): contacts and rows to rounding,
+ * whatever the iterations. */
 #include "scene_tools.h"
 #include "solvers.h"
 
-#include "core/solve/direct_interior.h"
-#include "core/solve/direct_newton.h"
+#include "core/solve/ncp_interior.h"
+#include "core/solve/ncp_newton.h"
 
 /* ---- Newton's steps on dense problems ----------------------------------------------------------------------------- */
 
@@ -17,9 +17,9 @@ static double uniform(uint32_t *random)
 }
 
 struct dense_problem {
-    struct direct_law law[MOST_CONTACTS + MOST_ROWS];
-    double J[SIZE][6 * MOST_CONTACTS], G[SIZE * SIZE], lambda[SIZE], u[SIZE], work[SIZE * (SIZE + DIRECT_VECTORS)];
-    struct direct_dense dense;
+    struct ncp_law law[MOST_CONTACTS + MOST_ROWS];
+    double J[SIZE][6 * MOST_CONTACTS], G[SIZE * SIZE], lambda[SIZE], u[SIZE], work[SIZE * (SIZE + NCP_VECTORS)];
+    struct ncp_dense dense;
 };
 
 /* Contacts and bounded rows on so many degrees of freedom, fewer of them than there are numbers where `freedoms` is
@@ -44,15 +44,15 @@ static void make_dense(struct dense_problem *p, int contacts, int rows, int free
         for (int i = 0; i < n; ++i) p->u[i] += p->J[i][k] * motion;
     }
     for (int i = 0; i < contacts; ++i) {
-        p->law[i] = (struct direct_law){.first = 3 * i, .count = 3, .friction = i % 3 == 2 ? 0 : 0.5};
+        p->law[i] = (struct ncp_law){.first = 3 * i, .count = 3, .friction = i % 3 == 2 ? 0 : 0.5};
         for (int k = 0; k < 3; ++k) p->law[i].response = fmax(p->law[i].response, p->G[(3 * i + k) * (n + 1)]);
     }
     for (int i = 0; i < rows; ++i) {
         const int at = 3 * contacts + i;
-        p->law[contacts + i] = (struct direct_law){
+        p->law[contacts + i] = (struct ncp_law){
             .first = at, .count = 1, .response = p->G[at * (n + 1)], .lo = i % 2 ? 0 : -0.1, .hi = i % 2 ? INFINITY : 0.1};
     }
-    p->dense = (struct direct_dense){contacts + rows, n, p->law, p->G, p->lambda, p->u, p->work, 1e9};
+    p->dense = (struct ncp_dense){contacts + rows, n, p->law, p->G, p->lambda, p->u, p->work, 1e9};
 }
 
 /* Twelve contacts of one body, four each with a floor and two walls; it falls, and slips by so much. */
@@ -73,7 +73,7 @@ static void make_corner(struct dense_problem *p, double speed, uint32_t *random)
             for (int q = 0; q < 3; ++q)
                 J[3 + q] = at[(q + 1) % 3] * axis[(q + 2) % 3] - at[(q + 2) % 3] * axis[(q + 1) % 3];
         }
-        p->law[i] = (struct direct_law){.first = 3 * i, .count = 3, .friction = 0.4};
+        p->law[i] = (struct ncp_law){.first = 3 * i, .count = 3, .friction = 0.4};
     }
     for (int k = 0; k < 3; ++k) motion[k] = -0.05, motion[3 + k] = speed * uniform(random);
     for (int i = 0; i < n; ++i) {
@@ -85,7 +85,7 @@ static void make_corner(struct dense_problem *p, double speed, uint32_t *random)
         }
         p->law[i / 3].response = fmax(p->law[i / 3].response, p->G[i * (n + 1)]);
     }
-    p->dense = (struct direct_dense){MOST_CONTACTS, n, p->law, p->G, p->lambda, p->u, p->work, 1e9};
+    p->dense = (struct ncp_dense){MOST_CONTACTS, n, p->law, p->G, p->lambda, p->u, p->work, 1e9};
 }
 
 /* With its own u from the start, not the one that is carried along. */
@@ -96,7 +96,7 @@ static double map_from_scratch(struct dense_problem *p, const double *start)
         p->u[i] = start[i];
         for (int j = 0; j < n; ++j) p->u[i] += p->G[i * n + j] * p->lambda[j];
     }
-    return direct_natural_map(&p->dense);
+    return ncp_natural_map(&p->dense);
 }
 
 START_TEST(dense_problems_are_solved)
@@ -109,7 +109,7 @@ START_TEST(dense_problems_are_solved)
                   all = 3 * contacts + rows, freedoms = _i ? all / 2 + 1 : all + 6;
         make_dense(&p, contacts, rows, freedoms, (uint32_t)(7919 * k + 1));
         memcpy(start, p.u, sizeof start);
-        const double before = direct_natural_map(&p.dense), best = direct_newton(&p.dense, 1e-13),
+        const double before = ncp_natural_map(&p.dense), best = ncp_newton(&p.dense, 1e-13),
                      after = map_from_scratch(&p, start);
         /* u is a sum of some 40 products of numbers around 10, of which one rounding is 1e-15 */
         ck_assert_double_lt(fabs(after - best), 1e-11);
@@ -133,10 +133,10 @@ START_TEST(redundant_contacts_near_rest_are_solved)
         uint32_t random = (uint32_t)(104729 * k + 3);
         make_corner(&p, speed, &random);
         memcpy(start, p.u, sizeof start);
-        inside += direct_interior(&p.dense, 0) < 1e-4 * speed; /* near enough to tell what slips from what sticks */
+        inside += ncp_interior(&p.dense, 0) < 1e-4 * speed; /* near enough to tell what slips from what sticks */
         memcpy(p.u, start, sizeof start);
         memset(p.lambda, 0, sizeof p.lambda);
-        direct_newton(&p.dense, 1e-13);
+        ncp_newton(&p.dense, 1e-13);
         solved += map_from_scratch(&p, start) < 1e-11; /* rounding of u, as above */
     }
     ck_assert_msg(solved == SEEDS, "%d of %d", solved, SEEDS);
@@ -155,25 +155,25 @@ START_TEST(one_contact_by_hand)
         {{-1, 3, 4}, 0, {0.5, 0, 0}},                                                     /* smooth */
         {{0.5, 1, 0}, 0.5, {0, 0, 0}},                                                    /* leaves */
     };
-    double G[9] = {2, 0, 0, 0, 2, 0, 0, 0, 2}, lambda[3] = {0.3, 0, 0}, u[3], work[3 * (3 + DIRECT_VECTORS)];
-    const struct direct_law law = {.first = 0, .count = 3, .response = 2, .friction = cases[_i].friction};
-    struct direct_dense dense = {1, 3, &law, G, lambda, u, work, 1e6};
+    double G[9] = {2, 0, 0, 0, 2, 0, 0, 0, 2}, lambda[3] = {0.3, 0, 0}, u[3], work[3 * (3 + NCP_VECTORS)];
+    const struct ncp_law law = {.first = 0, .count = 3, .response = 2, .friction = cases[_i].friction};
+    struct ncp_dense dense = {1, 3, &law, G, lambda, u, work, 1e6};
     for (int k = 0; k < 3; ++k) u[k] = cases[_i].u[k] + 2 * lambda[k];
-    ck_assert_double_lt(direct_newton(&dense, 1e-15), 1e-15);
+    ck_assert_double_lt(ncp_newton(&dense, 1e-15), 1e-15);
     for (int k = 0; k < 3; ++k) ck_assert_double_lt(fabs(lambda[k] - cases[_i].lambda[k]), 1e-15);
 }
 END_TEST
 
 /* ---- worlds ------------------------------------------------------------------------------------------------------- */
 
-static sadmm_world *scene_world(const char *spec, int solver, int iterations, int direct_points)
+static sadmm_world *scene_world(const char *spec, int solver, int iterations, int ncp_points)
 {
     struct sadmm_scene scene = open_scene(spec);
     scene.def.backend = solvers[solver].backend;
     scene.def.precision = solvers[solver].precision;
     scene.def.settings.method = solvers[solver].method;
     scene.def.settings.iterations = iterations;
-    scene.def.settings.direct_points = direct_points;
+    scene.def.settings.ncp_points = ncp_points;
     scene.def.settings.certify = true;
     sadmm_world *world = build_scene(&scene);
     return world;
@@ -278,7 +278,7 @@ START_TEST(momentum_is_kept)
 {
     sadmm_world_def def = sadmm_world_def_default();
     def.backend = solvers[_i].backend, def.precision = solvers[_i].precision, def.settings.method = solvers[_i].method;
-    def.settings.gravity[2] = 0, def.settings.iterations = 1, def.settings.direct_points = 128;
+    def.settings.gravity[2] = 0, def.settings.iterations = 1, def.settings.ncp_points = 128;
     sadmm_world *world = create_world(&def);
     sadmm_body_id body[3];
     static const double mass[3] = {1, 3, 2};
@@ -338,7 +338,7 @@ static sadmm_world *floor_world(int solver)
     sadmm_body_id id;
     def.backend = solvers[solver].backend, def.precision = solvers[solver].precision;
     def.settings.method = solvers[solver].method;
-    def.settings.direct_points = 128, def.settings.certify = true;
+    def.settings.ncp_points = 128, def.settings.certify = true;
     sadmm_world *world = create_world(&def);
     ground.type = SADMM_BODY_STATIC;
     plane.type = SADMM_SHAPE_PLANE;
@@ -480,8 +480,8 @@ END_TEST
 
 int main(void)
 {
-    Suite *suite = suite_create("direct");
-    TCase *tests = tcase_create("direct");
+    Suite *suite = suite_create("ncp");
+    TCase *tests = tcase_create("ncp");
     tcase_set_timeout(tests, 120);
     tcase_add_loop_test(tests, dense_problems_are_solved, 0, 2);
     tcase_add_test(tests, redundant_contacts_near_rest_are_solved);

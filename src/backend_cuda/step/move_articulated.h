@@ -1,15 +1,15 @@
 /* Where joints let bodies go, and what joints remember of it (docs/internals/algorithm.md, "Time stepping of rows"). */
-#ifndef SADMM_CUDA_STEP_MOVE_JOINED_H
-#define SADMM_CUDA_STEP_MOVE_JOINED_H
+#ifndef SADMM_CUDA_STEP_MOVE_ARTICULATED_H
+#define SADMM_CUDA_STEP_MOVE_ARTICULATED_H
 
 #include "core/model/gear_law.h"
 #include "core/model/joint_momentum.h"
 #include "move.h"
 
 /* Body i of an island with joints goes where these let it. */
-static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i)
+static __device__ __noinline__ void move_articulated(const cuda_view &v, int32_t i)
 {
-    const int32_t label = joined_label(v, i), bits = v.joints.touch[label];
+    const int32_t label = articulation_label(v, i), bits = v.joints.touch[label];
     const body_before before = fetch_body(v.step, i);
     const double dt = v.model.settings->dt;
     const bool trapezoid_off = bits & ISLAND_TRAPEZOID_OFF;
@@ -38,7 +38,7 @@ static __device__ __forceinline__ void end_joints(const cuda_view &v, int32_t j)
     const struct sadmm_row_constraint *first = &v.raw.constraints[constraint];
     if (first->count == 0) return;
     joints.after[j].trapezoid_off =
-        joints.touch[joined_label(v, first->body_a >= 0 ? first->body_a : first->body_b)] & ISLAND_TRAPEZOID_OFF;
+        joints.touch[articulation_label(v, first->body_a >= 0 ? first->body_a : first->body_b)] & ISLAND_TRAPEZOID_OFF;
 }
 
 #endif

@@ -1,4 +1,4 @@
-#include "joined_order.h"
+#include "articulation_order.h"
 
 #include <string.h>
 
@@ -66,8 +66,8 @@ static bool add_around(struct maker *m, int32_t body, int32_t most_around, int32
     return m->first[body + 1] - m->first[body] > most_around;
 }
 
-/* Constraints that hang together, breadth first from the lowest number. They are solved together or not at all: what is
- * left out presses on bodies, too, and a part knows nothing of it. */
+/* Connected constraints, breadth first from the lowest number. They are solved together or not at all: what is left out
+ * acts on bodies, too, and a part knows nothing of it. */
 static void find_parts(struct maker *m, int32_t most_around)
 {
     int32_t taken = 0;
@@ -99,7 +99,7 @@ struct graph {
     int32_t count, words;
     uint64_t *near;
     int32_t *degree;
-    uint8_t *gone, *held; /* eliminated; a neighbour is being so in this level */
+    uint8_t *gone, *adjacent; /* eliminated; a neighbour is being so in this level */
 };
 
 static uint64_t *near_of(const struct graph *g, int32_t i) { return g->near + (size_t)i * (size_t)g->words; }
@@ -126,7 +126,7 @@ static bool make_graph(const struct maker *m, int32_t part, int32_t *number, str
     g->degree = (int32_t *)sadmm_alloc((size_t)g->count + 1, sizeof *g->degree);
     g->gone = (uint8_t *)sadmm_alloc(2 * (size_t)g->count + 1, 1);
     if (!g->near || !g->degree || !g->gone) return false;
-    g->held = g->gone + g->count;
+    g->adjacent = g->gone + g->count;
     for (int32_t i = 0; i < g->count; ++i) number[member[i]] = i;
     for (int32_t i = 0; i < g->count; ++i)
         for (int s = 0; s < 2; ++s) {
@@ -169,23 +169,23 @@ static void take_level(struct graph *g, int32_t *order, int32_t *taken)
     int32_t least = INT32_MAX;
     for (int32_t i = 0; i < g->count; ++i)
         if (!g->gone[i] && g->degree[i] < least) least = g->degree[i];
-    memset(g->held, 0, (size_t)g->count);
+    memset(g->adjacent, 0, (size_t)g->count);
     for (int32_t i = 0; i < g->count; ++i) {
-        if (g->gone[i] || g->held[i] || g->degree[i] > least + DEGREE_SLACK) continue;
+        if (g->gone[i] || g->adjacent[i] || g->degree[i] > least + DEGREE_SLACK) continue;
         order[(*taken)++] = i;
-        EACH_NEAR(g, i, j) g->held[j] = 1;
+        EACH_NEAR(g, i, j) g->adjacent[j] = 1;
     }
     for (int32_t at = begin; at < *taken; ++at) eliminate(g, order[at]);
 }
 
 /* ---- the structure of a part ------------------------------------------------------------------------------------- */
 
-/* While it is made: the order of elimination, and of each place the level and the rows of its column. */
+/* While it is made: the order of elimination, and of each column its level and its rows. */
 struct columns {
-    int32_t *order, *place, *level; /* place -> constraint of the part, and back; place -> its level */
-    int32_t *first, *rows;          /* places + 1; as they were found: constraints of the part */
+    int32_t *order, *column, *level; /* column -> constraint of the part, and back; column -> its level */
+    int32_t *first, *rows;          /* columns + 1; as they were found: constraints of the part */
     size_t row_count, row_capacity;
-    int32_t places, levels;
+    int32_t columns, levels;
     int64_t updates;
 };
 
@@ -201,14 +201,14 @@ static bool find_columns(struct graph *g, struct columns *c)
     int32_t taken = 0;
     c->order = (int32_t *)sadmm_alloc(4 * n + 1, sizeof *c->order);
     if (!c->order) return false;
-    c->place = c->order + n, c->level = c->place + n, c->first = c->level + n;
-    c->places = g->count;
+    c->column = c->order + n, c->level = c->column + n, c->first = c->level + n;
+    c->columns = g->count;
     while (taken < g->count && c->updates <= MOST_UPDATES) {
         const int32_t begin = taken;
         take_level(g, c->order, &taken);
         for (int32_t at = begin; at < taken; ++at) {
             if (!sadmm_grow(&c->rows, &c->row_capacity, c->row_count, c->row_count + n, sizeof *c->rows)) return false;
-            c->place[c->order[at]] = at;
+            c->column[c->order[at]] = at;
             c->level[at] = c->levels;
             EACH_NEAR(g, c->order[at], j) c->rows[c->row_count++] = j;
             c->first[at + 1] = (int32_t)c->row_count;
@@ -220,15 +220,15 @@ static bool find_columns(struct graph *g, struct columns *c)
     return true;
 }
 
-/* The numbers of a structure as they grow: arrays are added in the order of joined_structure_at(). */
+/* The numbers of a structure as they grow: arrays are added in the order of articulation_structure_at(). */
 struct writer {
-    struct sadmm_joined_order *order;
+    struct sadmm_articulation_order *order;
     size_t begin, end; /* of this structure */
 };
 
 static int32_t *add(struct writer *w, size_t count)
 {
-    struct sadmm_joined_order *o = w->order;
+    struct sadmm_articulation_order *o = w->order;
     if (!sadmm_grow(&o->numbers, &o->numbers_capacity, w->end, w->end + count + 1, sizeof *o->numbers)) return NULL;
     int32_t *to = o->numbers + w->end;
     memset(to, 0, count * sizeof *to);
@@ -237,25 +237,25 @@ static int32_t *add(struct writer *w, size_t count)
 }
 
 /* What there is of it so far. */
-static struct joined_structure written(const struct writer *w)
+static struct articulation_structure written(const struct writer *w)
 {
-    return joined_structure_at(w->order->numbers + w->begin);
+    return articulation_structure_at(w->order->numbers + w->begin);
 }
 static int32_t *counts(const struct writer *w) { return w->order->numbers + w->begin; }
 
-/* Constraints by place; bodies as they come, and the sides of places. entry: bodies -> -1, before and after. */
+/* Constraints by column; bodies as they come, and the sides of columns. entry: bodies -> -1, before and after. */
 static bool write_bodies(struct writer *w, const struct maker *m, const int32_t *member, const struct columns *c,
                          int32_t *entry)
 {
-    const size_t n = (size_t)c->places;
-    if (!add(w, JOINED_COUNTS)) return false;
-    counts(w)[0] = c->places, counts(w)[1] = c->first[n], counts(w)[2] = c->levels;
+    const size_t n = (size_t)c->columns;
+    if (!add(w, ARTICULATION_COUNTS)) return false;
+    counts(w)[0] = c->columns, counts(w)[1] = c->first[n], counts(w)[2] = c->levels;
     int32_t *constraint = add(w, n), count = 0;
     if (!constraint) return false;
-    for (int32_t p = 0; p < c->places; ++p) constraint[p] = member[c->order[p]];
+    for (int32_t p = 0; p < c->columns; ++p) constraint[p] = member[c->order[p]];
     int32_t *body = add(w, 2 * n); /* more than there are */
     if (!body) return false;
-    for (int32_t p = 0; p < c->places; ++p)
+    for (int32_t p = 0; p < c->columns; ++p)
         for (int s = 0; s < 2; ++s) {
             const int32_t i = m->bodies[2 * member[c->order[p]] + s];
             if (i < 0 || entry[i] >= 0) continue;
@@ -266,12 +266,12 @@ static bool write_bodies(struct writer *w, const struct maker *m, const int32_t 
     counts(w)[3] = count;
     int32_t *side = add(w, 2 * n);
     if (!side) return false;
-    for (int32_t p = 0; p < c->places; ++p)
+    for (int32_t p = 0; p < c->columns; ++p)
         for (int s = 0; s < 2; ++s) {
             const int32_t i = m->bodies[2 * member[c->order[p]] + s];
             side[2 * p + s] = i < 0 ? -1 : entry[i];
         }
-    const struct joined_structure made = written(w);
+    const struct articulation_structure made = written(w);
     for (int32_t e = 0; e < count; ++e) entry[made.body[e]] = -1;
     return true;
 }
@@ -285,32 +285,32 @@ static int32_t common_of(const int32_t *row_sides, const int32_t *column_sides)
     return bits;
 }
 
-/* Rows of a column by their places, ascending. */
+/* Rows of a column, ascending. */
 static bool write_blocks(struct writer *w, const struct columns *c)
 {
-    const size_t n = (size_t)c->places, blocks = (size_t)c->first[n];
+    const size_t n = (size_t)c->columns, blocks = (size_t)c->first[n];
     int32_t *first_of_level = add(w, (size_t)c->levels + 1);
     if (!first_of_level) return false;
-    for (int32_t p = c->places - 1; p >= 0; --p) first_of_level[c->level[p]] = p;
-    first_of_level[c->levels] = c->places;
+    for (int32_t p = c->columns - 1; p >= 0; --p) first_of_level[c->level[p]] = p;
+    first_of_level[c->levels] = c->columns;
     int32_t *first_below = add(w, n + 1 + 3 * blocks);
     if (!first_below) return false;
     int32_t *row = first_below + n + 1, *column = row + blocks, *common = column + blocks;
     const int32_t *side = written(w).side;
     memcpy(first_below, c->first, (n + 1) * sizeof *first_below);
-    for (int32_t j = 0; j < c->places; ++j)
+    for (int32_t j = 0; j < c->columns; ++j)
         for (int32_t k = c->first[j]; k < c->first[j + 1]; ++k) {
-            const int32_t place = c->place[c->rows[k]];
+            const int32_t number = c->column[c->rows[k]];
             int32_t to = k;
-            for (; to > c->first[j] && row[to - 1] > place; --to) row[to] = row[to - 1];
-            row[to] = place;
+            for (; to > c->first[j] && row[to - 1] > number; --to) row[to] = row[to - 1];
+            row[to] = number;
             column[k] = j;
         }
     for (size_t b = 0; b < blocks; ++b) common[b] = common_of(side + 2 * row[b], side + 2 * column[b]);
     return true;
 }
 
-static int32_t find_block(const struct joined_structure *s, int32_t row, int32_t column)
+static int32_t find_block(const struct articulation_structure *s, int32_t row, int32_t column)
 {
     int32_t low = s->first_below[column], high = s->first_below[column + 1] - 1;
     while (low < high) {
@@ -322,12 +322,12 @@ static int32_t find_block(const struct joined_structure *s, int32_t row, int32_t
 }
 
 /* Every column takes from each pair of its rows. Into `next` how many a node has, or (update) into the list. */
-static void each_update(const struct joined_structure *s, int32_t *next, int32_t *update)
+static void each_update(const struct articulation_structure *s, int32_t *next, int32_t *update)
 {
-    for (int32_t k = 0; k < s->places; ++k)
+    for (int32_t k = 0; k < s->columns; ++k)
         for (int32_t w = s->first_below[k]; w < s->first_below[k + 1]; ++w)
             for (int32_t u = w; u < s->first_below[k + 1]; ++u) {
-                const int32_t node = u == w ? s->row[w] : s->places + find_block(s, s->row[u], s->row[w]);
+                const int32_t node = u == w ? s->row[w] : s->columns + find_block(s, s->row[u], s->row[w]);
                 if (update) {
                     update[2 * next[node]] = u;
                     update[2 * next[node] + 1] = w;
@@ -338,8 +338,8 @@ static void each_update(const struct joined_structure *s, int32_t *next, int32_t
 
 static bool write_updates(struct writer *w)
 {
-    struct joined_structure s = written(w);
-    const size_t nodes = (size_t)s.places + (size_t)s.blocks;
+    struct articulation_structure s = written(w);
+    const size_t nodes = (size_t)s.columns + (size_t)s.blocks;
     int32_t *first = add(w, nodes + 1);
     if (!first) return false;
     s = written(w);
@@ -366,21 +366,21 @@ static void put_group(int32_t *next, int32_t *list, int32_t level, int32_t of, i
 }
 
 /* Updates of nodes by the level of the column that they come from: 2 level, + 1 for blocks below the diagonal. */
-static void each_push(const struct joined_structure *s, const int32_t *level, int32_t *next, int32_t *list)
+static void each_scatter(const struct articulation_structure *s, const int32_t *level, int32_t *next, int32_t *list)
 {
-    for (int32_t node = 0; node < s->places + s->blocks; ++node)
+    for (int32_t node = 0; node < s->columns + s->blocks; ++node)
         for (int32_t at = s->first_update[node], end; at < s->first_update[node + 1]; at = end) {
             const int32_t from = level[s->column[s->update[2 * at]]];
             for (end = at + 1; end < s->first_update[node + 1]; ++end)
                 if (level[s->column[s->update[2 * end]]] != from) break;
-            put_group(next, list, 2 * from + (node >= s->places), node, at, end);
+            put_group(next, list, 2 * from + (node >= s->columns), node, at, end);
         }
 }
 
 /* Blocks of columns by the level of their row. */
-static void each_pull(const struct joined_structure *s, const int32_t *level, int32_t *next, int32_t *list)
+static void each_gather(const struct articulation_structure *s, const int32_t *level, int32_t *next, int32_t *list)
 {
-    for (int32_t p = 0; p < s->places; ++p)
+    for (int32_t p = 0; p < s->columns; ++p)
         for (int32_t b = s->first_below[p], end; b < s->first_below[p + 1]; b = end) {
             for (end = b + 1; end < s->first_below[p + 1]; ++end)
                 if (level[s->row[end]] != level[s->row[b]]) break;
@@ -388,14 +388,14 @@ static void each_pull(const struct joined_structure *s, const int32_t *level, in
         }
 }
 
-typedef void each_group(const struct joined_structure *, const int32_t *level, int32_t *next, int32_t *list);
+typedef void each_group(const struct articulation_structure *, const int32_t *level, int32_t *next, int32_t *list);
 
 /* Where the groups of each begin, then the groups. */
 static bool write_groups(struct writer *w, each_group *each, const int32_t *level, size_t groups, int count_at)
 {
     int32_t *first = add(w, groups + 1);
     if (!first) return false;
-    struct joined_structure s = written(w);
+    struct articulation_structure s = written(w);
     each(&s, level, first + 1, NULL);
     for (size_t k = 0; k < groups; ++k) first[k + 1] += first[k];
     const size_t at = (size_t)(first - w->order->numbers), total = (size_t)first[groups];
@@ -412,16 +412,16 @@ static bool write_groups(struct writer *w, each_group *each, const int32_t *leve
 
 static bool write_around(struct writer *w)
 {
-    struct joined_structure s = written(w);
-    int32_t *first = add(w, (size_t)s.bodies + 1 + 2 * (size_t)s.places);
+    struct articulation_structure s = written(w);
+    int32_t *first = add(w, (size_t)s.bodies + 1 + 2 * (size_t)s.columns);
     if (!first) return false;
     int32_t *around = first + s.bodies + 1;
     s = written(w);
-    for (int32_t k = 0; k < 2 * s.places; ++k)
+    for (int32_t k = 0; k < 2 * s.columns; ++k)
         if (s.side[k] >= 0) ++first[s.side[k] + 1];
     for (int32_t e = 0; e < s.bodies; ++e) first[e + 1] += first[e];
     const int32_t total = first[s.bodies];
-    for (int32_t k = 2 * s.places - 1; k >= 0; --k) /* from its end, which becomes its beginning */
+    for (int32_t k = 2 * s.columns - 1; k >= 0; --k) /* from its end, which becomes its beginning */
         if (s.side[k] >= 0) around[--first[s.side[k] + 1]] = k;
     for (int32_t e = 0; e < s.bodies; ++e) first[e] = first[e + 1];
     first[s.bodies] = total;
@@ -432,8 +432,8 @@ static bool write_part(struct writer *w, const struct maker *m, const int32_t *m
                        int32_t *entry)
 {
     return write_bodies(w, m, member, c, entry) && write_blocks(w, c) && write_updates(w) &&
-           write_groups(w, each_push, c->level, 2 * (size_t)c->levels, 5) &&
-           write_groups(w, each_pull, c->level, (size_t)c->levels, 6) && write_around(w);
+           write_groups(w, each_scatter, c->level, 2 * (size_t)c->levels, 5) &&
+           write_groups(w, each_gather, c->level, (size_t)c->levels, 6) && write_around(w);
 }
 
 /* number: constraints -> number in their part. *left_out: its factor would be too large. */
@@ -450,7 +450,7 @@ static bool make_part(const struct maker *m, int32_t part, int32_t *number, int3
     return fits;
 }
 
-static bool make(struct maker *m, int32_t most_around, struct sadmm_joined_order *order)
+static bool make(struct maker *m, int32_t most_around, struct sadmm_articulation_order *order)
 {
     const size_t n = (size_t)m->constraints + 1;
     int32_t *numbers = (int32_t *)sadmm_alloc(n + (size_t)m->body_count, sizeof *numbers),
@@ -473,21 +473,21 @@ static bool make(struct maker *m, int32_t most_around, struct sadmm_joined_order
     return fits;
 }
 
-bool sadmm_joined_order_make(struct sadmm_joined_order *order, const int32_t *bodies, int32_t constraints,
-                             int32_t body_count, int32_t most_around)
+bool sadmm_articulation_order_make(struct sadmm_articulation_order *order, const int32_t *bodies, int32_t constraints,
+                                   int32_t body_count, int32_t most_around)
 {
     struct maker m = {.bodies = bodies, .constraints = constraints, .body_count = body_count};
-    struct sadmm_joined_order made = {0};
+    struct sadmm_articulation_order made = {0};
     const bool fits = make(&m, most_around, &made);
     free_maker(&m);
-    sadmm_joined_order_free(fits ? order : &made);
+    sadmm_articulation_order_free(fits ? order : &made);
     if (fits) *order = made;
     return fits;
 }
 
-void sadmm_joined_order_free(struct sadmm_joined_order *order)
+void sadmm_articulation_order_free(struct sadmm_articulation_order *order)
 {
     sadmm_free(order->first);
     sadmm_free(order->numbers);
-    *order = (struct sadmm_joined_order){0};
+    *order = (struct sadmm_articulation_order){0};
 }

@@ -1,9 +1,9 @@
-#include "direct_newton.h"
+#include "ncp_newton.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "direct_interior.h"
+#include "ncp_interior.h"
 
 /* Steps from where the iterations are, which is what most problems need, and from an interior point. */
 enum { STEPS_FROM_START = 20, STEPS_FROM_INTERIOR = 200, STEPS_IN_TURN = 50 };
@@ -21,7 +21,7 @@ static const double NEARLY = 1e-11;
 /* ---- a step ------------------------------------------------------------------------------------------------------ */
 
 struct newton {
-    struct direct_dense *d;
+    struct ncp_dense *d;
     double *M;              /* of the numbers that are solved for: count x count */
     double *step, *moved;   /* (size) of lambda; of u by the steps of numbers that their law fixes */
     double *right;          /* (count) right sides, then the steps */
@@ -31,8 +31,8 @@ struct newton {
     double proximal;
 };
 
-/* The work, cut up: DIRECT_NEWTON_VECTORS behind the matrix. */
-static struct newton newton_of(struct direct_dense *d)
+/* The work, cut up: NCP_NEWTON_VECTORS behind the matrix. */
+static struct newton newton_of(struct ncp_dense *d)
 {
     const size_t n = (size_t)d->size;
     struct newton s = {.d = d};
@@ -52,30 +52,30 @@ static struct newton newton_of(struct direct_dense *d)
 /* Numbers that their law fixes go where it has them: an open contact's to 0. The others are listed, to be solved for. */
 static void sort_numbers(struct newton *s)
 {
-    const struct direct_dense *d = s->d;
+    const struct ncp_dense *d = s->d;
     s->count = 0;
     memset(s->moved, 0, (size_t)d->size * sizeof *s->moved);
     for (int32_t i = 0; i < d->laws; ++i) {
-        const struct direct_law *law = &d->law[i];
+        const struct ncp_law *law = &d->law[i];
         double y[3], to[3], D[3][3];
-        direct_arrive(d, law, y);
-        direct_project(law, y, to, D);
+        ncp_arrive(d, law, y);
+        ncp_project(law, y, to, D);
         for (int32_t k = 0; k < law->count; ++k) {
             const int32_t n = law->first + k;
             s->step[n] = to[k] - d->lambda[n];
             if (D[k][0] != 0 || D[k][1] != 0 || D[k][2] != 0) s->number[s->count++] = n;
-            else if (s->step[n] != 0) direct_respond(d, n, s->step[n], s->moved);
+            else if (s->step[n] != 0) ncp_respond(d, n, s->step[n], s->moved);
         }
     }
 }
 
 /* Rows of a law: (1 - D) step + D G step / w = Pi - lambda. `row`: the next one. */
-static void enter_law(struct newton *s, const struct direct_law *law, int32_t *row)
+static void enter_law(struct newton *s, const struct ncp_law *law, int32_t *row)
 {
-    const struct direct_dense *d = s->d;
+    const struct ncp_dense *d = s->d;
     double y[3], to[3], D[3][3];
-    direct_arrive(d, law, y);
-    direct_project(law, y, to, D);
+    ncp_arrive(d, law, y);
+    ncp_project(law, y, to, D);
     for (int32_t k = 0; k < law->count && *row < s->count; ++k) {
         if (s->number[*row] != law->first + k) continue;
         double *M = s->M + (size_t)*row * (size_t)s->count, *right = &s->right[*row];
@@ -98,25 +98,25 @@ static void enter_law(struct newton *s, const struct direct_law *law, int32_t *r
 
 static bool make_step(struct newton *s)
 {
-    struct direct_dense *d = s->d;
+    struct ncp_dense *d = s->d;
     int32_t row = 0;
     sort_numbers(s);
     for (int32_t i = 0; i < d->laws; ++i) enter_law(s, &d->law[i], &row);
     const double solved_for = s->count, all = d->size;
-    d->budget -= direct_factor_work(solved_for) + 2 * all * all;
-    if (!direct_factor(s->M, s->pivot, s->count)) return false;
-    direct_substitute(s->M, s->pivot, s->count, s->right);
+    d->budget -= ncp_factor_work(solved_for) + 2 * all * all;
+    if (!ncp_factor(s->M, s->pivot, s->count)) return false;
+    ncp_substitute(s->M, s->pivot, s->count, s->right);
     for (int32_t r = 0; r < s->count; ++r) s->step[s->number[r]] = s->right[r];
     for (int32_t n = 0; n < d->size; ++n) {
         d->lambda[n] += s->step[n];
-        if (s->step[n] != 0) direct_respond(d, n, s->step[n], d->u);
+        if (s->step[n] != 0) ncp_respond(d, n, s->step[n], d->u);
     }
     return true;
 }
 
 /* ---- the search -------------------------------------------------------------------------------------------------- */
 
-static void copy(const struct direct_dense *d, const double *lambda, const double *u, double *to_lambda, double *to_u)
+static void copy(const struct ncp_dense *d, const double *lambda, const double *u, double *to_lambda, double *to_u)
 {
     memcpy(to_lambda, lambda, (size_t)d->size * sizeof *lambda);
     memcpy(to_u, u, (size_t)d->size * sizeof *u);
@@ -125,7 +125,7 @@ static void copy(const struct direct_dense *d, const double *lambda, const doubl
 static void keep_best(struct newton *s) { copy(s->d, s->d->lambda, s->d->u, s->best_lambda, s->best_u); }
 
 /* What the natural map is a share of: the largest speed, m/s, or load times response. */
-static double size_of(const struct direct_dense *d)
+static double size_of(const struct ncp_dense *d)
 {
     double size = 0;
     for (int32_t i = 0; i < d->laws; ++i)
@@ -139,31 +139,31 @@ static double size_of(const struct direct_dense *d)
 /* Full steps: on the way to the right pieces the map may grow. Returns the best map so far. */
 static double take_steps(struct newton *s, int steps, double size, double best, double enough)
 {
-    struct direct_dense *d = s->d;
-    double map = direct_natural_map(d);
+    struct ncp_dense *d = s->d;
+    double map = ncp_natural_map(d);
     for (int step = 0; step < steps && best > enough && map < HUGE_VAL && d->budget > 0; ++step) {
         const struct damping *by = &damping[step / STEPS_IN_TURN % DAMPINGS];
         s->proximal = fmin(by->most, fmax(by->least, by->share * map / size));
         if (!make_step(s)) return best;
-        map = direct_natural_map(d);
+        map = ncp_natural_map(d);
         if (map < best) keep_best(s);
         best = fmin(best, map);
     }
     return best;
 }
 
-double direct_newton(struct direct_dense *d, double enough)
+double ncp_newton(struct ncp_dense *d, double enough)
 {
     struct newton s = newton_of(d);
     const double size = size_of(d);
-    double best = direct_natural_map(d);
+    double best = ncp_natural_map(d);
     if (!(best > enough && size < HUGE_VAL)) return best;
     copy(d, d->lambda, d->u, s.start_lambda, s.start_u);
     keep_best(&s);
     best = take_steps(&s, STEPS_FROM_START, size, best, enough);
     if (best > NEARLY) {
         copy(d, s.start_lambda, s.start_u, d->lambda, d->u);
-        const double map = direct_interior(d, enough);
+        const double map = ncp_interior(d, enough);
         if (map < best) keep_best(&s);
         best = take_steps(&s, STEPS_FROM_INTERIOR, size, fmin(best, map), enough);
     }

@@ -1,4 +1,4 @@
-#include "direct_interior.h"
+#include "ncp_interior.h"
 
 #include <math.h>
 #include <string.h>
@@ -6,7 +6,7 @@
 enum { MOST_STEPS = 40, MOST_SHORT = 4 };
 /* How much of the way to the boundary is gone. Steps shorter than SHORT turn to the middle of the cones instead. */
 static const double SHARE = 0.95, SHORT = 0.1;
-/* Of the size of scaled velocities, squared: a smaller gap is rounding. */
+/* Of the size of scaled velocities, squared: a smaller complementarity gap is rounding. */
 static const double LEAST = 1e-18;
 
 /* A law in scaled numbers x = lambda / scale, y = scale u: scales are such that Coulomb's cone is |x_t| <= x_n, and a
@@ -21,7 +21,7 @@ struct cone {
 };
 
 struct interior {
-    struct direct_dense *d;
+    struct ncp_dense *d;
     double *M;                 /* (count x count) of a step, then its factors */
     double *free;              /* (size) u without impulses */
     double *scale, *x, *y, *dx; /* (count), as are */
@@ -29,7 +29,7 @@ struct interior {
     int32_t *number, count, *pivot;
     struct cone *cone;
     int32_t cones, degree;
-    double gap;                /* of a degree: what x and the duals miss orthogonality by */
+    double gap;                /* complementarity of x and the duals, by the degree */
 };
 
 /* ---- the cone |t| <= n ---------------------------------------------------------------------------------------- */
@@ -99,7 +99,7 @@ static bool scale_cone(struct cone *c, const double x[3])
 
 static void find_velocities(struct interior *s)
 {
-    struct direct_dense *d = s->d;
+    struct ncp_dense *d = s->d;
     for (int32_t i = 0; i < d->size; ++i) {
         const double *G = d->G + (size_t)i * (size_t)d->size;
         d->u[i] = s->free[i];
@@ -114,9 +114,9 @@ static void add_number(struct interior *s, int32_t number, double scale)
 }
 
 /* Tangents without friction are left out, and rows whose bounds are one. */
-static void add_law(struct interior *s, const struct direct_law *law)
+static void add_law(struct interior *s, const struct ncp_law *law)
 {
-    struct direct_dense *d = s->d;
+    struct ncp_dense *d = s->d;
     const double scale = 1 / sqrt(law->response);
     struct cone c = {.at = s->count, .count = law->count, .hi = HUGE_VAL};
     for (int32_t k = 0; k < law->count; ++k) d->lambda[law->first + k] = 0;
@@ -153,10 +153,10 @@ static void begin(struct interior *s, double size)
 /* The work, cut up: behind the matrix and what Newton's search keeps meanwhile. */
 static void open_work(struct interior *s)
 {
-    _Static_assert(7 * sizeof(double) + sizeof(struct cone) <= DIRECT_INTERIOR_VECTORS * sizeof(double), "its vectors");
+    _Static_assert(7 * sizeof(double) + sizeof(struct cone) <= NCP_INTERIOR_VECTORS * sizeof(double), "its vectors");
     const size_t n = (size_t)s->d->size;
     double *at = s->d->work;
-    s->M = at, at += n * (n + DIRECT_NEWTON_VECTORS);
+    s->M = at, at += n * (n + NCP_NEWTON_VECTORS);
     double **vectors[] = {&s->free, &s->scale, &s->x, &s->y, &s->off, &s->dx};
     for (size_t k = 0; k < sizeof vectors / sizeof *vectors; ++k) *vectors[k] = at, at += n;
     s->number = (int32_t *)at, at += n;
@@ -167,7 +167,7 @@ static void open_work(struct interior *s)
 /* y, what it is off by from the duals, and the gap. */
 static void measure(struct interior *s)
 {
-    struct direct_dense *d = s->d;
+    struct ncp_dense *d = s->d;
     for (int32_t i = 0; i < s->count; ++i) d->lambda[s->number[i]] = s->scale[i] * s->x[i];
     find_velocities(s);
     s->gap = 0;
@@ -217,17 +217,17 @@ static bool make_matrix(struct interior *s)
                 M[r * n + (size_t)c->at + k] += (2 * sign * c->middle[r] * c->middle[k] - J) / (c->size * c->size);
             }
     }
-    s->d->budget -= direct_factor_work(s->count) + 4 * (double)(all * all);
-    return direct_factor(s->M, s->pivot, s->count);
+    s->d->budget -= ncp_factor_work(s->count) + 4 * (double)(all * all);
+    return ncp_factor(s->M, s->pivot, s->count);
 }
 
 /* What W^-1 dx + W dstep of a cone is to be: to make the product of the two `aim`. */
 static void wanted(const struct cone *c, double aim, bool second, double to[3])
 {
-    double missing[3];
-    multiply(c->scaled, c->scaled, missing);
-    for (int k = 0; k < 3; ++k) missing[k] = (k == 0 ? aim : 0) - missing[k] - (second ? c->second[k] : 0);
-    divide(c->scaled, missing, to);
+    double residual[3];
+    multiply(c->scaled, c->scaled, residual);
+    for (int k = 0; k < 3; ++k) residual[k] = (k == 0 ? aim : 0) - residual[k] - (second ? c->second[k] : 0);
+    divide(c->scaled, residual, to);
 }
 
 /* Of a row's bound, so far away: its dual's step for a step `nearer` to it. */
@@ -255,7 +255,7 @@ static double find_step(struct interior *s, double aim, bool second)
         if (c->lo > -HUGE_VAL) right[0] += bound_step(aim, second ? c->second[0] : 0, x - c->lo, c->dual[0], 0);
         if (c->hi < HUGE_VAL) right[0] -= bound_step(aim, second ? c->second[1] : 0, c->hi - x, c->dual[1], 0);
     }
-    direct_substitute(s->M, s->pivot, s->count, s->dx);
+    ncp_substitute(s->M, s->pivot, s->count, s->dx);
     for (int32_t i = 0; i < s->count; ++i)
         if (!(fabs(s->dx[i]) < HUGE_VAL)) return 0;
     for (int32_t i = 0; i < s->cones; ++i) {
@@ -314,7 +314,7 @@ static double make_step(struct interior *s)
     return way;
 }
 
-double direct_interior(struct direct_dense *d, double enough)
+double ncp_interior(struct ncp_dense *d, double enough)
 {
     struct interior s = {.d = d};
     double size = 0, map;
@@ -329,7 +329,7 @@ double direct_interior(struct direct_dense *d, double enough)
     begin(&s, size);
     for (int step = 0, brief = 0;; ++step) {
         measure(&s);
-        map = direct_natural_map(d);
+        map = ncp_natural_map(d);
         if (!(map > enough && map < HUGE_VAL) || step == MOST_STEPS || brief == MOST_SHORT || d->budget < 0 ||
             s.gap < LEAST * size * size)
             return map;

@@ -1,10 +1,10 @@
-/* Bodies joined by rows, solved directly (core/solve/joined.h): where loads and masses are far beyond what an iteration
- * of few steps brings along a mechanism. */
+/* Articulations and their block direct solve (core/solve/articulation.h): where loads and masses are far beyond what an
+ * iteration of few steps brings along a mechanism. */
 #include "failed_step.h"
 #include "scene_tools.h"
 #include "solvers.h"
 
-#include "core/solve/joined_order.h"
+#include "core/solve/articulation_order.h"
 
 static const double UNIT[4] = {1, 0, 0, 0};
 static const double ABOUT_Y[4] = {0.70710678118654752, -0.70710678118654752, 0, 0}; /* z of the frame along y */
@@ -68,8 +68,8 @@ START_TEST(a_chain_bears_many_times_its_weight)
     }
     for (int step = 0; step < 100; ++step) {
         step_world(world, 1);
-        /* of 20 m. A row gives by a billionth of the speed that its load would give a link (core/model/joined.h), and
-         * the feedback takes that back: 1.4e-7 and 7e-6 m in all */
+        /* of 20 m. The regularisation of a row leaves a billionth of the speed that its load would give a link
+         * (core/model/articulation.h), and the feedback takes that back: 1.4e-7 and 7e-6 m in all */
         ck_assert_double_lt(fabs(body_state(world, end).position[2] - rest), 2e-10 * weight);
     }
     sadmm_world_destroy(world);
@@ -96,16 +96,17 @@ START_TEST(a_light_beam_does_not_sag)
     const sadmm_body_id last = add_beam(world, 100);
     for (int step = 0; step < 200; ++step) {
         step_world(world, 1);
-        /* a row gives by a billionth of the 10 m/s that the load would give a body a step: 1.4e-7 m */
+        /* the regularisation of a row leaves a billionth of the 10 m/s that the load would give a body a step: 1.4e-7
+         * m */
         ck_assert_double_lt(fabs(body_state(world, last).position[2]), 1e-6);
     }
     sadmm_world_destroy(world);
 }
 END_TEST
 
-/* 1 t: locks give by 1.5e-4 m/s or rad/s, which the second solve takes back, all but its square:
+/* 1 t: the regularisation of locks leaves 1.5e-4 m/s or rad/s, which one refinement takes away, all but its square:
  * 2.8e-7. */
-START_TEST(what_locks_give_by_is_taken_back)
+START_TEST(heavy_locks_are_refined)
 {
     sadmm_world *world = new_world(_i, 0.005, 20);
     add_beam(world, 1000);
@@ -127,8 +128,8 @@ START_TEST(a_motor_moves_ten_thousand_times_its_link)
         sadmm_joint_state state;
         step_world(world, 1);
         MUST(world, sadmm_world_joint_state(world, motor, &state));
-        /* a torque of 2600 N m gives the link by itself 1e4 rad/s a step, and rows give by a billionth of that and more
-         * where the load swings in: 9e-5 */
+        /* a torque of 2600 N m gives the link by itself 1e4 rad/s a step, and their regularisation leaves rows a
+         * billionth of that and more where the load swings in: 9e-5 */
         ck_assert_double_lt(fabs(state.speed[5] - 1), 2e-4);
         /* by the mean of the speeds before and after the first step: half a step behind */
         ck_assert_double_lt(fabs(state.position[5] - (step - 0.5) * dt), 1e-4);
@@ -252,8 +253,8 @@ START_TEST(mechanisms_are_solved_by_one_iteration)
     }
     for (int step = 0; step < 20; ++step) {
         const sadmm_certificate certificate = certified_step(world);
-        /* a billionth of the speed that a load gives the body that bears it by itself (core/model/joined.h): 100 kg
-         * that are pulled at some m/s on 10 g, 1e4 m/s and more. The iteration alone is off by some m/s. */
+        /* a billionth of the speed that a load gives the body that bears it by itself (core/model/articulation.h): 100
+         * kg that are pulled at some m/s on 10 g, 1e4 m/s and more. The iteration alone is off by some m/s. */
         ck_assert_msg(certificate.ncp_max < 1e-4, "mechanism %d, step %d: natural map %g", _i, step,
                       certificate.ncp_max);
         /* to rounding: velocities and multipliers are of one solution, in double */
@@ -266,7 +267,7 @@ END_TEST
 
 /* ---- steps that fail --------------------------------------------------------------------------------------------- */
 
-/* What was solved before the iterations of a step that failed says nothing of a later step, which solves joined bodies
+/* What was solved before the iterations of a step that failed says nothing of a later step, which solves articulations
  * only after them: here another velocity of theirs, and no warm start. */
 START_TEST(a_failed_step_leaves_nothing)
 {
@@ -295,42 +296,42 @@ END_TEST
 
 /* ---- the order --------------------------------------------------------------------------------------------------- */
 
-static void expect_order(const struct joined_structure *s)
+static void expect_order(const struct articulation_structure *s)
 {
     for (int32_t b = 0; b < s->blocks; ++b) ck_assert_int_gt(s->row[b], s->column[b]);
-    for (int32_t node = 0; node < s->places + s->blocks; ++node)
+    for (int32_t node = 0; node < s->columns + s->blocks; ++node)
         for (int32_t at = s->first_update[node]; at < s->first_update[node + 1]; ++at) {
             const int32_t from = s->column[s->update[2 * at]],
-                          column = node < s->places ? node : s->column[node - s->places];
+                          column = node < s->columns ? node : s->column[node - s->columns];
             ck_assert_int_lt(from, column); /* columns before it alone */
             ck_assert_int_eq(from, s->column[s->update[2 * at + 1]]);
         }
 }
 
-/* A hub has more constraints than are solved directly; what hangs on one of its spokes is, by itself. */
+/* A hub has more constraints than the block direct solve takes; what hangs on one of its spokes is, by itself. */
 START_TEST(constraints_left_out_are_in_no_part)
 {
     enum { SPOKES = 65, CHAIN = 9, CONSTRAINTS = SPOKES + CHAIN };
     int32_t bodies[2 * CONSTRAINTS];
-    struct sadmm_joined_order order = {0};
+    struct sadmm_articulation_order order = {0};
     for (int32_t k = 0; k < CONSTRAINTS; ++k) { /* the chain's last one is at the last spoke */
         bodies[2 * k] = k < SPOKES ? 0 : SPOKES + CONSTRAINTS - k;
         bodies[2 * k + 1] = k < SPOKES ? k + 1 : bodies[2 * k] - 1;
     }
-    ck_assert(sadmm_joined_order_make(&order, bodies, CONSTRAINTS, CONSTRAINTS + 1, 64));
+    ck_assert(sadmm_articulation_order_make(&order, bodies, CONSTRAINTS, CONSTRAINTS + 1, 64));
     ck_assert_int_eq(order.parts, 0); /* the spokes press on the chain */
-    ck_assert(sadmm_joined_order_make(&order, bodies + 2, CONSTRAINTS - 1, CONSTRAINTS + 1, 64));
+    ck_assert(sadmm_articulation_order_make(&order, bodies + 2, CONSTRAINTS - 1, CONSTRAINTS + 1, 64));
     ck_assert_int_eq(order.parts, 1); /* 64 may be at a body; the chain is at the last one still */
-    ck_assert_int_eq(sadmm_joined_part(&order, 0).places, CONSTRAINTS - 1);
+    ck_assert_int_eq(sadmm_articulation_part(&order, 0).columns, CONSTRAINTS - 1);
     /* With the chain apart it is one. */
     bodies[2 * (CONSTRAINTS - 1) + 1] = -1;
-    ck_assert(sadmm_joined_order_make(&order, bodies, CONSTRAINTS, CONSTRAINTS + 1, 64));
+    ck_assert(sadmm_articulation_order_make(&order, bodies, CONSTRAINTS, CONSTRAINTS + 1, 64));
     ck_assert_int_eq(order.parts, 1);
-    const struct joined_structure s = sadmm_joined_part(&order, 0);
-    ck_assert_int_eq(s.places, CHAIN);
-    for (int32_t p = 0; p < s.places; ++p) ck_assert_int_ge(s.constraint[p], SPOKES);
+    const struct articulation_structure s = sadmm_articulation_part(&order, 0);
+    ck_assert_int_eq(s.columns, CHAIN);
+    for (int32_t p = 0; p < s.columns; ++p) ck_assert_int_ge(s.constraint[p], SPOKES);
     expect_order(&s);
-    sadmm_joined_order_free(&order);
+    sadmm_articulation_order_free(&order);
 }
 END_TEST
 
@@ -339,7 +340,7 @@ START_TEST(parts_that_fill_up_are_left_out)
 {
     enum { BODIES = 60, EACH = 10, CHAIN = 20, CONSTRAINTS = BODIES * EACH + CHAIN };
     static int32_t bodies[2 * CONSTRAINTS];
-    struct sadmm_joined_order order = {0};
+    struct sadmm_articulation_order order = {0};
     uint32_t random = 1;
     for (int32_t k = 0; k < CONSTRAINTS; ++k) {
         random = random * 1664525 + 1013904223;
@@ -347,23 +348,23 @@ START_TEST(parts_that_fill_up_are_left_out)
         bodies[2 * k + 1] =
             k < BODIES * EACH ? (k + 1 + (int32_t)(random >> 8) % (BODIES - 1)) % BODIES : bodies[2 * k] + 1;
     }
-    ck_assert(sadmm_joined_order_make(&order, bodies, CONSTRAINTS, BODIES + CHAIN + 1, 64));
+    ck_assert(sadmm_articulation_order_make(&order, bodies, CONSTRAINTS, BODIES + CHAIN + 1, 64));
     ck_assert_int_eq(order.parts, 1);
-    const struct joined_structure s = sadmm_joined_part(&order, 0);
-    ck_assert_int_eq(s.places, CHAIN);
+    const struct articulation_structure s = sadmm_articulation_part(&order, 0);
+    ck_assert_int_eq(s.columns, CHAIN);
     expect_order(&s);
-    sadmm_joined_order_free(&order);
+    sadmm_articulation_order_free(&order);
 }
 END_TEST
 
 int main(void)
 {
-    Suite *suite = suite_create("joined");
-    TCase *tests = tcase_create("joined");
+    Suite *suite = suite_create("articulation");
+    TCase *tests = tcase_create("articulation");
     tcase_set_timeout(tests, 120);
     tcase_add_loop_test(tests, a_chain_bears_many_times_its_weight, 0, 2 * SOLVERS);
     tcase_add_loop_test(tests, a_light_beam_does_not_sag, 0, SOLVERS);
-    tcase_add_loop_test(tests, what_locks_give_by_is_taken_back, 0, SOLVERS);
+    tcase_add_loop_test(tests, heavy_locks_are_refined, 0, SOLVERS);
     tcase_add_loop_test(tests, a_motor_moves_ten_thousand_times_its_link, 0, SOLVERS);
     tcase_add_loop_test(tests, a_fast_rotor_stays, 0, 2);
     tcase_add_test(tests, a_double_four_bar_is_where_it_should_be);

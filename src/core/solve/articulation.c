@@ -1,0 +1,314 @@
+#include "articulation.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "articulation_part.h"
+#include "core/base/memory.h"
+#include "core/model/joint_close.h"
+#include "core/model/system_math.h"
+
+/* One call. */
+struct solving {
+    struct sadmm_articulations *j;
+    const struct sadmm_system *system;
+    const struct sadmm_row_constraint *slots;
+    size_t slot_count;
+    const struct sadmm_settings *settings;
+};
+
+struct sadmm_articulations *sadmm_articulations_create(void)
+{
+    return (struct sadmm_articulations *)sadmm_alloc(1, sizeof(struct sadmm_articulations));
+}
+
+void sadmm_articulations_destroy(struct sadmm_articulations *j)
+{
+    if (!j) return;
+    sadmm_articulation_order_free(&j->order);
+    void *blocks[] = {j->bodies,  j->parts,         j->part,        j->entry,      j->work,
+                      j->impulse, j->kept_velocity, j->kept_lambda, j->kept_states};
+    for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
+    sadmm_free(j);
+}
+
+void sadmm_articulations_begin(struct sadmm_articulations *j) { j->kept = false; }
+
+/* ---- structure --------------------------------------------------------------------------------------------------- */
+
+static bool same_graph(const struct solving *s)
+{
+    const struct sadmm_articulations *j = s->j;
+    if (j->constraints != s->slot_count || j->body_count != s->system->body_count) return false;
+    for (size_t k = 0; k < s->slot_count; ++k)
+        if (j->bodies[2 * k] != s->slots[k].body_a || j->bodies[2 * k + 1] != s->slots[k].body_b) return false;
+    return true;
+}
+
+/* Views, and which bodies they have. */
+static bool make_parts(struct sadmm_articulations *j, size_t bodies)
+{
+    const size_t parts = (size_t)j->order.parts;
+    size_t work = 0, members = 0, columns = 0;
+    for (int32_t k = 0; k < j->order.parts; ++k) {
+        const struct articulation_structure s = sadmm_articulation_part(&j->order, k);
+        work += articulation_work_size(&s);
+        members += (size_t)s.bodies;
+        columns += (size_t)s.columns;
+    }
+    if (!sadmm_grow_empty(&j->parts, &j->parts_capacity, parts, sizeof *j->parts) ||
+        !sadmm_grow_empty(&j->work, &j->work_capacity, work, sizeof *j->work) ||
+        !sadmm_grow_empty(&j->kept_states, &j->kept_states_capacity, SADMM_MAX_ROWS * columns,
+                          sizeof *j->kept_states) ||
+        !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 6 * members, sizeof *j->impulse) ||
+        !sadmm_grow_empty(&j->kept_velocity, &j->kept_velocity_capacity, 6 * members, sizeof *j->kept_velocity))
+        return false;
+    for (size_t i = 0; i < bodies; ++i) j->part[i] = -1;
+    work = members = columns = 0;
+    j->loops = false;
+    for (int32_t k = 0; k < j->order.parts; ++k) {
+        const struct articulation_structure s = sadmm_articulation_part(&j->order, k);
+        j->parts[k] = (struct articulation_part){.view = articulation_view_at(&s, j->work + work),
+                                                 .loop = articulation_has_loop(&s),
+                                                 .impulse = j->impulse + 6 * members,
+                                                 .kept_velocity = j->kept_velocity + 6 * members,
+                                                 .kept_state = j->kept_states + SADMM_MAX_ROWS * columns};
+        j->loops = j->loops || j->parts[k].loop;
+        for (int32_t e = 0; e < s.bodies; ++e) {
+            j->part[s.body[e]] = k;
+            j->entry[s.body[e]] = e;
+        }
+        work += articulation_work_size(&s);
+        members += (size_t)s.bodies;
+        columns += (size_t)s.columns;
+    }
+    return true;
+}
+
+static bool find_order(const struct solving *s)
+{
+    struct sadmm_articulations *j = s->j;
+    const size_t n = s->slot_count, bodies = (size_t)s->system->body_count;
+    if (same_graph(s)) return true;
+    j->constraints = 0;
+    if (!sadmm_grow_empty(&j->bodies, &j->bodies_capacity, 2 * n, sizeof *j->bodies) ||
+        !sadmm_grow_empty(&j->part, &j->part_capacity, bodies, sizeof *j->part) ||
+        !sadmm_grow_empty(&j->entry, &j->entry_capacity, bodies, sizeof *j->entry))
+        return false;
+    for (size_t k = 0; k < n; ++k) {
+        j->bodies[2 * k] = s->slots[k].body_a;
+        j->bodies[2 * k + 1] = s->slots[k].body_b;
+    }
+    if (!sadmm_articulation_order_make(&j->order, j->bodies, (int32_t)n, s->system->body_count,
+                                       SADMM_ARTICULATION_AROUND))
+        return false;
+    if (!make_parts(j, bodies)) {
+        sadmm_articulation_order_free(&j->order); /* no parts without their views */
+        return false;
+    }
+    j->constraints = n;
+    j->body_count = s->system->body_count;
+    return true;
+}
+
+/* ---- what there is ----------------------------------------------------------------------------------------------- */
+
+/* What is done with a side of a pair at a body of a part, number `entry` of it. */
+typedef void on_side(struct articulation_part *, const struct sadmm_contact_point *, int32_t count, int side,
+                     size_t entry);
+
+static void each_contact(const struct solving *s, on_side *f)
+{
+    const struct sadmm_contact_set *contacts = s->system->contacts;
+    const struct sadmm_articulations *j = s->j;
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        for (int side = 0; side < 2; ++side) {
+            const int32_t body = side ? pair->body_b : pair->body_a;
+            if (body < 0 || j->part[body] < 0) continue;
+            f(&j->parts[j->part[body]], &contacts->points[pair->first], pair->count, side, (size_t)j->entry[body]);
+        }
+    }
+}
+
+static const double *arm_of(const struct sadmm_contact_point *point, int side)
+{
+    return side ? point->arm_b : point->arm_a;
+}
+
+static void add_impulse(struct articulation_part *part, const struct sadmm_contact_point *points, int32_t count,
+                        int side, size_t entry)
+{
+    part->touched = true;
+    for (int32_t p = 0; p < count; ++p)
+        for (size_t k = 0; k < 6; ++k)
+            part->impulse[6 * entry + k] +=
+                articulation_point_load(arm_of(&points[p], side), points[p].impulse, side, (int)k);
+}
+
+/* C, to A where the part is solved. */
+static void add_weight(struct articulation_part *part, const struct sadmm_contact_point *points, int32_t count,
+                       int side, size_t entry)
+{
+    double *A = part->view.factor + 36 * entry, load = 0;
+    for (int32_t p = 0; p < count; ++p) load += v3_norm(v3_load(points[p].impulse));
+    const double B = articulation_contact_weight(load, count, part->speed);
+    for (int32_t p = 0; B > 0 && p < count; ++p)
+        for (int k = 0; k < 6; ++k)
+            for (int q = 0; q <= k; ++q)
+                A[6 * k + q] += B * articulation_point_entry(arm_of(&points[p], side), k, q);
+}
+
+static void find_impulses(const struct solving *s)
+{
+    struct sadmm_articulations *j = s->j;
+    for (int32_t k = 0; k < j->order.parts; ++k) {
+        struct articulation_part *part = &j->parts[k];
+        part->touched = false;
+        memset(part->impulse, 0, 6 * (size_t)part->view.s.bodies * sizeof *part->impulse);
+    }
+    each_contact(s, add_impulse);
+}
+
+/* ---- before and after the iterations ----------------------------------------------------------------------------- */
+
+/* What the momentum misses is the contacts' to mend in the paper's method: its velocity is not the one that goes with
+ * the impulses (docs/internals/algorithm.md, "Positions"), and rows alone would have to carry the difference. */
+static void leave_to_contacts(const struct articulation_view *v)
+{
+    memset(v->residual, 0, 6 * (size_t)v->s.bodies * sizeof *v->residual);
+}
+
+/* solved: else the iterations' end is better than what they began with. */
+static void keep_part(const struct solving *s, struct articulation_part *part, bool solved)
+{
+    const struct articulation_view *v = &part->view;
+    part->kept = solved;
+    memcpy(part->kept_state, v->state, (size_t)(SADMM_MAX_ROWS * v->s.columns));
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        memcpy(part->kept_velocity + 6 * e, s->system->velocity + 6 * v->s.body[e], 6 * sizeof(double));
+    EACH_ARTICULATION_ROW(s->slots, v, r, from) s->j->kept_lambda[from] = s->system->rows->lambda[from];
+}
+
+static void take_kept(const struct solving *s, const struct articulation_part *part)
+{
+    const struct articulation_view *v = &part->view;
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        memcpy(s->system->velocity + 6 * v->s.body[e], part->kept_velocity + 6 * e, 6 * sizeof(double));
+    EACH_ARTICULATION_ROW(s->slots, v, r, from) s->system->rows->lambda[from] = s->j->kept_lambda[from];
+}
+
+/* Is it as it was solved before the iterations? No contact touches it. */
+static bool is_solved(const struct articulation_part *part) { return part->kept && !part->touched; }
+
+static bool has_any(const struct articulation_part *part, const uint8_t *bodies)
+{
+    bool any = false;
+    for (int32_t e = 0; e < part->view.s.bodies; ++e) any = any || bodies[part->view.s.body[e]];
+    return any;
+}
+
+sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations, const struct sadmm_system *system,
+                                       const struct sadmm_row_constraint *slots, size_t slot_count,
+                                       const struct sadmm_settings *settings, const uint8_t *stiffened, bool after,
+                                       struct sadmm_error *error)
+{
+    const struct solving s = {articulations, system, slots, slot_count, settings};
+    if (!find_order(&s) || !sadmm_grow_empty(&articulations->kept_lambda, &articulations->kept_lambda_capacity,
+                                             system->rows->row_count, sizeof *articulations->kept_lambda))
+        return sadmm_fail_memory(error, "articulations");
+    const bool kept = after && articulations->kept; /* by the same contacts */
+    bool solves = !kept;
+    for (int32_t k = 0; k < articulations->order.parts; ++k) {
+        struct articulation_part *part = &articulations->parts[k];
+        part->speed = 0;
+        part->left = stiffened && !has_any(part, stiffened);
+        if (part->left) continue;
+        part->kept = kept && part->kept;
+        solves = solves || !is_solved(part);
+    }
+    if (solves) find_impulses(&s);
+    for (int32_t k = 0; k < articulations->order.parts; ++k)
+        if (!articulations->parts[k].left && !is_solved(&articulations->parts[k]))
+            sadmm_articulation_part_load(&articulations->parts[k], system, settings, slots);
+    if (solves) each_contact(&s, add_weight);
+    for (int32_t k = 0; k < articulations->order.parts; ++k) {
+        struct articulation_part *part = &articulations->parts[k];
+        if (part->left) continue;
+        if (is_solved(part)) {
+            take_kept(&s, part);
+            continue;
+        }
+        if (part->touched && settings->method == SADMM_METHOD_PAPER) leave_to_contacts(&part->view);
+        const bool solved = sadmm_articulation_part_solve(&part->view, part->kept ? part->kept_state : NULL,
+                                                          settings->ncp_points > 0);
+        /* Rows that are not solved are left as they are: velocities that go with multipliers beyond their bounds have
+         * energy from nowhere. */
+        if (solved) sadmm_articulation_part_store(&part->view, system, slots);
+        if (!after) keep_part(&s, part, solved);
+    }
+    articulations->kept = !after;
+    return SADMM_OK;
+}
+
+bool sadmm_articulations_has_loops(const struct sadmm_articulations *articulations) { return articulations->loops; }
+
+void sadmm_articulations_find_left(const struct sadmm_articulations *articulations,
+                                   const struct sadmm_row_constraint *slots, double *left)
+{
+    for (int32_t k = 0; k < articulations->order.parts; ++k) {
+        const struct articulation_view *v = &articulations->parts[k].view;
+        if (articulations->parts[k].loop) EACH_ARTICULATION_ROW(slots, v, r, from) left[from] = articulation_left(v, r);
+    }
+}
+
+void sadmm_articulations_mark_parts(const struct sadmm_articulations *articulations, uint8_t *bodies)
+{
+    for (int32_t k = 0; k < articulations->order.parts; ++k) {
+        const struct articulation_part *part = &articulations->parts[k];
+        if (!has_any(part, bodies)) continue;
+        for (int32_t e = 0; e < part->view.s.bodies; ++e) bodies[part->view.s.body[e]] = true;
+    }
+}
+
+/* ---- at the end of a step ---------------------------------------------------------------------------------------- */
+
+static void move_by(const struct articulation_view *v, struct sadmm_rigid *bodies)
+{
+    for (int32_t e = 0; e < v->s.bodies; ++e) {
+        struct sadmm_rigid *body = &bodies[v->s.body[e]];
+        joint_close_move(v->dv + 6 * (size_t)e, body->position, body->orientation);
+    }
+}
+
+static void change_speeds(const struct articulation_view *v, struct sadmm_rigid *bodies)
+{
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        for (int k = 0; k < 6; ++k) bodies[v->s.body[e]].velocity[k] += v->dv[6 * e + k];
+}
+
+static void close_part(const struct solving *s, struct articulation_part *part, bool speeds, struct sadmm_rigid *bodies)
+{
+    const struct articulation_view *v = &part->view;
+    memset(part->impulse, 0, 6 * (size_t)v->s.bodies * sizeof *part->impulse);
+    sadmm_articulation_part_load(part, s->system, s->settings, s->slots);
+    memset(v->velocity, 0, 6 * (size_t)v->s.bodies * sizeof *v->velocity);
+    for (int32_t e = 0; speeds && e < v->s.bodies; ++e)
+        memcpy(v->velocity + 6 * (size_t)e, bodies[v->s.body[e]].velocity, 6 * sizeof *v->velocity);
+    leave_to_contacts(v); /* nothing but the errors moves bodies */
+    if (!sadmm_articulation_part_solve(v, NULL, true)) return;
+    if (speeds) change_speeds(v, bodies);
+    else move_by(v, bodies);
+}
+
+sadmm_status sadmm_articulations_close(struct sadmm_articulations *articulations, const struct sadmm_system *system,
+                                       const struct sadmm_row_constraint *slots, size_t slot_count,
+                                       const struct sadmm_settings *settings, const uint8_t *opened, bool speeds,
+                                       struct sadmm_rigid *bodies, struct sadmm_error *error)
+{
+    const struct solving s = {articulations, system, slots, slot_count, settings};
+    if (!find_order(&s)) return sadmm_fail_memory(error, "articulations");
+    for (int32_t k = 0; k < articulations->order.parts; ++k)
+        if (has_any(&articulations->parts[k], opened)) close_part(&s, &articulations->parts[k], speeds, bodies);
+    return SADMM_OK;
+}

@@ -1,0 +1,80 @@
+/* An articulation on the host, a part: what is kept of it from call to call, and its block direct solve for given
+ * contact impulses, by the formulas of core/model/articulation.h. Shared by the solve before and after the iterations
+ * (articulation.h) and the dense contact solve (ncp.h). */
+#ifndef SADMM_CORE_SOLVE_ARTICULATION_PART_H
+#define SADMM_CORE_SOLVE_ARTICULATION_PART_H
+
+#include "articulation_order.h"
+#include "core/model/articulation.h"
+#include "core/model/system.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct articulation_part {
+    struct articulation_view view; /* arrays in `work` of sadmm_articulations */
+    double *impulse;         /* bodies x 6, in lists of all parts: J^T lambda; */
+    double *kept_velocity;   /* that before the iterations */
+    bool loop;               /* its joints are more than hang it together */
+    double speed;            /* that its impulses change it by; 0: it is not solved */
+    bool left;               /* it is not this call's */
+    bool touched;            /* by a contact */
+    bool kept;               /* solved before the iterations: */
+    uint8_t *kept_state;     /* rows; in `kept_states` */
+};
+
+struct sadmm_articulations {
+    struct sadmm_articulation_order order;
+    int32_t *bodies;        /* two a constraint: what the order was made for */
+    size_t constraints;
+    int32_t body_count;
+    struct articulation_part *parts;
+    bool loops;             /* a part has one */
+    int32_t *part, *entry;  /* bodies: the part, -1: of none; number in it */
+    double *work;           /* of all views */
+    double *impulse;        /* bodies of parts x 6 */
+    bool kept;              /* velocities and multipliers from before the iterations are in: */
+    double *kept_velocity, *kept_lambda; /* bodies of parts x 6; rows */
+    uint8_t *kept_states;                /* columns x SADMM_MAX_ROWS of all parts */
+    size_t bodies_capacity, part_capacity, entry_capacity, parts_capacity, work_capacity, impulse_capacity,
+        kept_velocity_capacity, kept_lambda_capacity, kept_states_capacity;
+};
+
+/* Goes through the rows of a part: r, which is row `from` of the system; slots as of sadmm_articulations_solve. */
+#define EACH_ARTICULATION_ROW(slots, v, r, from)                                                        \
+    for (int32_t p_ = 0; p_ < (v)->s.columns; ++p_)                                                     \
+        for (int32_t r = SADMM_MAX_ROWS * p_, from = (slots)[(v)->s.constraint[p_]].first,              \
+                     end_ = r + (slots)[(v)->s.constraint[p_]].count;                                   \
+             r < end_; ++r, ++from)
+
+/* Rows; velocities; A, and b - A v + J^T lambda + the part's `impulse`; the speed that its impulses change it by. */
+void sadmm_articulation_part_load(struct articulation_part *part, const struct sadmm_system *system,
+                                  const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots);
+
+/* The factors of the bodies' A + C, and their response to the residual: the free change. */
+void sadmm_articulation_part_free(const struct articulation_view *v);
+
+/* Where rows are before the first pass. earlier: states of a solve of this step; NULL: none. */
+void sadmm_articulation_part_begin_rows(const struct articulation_view *v, const uint8_t *earlier);
+
+/* Rows that left their bounds, or are at them against their law: did any change its state? */
+bool sadmm_articulation_part_change_rows(const struct articulation_view *v);
+
+void sadmm_articulation_part_factorize(const struct articulation_view *v);
+
+/* Multipliers of rows inside their bounds, for what the others are. again: from what they are. */
+void sadmm_articulation_part_solve_rows(const struct articulation_view *v, bool again);
+
+/* All of it but loading. exact: hard rows are refined to rounding, not only where their regularisation leaves much. Is
+ * it solved? Rows may still change their states, or numbers are not finite. */
+bool sadmm_articulation_part_solve(const struct articulation_view *v, const uint8_t *earlier, bool exact);
+
+/* Its velocities and multipliers to the system. */
+void sadmm_articulation_part_store(const struct articulation_view *v, const struct sadmm_system *system,
+                                   const struct sadmm_row_constraint *slots);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
