@@ -1,5 +1,5 @@
 /* How fast a cold solve of one problem converges. Errors are those of whole solves with that many iterations (nothing
- * looks into a running one), measured in double whatever ran; times are those of the same solves without the
+ * reads a running one), measured in double whatever ran; times are those of the same solves without the
  * measurement.
  *
  * The error is the certificate's natural map at v = A^-1 (b + J^T lambda), where momentum balances ("balanced"): one

@@ -479,12 +479,12 @@ static void draw(int kind, int number, int attempt, struct known_motion *m)
  * what leans does not fall over. */
 static bool holds(const struct known_motion *drawn)
 {
-    enum { LOOKS = 100 };
+    enum { SAMPLES = 100 };
     struct known_motion m = *drawn;
     double now = 0;
     m.system.least_load = HUGE_VAL;
-    for (int k = 0; k < LOOKS; ++k) {
-        known_motion_advance(&m, &now, m.seconds / LOOKS);
+    for (int k = 0; k < SAMPLES; ++k) {
+        known_motion_advance(&m, &now, m.seconds / SAMPLES);
         const double up = m3_mul(q_matrix(q_load(m.system.bodies[0].state.orientation)), v3(0, 0, 1)).z;
         if (m.lean[1] > 0 && (fabs(up) < m.lean[0] || fabs(up) > m.lean[1])) return false;
         if (m.event == EVENT_NONE && m.system.least_load < 0.2 * m.system.bodies[m.system.body_count - 1].mass * g)

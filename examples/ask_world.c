@@ -23,7 +23,7 @@ static sadmm_status add_ball(sadmm_world *world, double x, double radius, sadmm_
 
 static sadmm_status ask(sadmm_world *world, sadmm_shape_id left, sadmm_shape_id right)
 {
-    sadmm_ray ray = {{-5, 0, 0}, {1, 0, 0}, INFINITY}; /* origin, direction, how far to look */
+    sadmm_ray ray = {{-5, 0, 0}, {1, 0, 0}, INFINITY}; /* origin, direction, how far to search */
     sadmm_ray_hit hit;
     sadmm_status status = sadmm_world_cast_ray(world, &ray, NULL, &hit);
     if (status != SADMM_OK) return status;

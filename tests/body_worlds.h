@@ -15,7 +15,7 @@ static const struct {
 } solvers[] = {
 #ifdef BODIES_ON_CUDA
     {SADMM_BACKEND_CUDA, SADMM_F32},
-#ifndef TESTS_UNDER_SANITIZERS /* what they look for is the same in both */
+#ifndef TESTS_UNDER_SANITIZERS /* what they search for is the same in both */
     {SADMM_BACKEND_CUDA, SADMM_F64},
 #endif
 #else

@@ -21,7 +21,7 @@ struct contact_problem *contact_problem_new(void);
 void contact_problem_free(struct contact_problem *problem);
 /* With rows from the blocks as they are. */
 struct contact_problem *contact_problem_copy(const struct contact_problem *problem);
-/* The system's rows from the blocks as they are: before anything looks at the system. */
+/* The system's rows from the blocks as they are: before anything reads the system. */
 void contact_problem_rows(struct contact_problem *problem);
 
 /* A solid box; returns its index. */

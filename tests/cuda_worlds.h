@@ -40,7 +40,7 @@ static inline void use_device(sadmm_world *world, int precision, int device)
                   world->error.message);
 }
 
-/* The host makes the steps: a stop rule has to be looked at, and nothing ever meets this one. */
+/* The host makes the steps: a stop rule has to be inspected, and nothing ever meets this one. */
 static inline void by_host(sadmm_world *world)
 {
     sadmm_settings settings = sadmm_world_settings(world);

@@ -38,7 +38,7 @@ static inline void set_friction(sadmm_world *world, double mu)
     }
 }
 
-/* Step `begin` to `end`, looked at after each of them; with `begin` = 0 also before the first. */
+/* Step `begin` to `end`, inspected after each of them; with `begin` = 0 also before the first. */
 static inline void run_to_result(const struct sadmm_scene *scene, sadmm_world *world, int64_t begin, int64_t end,
                                  struct sadmm_scene_result *result)
 {

@@ -54,7 +54,7 @@ static inline void shoot(sadmm_world *world, int number, bool hulls, double dt, 
 }
 
 /* The first beyond the second, through its middle. */
-static inline void shot_look(sadmm_world *world, struct shot *s)
+static inline void shot_inspect(sadmm_world *world, struct shot *s)
 {
     const sadmm_body_state a = body_state(world, s->id[0]), b = body_state(world, s->id[1]);
     const vec3 x = v3_sub(v3_load(a.position), v3_load(b.position)), way = v3_sub(x, s->last);
@@ -80,7 +80,7 @@ static inline int shots_through(uint64_t number, bool hulls)
     for (int i = 0; i < SHOT_PAIRS; ++i) shoot(world, i, hulls, def.settings.dt, &seed, &shots[i]);
     for (int step = 0; step < SHOT_STEPS; ++step) {
         step_world(world, 1);
-        for (int i = 0; i < SHOT_PAIRS; ++i) shot_look(world, &shots[i]);
+        for (int i = 0; i < SHOT_PAIRS; ++i) shot_inspect(world, &shots[i]);
     }
     for (int i = 0; i < SHOT_PAIRS; ++i) through += shots[i].through;
     sadmm_world_destroy(world);

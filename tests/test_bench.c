@@ -324,7 +324,7 @@ START_TEST(bad_options_are_refused)
 END_TEST
 
 /* A block that must not creep stands; one sphere that bounces does not. */
-START_TEST(stand_tells_what_stands)
+START_TEST(stand_reports_what_stands)
 {
     static char out[MAX_TEXT];
     ck_assert_msg(run("stand --scene incline --steps 50 --iterations 30 --threads 1", out) == 0 &&
@@ -363,7 +363,7 @@ int main(void)
     tcase_add_test(cases, scaling_says_what_it_skips);
     tcase_add_test(cases, convergence_measures);
     tcase_add_test(cases, convergence_of_one_problem);
-    tcase_add_test(cases, stand_tells_what_stands);
+    tcase_add_test(cases, stand_reports_what_stands);
     tcase_add_loop_test(cases, bad_options_are_refused, 0, sizeof refused / sizeof *refused);
     tcase_add_test(cases, helps);
     suite_add_tcase(suite, cases);

@@ -107,18 +107,18 @@ START_TEST(only_another_pose_makes_a_world_forget)
             sadmm_body_id id = body_at(world, i);
             sadmm_body_state state = body_state(world, id);
             const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", &world->error);
-            const uint32_t before = body->steady.placed;
+            const uint32_t before = body->extrapolation.placed;
             MUST(world, sadmm_world_set_body_state(world, id, &state));
-            ck_assert_uint_eq(body->steady.placed, before);
+            ck_assert_uint_eq(body->extrapolation.placed, before);
             if (body->type == SADMM_BODY_STATIC) continue;
             state.linear_velocity[0] += 0.001;
             state.angular_velocity[2] += 0.001;
             MUST(world, sadmm_world_set_body_state(world, id, &state));
-            ck_assert_uint_eq(body->steady.placed, before);
+            ck_assert_uint_eq(body->extrapolation.placed, before);
             if (step < 9) continue;
             state.position[i % 3] += 1e-9;
             MUST(world, sadmm_world_set_body_state(world, id, &state));
-            ck_assert_uint_ne(body->steady.placed, before);
+            ck_assert_uint_ne(body->extrapolation.placed, before);
         }
         step_world(world, 1);
     }

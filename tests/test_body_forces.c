@@ -394,8 +394,8 @@ END_TEST
 #endif
 
 #ifdef BODIES_ON_CUDA
-/* Cubes of all kinds that fall on each other and a floor, some faster than their velocities tell; what is set goes along
- * with steps that are made on the device. */
+/* Cubes of all kinds that fall on each other and a floor, some faster than their velocities show; what is set goes
+ * along with steps that are made on the device. */
 static sadmm_world *falling_world(int precision)
 {
     sadmm_world_def def = bodies_def();

@@ -327,7 +327,7 @@ START_TEST(workspace_is_kept_and_failures_change_nothing)
 END_TEST
 
 /* Three boxes side by side on exact impulses, a fourth on top of the last: three islands. Then one impulse is wrong,
- * then a velocity. Momentum is looked at as in momentum_max, relative to the largest. */
+ * then a velocity. Momentum is inspected as in momentum_max, relative to the largest. */
 START_TEST(islands_above_tolerance)
 {
     struct sadmm_error error = {SADMM_OK, ""};

@@ -302,7 +302,7 @@ START_TEST(run_prints)
 END_TEST
 
 /* What a scene measures of its own success, on the way and at the end. */
-START_TEST(run_tells_the_scenes_result)
+START_TEST(run_reports_the_scenes_result)
 {
     for (int whole = 0; whole < 2; ++whole) {
         json_t *r = run_json(whole ? "run grippers:2 --json" : "run grippers:2 --steps 10 --json");
@@ -336,7 +336,7 @@ START_TEST(run_stops)
     r = run_json(
         "run pyramid:3 --steps 12 --backend cpu --iterations 70 --tolerance 1e-6 --check-period 7 --certify --json -");
     ck_assert_double_eq(number(r, "stop.tolerance"), 1e-6);
-    ck_assert_double_eq(number(r, "stop.steps_met"), 12); /* it stands, from loads that were predicted */
+    ck_assert_double_eq(number(r, "stop.steps_met"), 12); /* it stands, from initialised impulses */
     ck_assert_double_le(number(r, "certificate.ncp_max_run"), 1e-6);
     ck_assert_double_ge(number(r, "stop.iterations_mean"), 7);
     ck_assert_double_lt(number(r, "stop.iterations_mean"), 70);
@@ -615,7 +615,7 @@ static void expect_joints(json_t *scene)
     }
 }
 
-/* Every scene, at a small size, is told completely, and has the bodies and joints that a run of it has. */
+/* Every scene, at a small size, is reported completely, and has the bodies and joints that a run of it has. */
 #ifdef SADMM_HAVE_QHULL
 static const bool have_hulls = true;
 #else
@@ -630,7 +630,7 @@ static bool needs_hulls(const char *scene)
     return false;
 }
 
-START_TEST(scenes_are_told)
+START_TEST(scenes_are_reported)
 {
     json_t *list = run_json("scenes --json"), *info;
     size_t k, i;
@@ -675,8 +675,8 @@ START_TEST(scenes_are_told)
 }
 END_TEST
 
-/* A mesh that several bodies have is told once; one of two has a number of its own. */
-START_TEST(meshes_are_told_once)
+/* A mesh that several bodies have is reported once; one of two has a number of its own. */
+START_TEST(meshes_are_reported_once)
 {
     json_t *track = run_json("scenes marble_run --json -"), *bodies = at(track, "bodies");
     ck_assert_uint_eq(json_array_size(at(track, "meshes")), 2);
@@ -700,7 +700,7 @@ START_TEST(meshes_are_told_once)
 }
 END_TEST
 
-START_TEST(backends_are_told)
+START_TEST(backends_are_reported)
 {
     static const char *const names[] = {"ref", "cpu", "cuda"};
     json_t *r = run_json("backends --json"), *backends = at(r, "backends"), *b;
@@ -888,7 +888,7 @@ int main(void)
     tcase_add_test(tests, run_reports_null);
     tcase_add_test(tests, run_prints);
     tcase_add_test(tests, run_stops);
-    tcase_add_test(tests, run_tells_the_scenes_result);
+    tcase_add_test(tests, run_reports_the_scenes_result);
     tcase_add_test(tests, run_default_steps);
     tcase_add_loop_test(tests, same_hash, 0, 4);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -897,9 +897,9 @@ int main(void)
     tcase_add_test(tests, iterations_follow_the_method);
     tcase_add_test(tests, options_matter);
     tcase_add_test(tests, traces);
-    tcase_add_test(tests, scenes_are_told);
-    tcase_add_test(tests, meshes_are_told_once);
-    tcase_add_test(tests, backends_are_told);
+    tcase_add_test(tests, scenes_are_reported);
+    tcase_add_test(tests, meshes_are_reported_once);
+    tcase_add_test(tests, backends_are_reported);
     tcase_add_loop_test(tests, backends_agree, 0, 6);
 #ifdef SADMM_HAVE_HDF5
     tcase_add_test(tests, dumps_and_solves);

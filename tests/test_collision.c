@@ -961,7 +961,7 @@ START_TEST(contacts_depend_on_the_present_alone)
         ck_assert_uint_gt(reference->contacts.point_count, 3000);
         for (int o = 0; o < OTHERS; ++o) {
             memcpy(others[o]->bodies, reference->bodies, sizeof reference->bodies);
-            if (step % 3 == 2) { /* a look elsewhere, undone: the larger boxes stay behind */
+            if (step % 3 == 2) { /* a find elsewhere, undone: the larger boxes stay behind */
                 struct random elsewhere = {5 + (uint64_t)o};
                 stir(others[o], &elsewhere, 0.03);
                 find(others[o]);

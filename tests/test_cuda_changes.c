@@ -140,11 +140,11 @@ START_TEST(a_saved_scene_goes_on)
 }
 END_TEST
 
-/* ---- edits ------------------------------------------------------------------------------------------------------- */
+/* ---- updates ----------------------------------------------------------------------------------------------------- */
 
 /* Several changes of one body before a step: the last one counts, of states and of wrenches, and neither disturbs the
  * other. */
-static void edit_often(sadmm_world *world, int step)
+static void update_often(sadmm_world *world, int step)
 {
     set_wrench(world, 1, 300, 400);
     set_wrench(world, 2, -1, step);
@@ -159,7 +159,7 @@ static void edit_often(sadmm_world *world, int step)
     set_wrench(world, 1, 0.4, 0.1 * step);
 }
 
-static void expect_last_edit_wins(int precision)
+static void expect_last_update_wins(int precision)
 {
     sadmm_world *host = small_world(precision, 1), *device = small_world(precision, 1),
                 *queue = small_world(precision, 1);
@@ -167,7 +167,7 @@ static void expect_last_edit_wins(int precision)
     by_host(host);
     for (int step = 0; step < 12; ++step) {
         for (int w = 0; w < 3; ++w) {
-            edit_often(worlds[w], step);
+            update_often(worlds[w], step);
             MUST(worlds[w], w == 2 ? sadmm_world_step_async(worlds[w]) : sadmm_world_step(worlds[w]));
         }
         if (step % 4 == 3) expect_same_world(host, device, "single steps");
@@ -182,10 +182,10 @@ START_TEST(the_last_change_of_a_body_counts)
 {
 #ifdef CUDA_EMULATED
     for (cuda_emulation_descending = 1; cuda_emulation_descending >= 0; --cuda_emulation_descending)
-        expect_last_edit_wins(_i);
+        expect_last_update_wins(_i);
     cuda_emulation_descending = 0;
 #else
-    expect_last_edit_wins(_i);
+    expect_last_update_wins(_i);
 #endif
 }
 END_TEST
@@ -199,10 +199,10 @@ START_TEST(changes_of_a_body_do_not_pile_up)
         set_wrench(world, 1, k, 1);
         if (k % 100 == 0) set_state(world, 1 + k % 3, 0.1, 0.2);
     }
-    ck_assert_uint_eq(world->resident.edited_count, 3);
+    ck_assert_uint_eq(world->resident.dirty_count, 3);
     step_world(world, 1);
-    ck_assert_uint_le(world->resident.edit_capacity, 64);
-    ck_assert_uint_eq(world->resident.edited_count, 0);
+    ck_assert_uint_le(world->resident.update_capacity, 64);
+    ck_assert_uint_eq(world->resident.dirty_count, 0);
     sadmm_world_destroy(world);
 }
 END_TEST

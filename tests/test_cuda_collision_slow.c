@@ -1,5 +1,5 @@
 /* Contact finding on the CUDA device against the host, on more than a million pairs of random shapes: every kind of
- * pair, on planes, meshes and heightfields too, in worlds of 20,000 bodies of 1e-3 to 1e3 m, each looked at as it is
+ * pair, on planes, meshes and heightfields too, in worlds of 20,000 bodies of 1e-3 to 1e3 m, each inspected as it is
  * and one step later, with what the step before remembers. Not one bit may differ. Says how many pairs and points of
  * each kind there were. On the emulated device (test_cuda_collision_slow_emulated.c), or with SADMM_TEST_SHORT, there
  * are few. */

@@ -23,7 +23,7 @@ static void start(struct runner *r, const struct sadmm_kernels *k, const struct 
     runner_start_method(r, k, scene, tier, SADMM_METHOD_FAST);
 }
 
-static void refresh_weights(struct runner *r)
+static void update_weights(struct runner *r)
 {
     CALL(r, r->k->update_weights(r->c, &r->error));
     CALL(r, r->k->factorize(r->c, &r->error));
@@ -37,7 +37,7 @@ static void iterate(struct runner *r, int count, bool measure)
 static int32_t limit(struct runner *r)
 {
     int32_t limited = 0;
-    if (r->plan.limit) CALL(r, r->k->limit_velocity(r->c, &limited, &r->error));
+    if (r->plan.energy_limit) CALL(r, r->k->limit_energy(r->c, &limited, &r->error));
     return limited;
 }
 
@@ -94,8 +94,8 @@ START_TEST(entries_equal_cpu)
     ck_assert_msg(fabs(got.dual - wanted.dual) <= tolerance * (wanted.dual + 10 * scales.lambda + 100),
                   "%s: dual %g, %g", scene->name, got.dual, wanted.dual);
 
-    refresh_weights(&ref);
-    refresh_weights(&own);
+    update_weights(&ref);
+    update_weights(&own);
     iterate(&ref, 1, false);
     iterate(&own, 1, false);
     compare(&own, &ref, &scales, tolerance, "new weights");
@@ -103,8 +103,8 @@ START_TEST(entries_equal_cpu)
     for (int s = 0; s < BATCHES; ++s) {
         iterate(&ref, batches[s], false);
         iterate(&own, batches[s], false);
-        refresh_weights(&ref);
-        refresh_weights(&own);
+        update_weights(&ref);
+        update_weights(&own);
     }
     compare(&own, &ref, &scales, run_tolerance[table->precision], "batches");
     ck_assert_int_eq(limit(&own), limit(&ref));
@@ -129,8 +129,8 @@ static void check_equal(struct runner *a, struct runner *b, const struct scene *
             const struct sadmm_residual x = runner_residual(a), y = runner_residual(b);
             ck_assert_msg(x.primal == y.primal && x.dual == y.dual, "%s: residuals", what);
         }
-        refresh_weights(a);
-        refresh_weights(b);
+        update_weights(a);
+        update_weights(b);
     }
     ck_assert_int_eq(limit(a), limit(b));
     check_same(a, b, "after the limit");
@@ -239,8 +239,8 @@ START_TEST(many_bodies)
     start(&own, table, &many, SADMM_CUDA_TIER_STREAM);
     iterate(&ref, 2, false);
     iterate(&own, 2, false);
-    refresh_weights(&ref);
-    refresh_weights(&own);
+    update_weights(&ref);
+    update_weights(&own);
     iterate(&ref, 1, false);
     iterate(&own, 1, false);
     compare(&own, &ref, &scales, entry_tolerance[table->precision], "chains");
@@ -368,7 +368,7 @@ START_TEST(aborted_does_nothing)
         check_same(&aborted, &plain, "aborted");
         for (int k = 0; k < 2; ++k) {
             struct runner *r = k ? &aborted : &plain;
-            refresh_weights(r);
+            update_weights(r);
             if (k) set_abort(r, ABORT_PARTITION);
             if (k) CALL(r, table->factorize(r->c, &r->error));
             if (k) set_abort(r, ABORT_NONE);

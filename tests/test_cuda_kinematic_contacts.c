@@ -86,7 +86,7 @@ static void move(sadmm_world *world, int which, double x, double y, double z, do
     MUST(world, sadmm_world_move_body(world, body_at(world, 1 + which), position, orientation));
 }
 
-/* What is set between two steps, in either world. Targets do not look at what the device has: they wait for nothing. */
+/* What is set between two steps, in either world. Targets do not read what the device has: they wait for nothing. */
 static void change(sadmm_world *world, int step, bool turns)
 {
     if (step % 4 == 0) go(world, LIFT, 0.1, 0.3 * cos(0.2 * step));
@@ -199,7 +199,7 @@ START_TEST(resident_steps_equal_those_by_host)
 }
 END_TEST
 
-/* Targets and steps are enqueued without a look at what has become of them; capacities are outgrown on the way. */
+/* Targets and steps are enqueued without a wait for what has become of them; capacities are outgrown on the way. */
 START_TEST(steps_run_ahead)
 {
     sadmm_world *worlds[2];

@@ -37,7 +37,7 @@ START_TEST(rocking_is_the_hosts)
 }
 END_TEST
 
-/* Rocking that no step resolves dies away; and a world that the host takes back in between goes on to the same bits. */
+/* Rocking that no step resolves dies away; and a world that is detached in between goes on to the same bits. */
 START_TEST(flat_lenses_come_to_rest)
 {
     const double a = 0.01, c = 0.0005;

@@ -600,7 +600,7 @@ START_TEST(islands_stop_by_themselves)
 END_TEST
 
 /* One island: every tier stops after as many iterations, with the same bits; what stopped meets the tolerance; and a
- * rule that is looked at only at the end changes nothing. */
+ * rule that is inspected only at the end changes nothing. */
 START_TEST(tiers_stop_alike)
 {
     const int precision = _i, steps = EMULATED ? 8 : 60;
@@ -737,9 +737,9 @@ START_TEST(contacts_are_read_with_their_own_bodies)
 }
 END_TEST
 
-/* More bodies than worlds have whose kernels are all launched early (device/early.h) and whose shapes are placed thread
- * by thread (collide/pipeline.cu), pairs on the floor and in the air that push each other apart, in two sub-steps. The
- * emulated device has a few of them. */
+/* More bodies than worlds have whose kernels are all launched with PDL (device/pdl.h) and whose shapes are placed
+ * thread by thread (collide/pipeline.cu), pairs on the floor and in the air that push each other apart, in two
+ * sub-steps. The emulated device has a few of them. */
 START_TEST(large_worlds_equal_those_by_host)
 {
     sadmm_world *worlds[2];

@@ -253,8 +253,8 @@ START_TEST(the_first_contact_comes_late)
 }
 END_TEST
 
-/* So many shapes that candidates are looked for in a tree, and sorted by their bits: pairs of balls that roll off each
- * other in the air, at a few metres a second so that they come across others. */
+/* So many shapes that candidates are searched for in a tree, and sorted by their bits: pairs of balls that roll off
+ * each other in the air, at a few metres a second so that they come across others. */
 START_TEST(many_shapes)
 {
     enum { SIDE = 80 }; /* 6,400: 6,144 and more take the tree */

@@ -156,7 +156,7 @@ static void follow(struct pairs *pairs, int32_t count)
     }
 }
 
-static void look(sadmm_world *world, struct pairs *pairs)
+static void inspect(sadmm_world *world, struct pairs *pairs)
 {
     static sadmm_contact contacts[MOST];
     const int32_t count = sadmm_world_contact_count(world), shapes = sadmm_world_shape_count(world);
@@ -215,24 +215,25 @@ static sadmm_world *heap(int solver, int threads, bool sensors)
 
 START_TEST(heap_is_followed)
 {
-    static struct pairs told, seen;
+    static struct pairs reported, seen;
     sadmm_world *world = heap(_i, 1, true);
     int32_t count = 0;
-    memset(&told, 0, sizeof told);
+    memset(&reported, 0, sizeof reported);
     MUST(world, sadmm_world_record_events(world, MOST));
     for (int step = 0; step < HEAP_STEPS; ++step) {
         const int32_t taken = step_and_take(world);
         count += taken;
-        follow(&told, taken);
-        look(world, &seen);
-        ck_assert_msg(memcmp(&told, &seen, sizeof told) == 0, "step %d: events and world disagree", step);
+        follow(&reported, taken);
+        inspect(world, &seen);
+        ck_assert_msg(memcmp(&reported, &seen, sizeof reported) == 0, "step %d: events and world disagree", step);
     }
     ck_assert_int_gt(count, HEAP);
     sadmm_world_destroy(world);
 }
 END_TEST
 
-/* The same events to the bit, on any number of threads, in one step or several between two looks, waited for or not. */
+/* The same events to the bit, on any number of threads, in one step or several between two readings, waited for or
+ * not. */
 START_TEST(same_on_any_thread)
 {
     static sadmm_event wanted[MOST];
@@ -433,10 +434,10 @@ START_TEST(oldest_are_dropped)
 }
 END_TEST
 
-/* A world restored tells once more what touches in it, then what a new one does that had all of it told. */
+/* A world restored reports once more what touches in it, then what a new one does that had all of it reported. */
 START_TEST(restored_begins_anew)
 {
-    static struct pairs told, seen;
+    static struct pairs reported, seen;
     sadmm_world *world = heap(_i, 1, true);
     size_t size;
 #ifdef BODIES_ON_CUDA
@@ -450,15 +451,15 @@ START_TEST(restored_begins_anew)
     MUST(world, sadmm_world_save(world, buffer, size, &size));
     step_world(world, 30);
     const uint64_t hash = state_hash(world);
-    look(world, &seen);
+    inspect(world, &seen);
     MUST(world, sadmm_world_restore(world, buffer, size));
     ck_assert_int_eq(sadmm_world_event_capacity(world), MOST);
     ck_assert_int_eq(sadmm_world_event_count(world), 0);
     step_world(world, 30);
     ck_assert_uint_eq(state_hash(world), hash);
-    memset(&told, 0, sizeof told);
-    follow(&told, take(world));
-    ck_assert(memcmp(&told, &seen, sizeof told) == 0);
+    memset(&reported, 0, sizeof reported);
+    follow(&reported, take(world));
+    ck_assert(memcmp(&reported, &seen, sizeof reported) == 0);
     free(buffer);
     sadmm_world_destroy(world);
 }
@@ -468,24 +469,24 @@ END_TEST
 /* Whatever allocation fails: a step is made or not, and events catch up. */
 START_TEST(out_of_memory)
 {
-    static struct pairs told, seen;
+    static struct pairs reported, seen;
     for (long n = 0; n < 60; ++n) {
         sadmm_world *world = heap(_i, 1, true);
         MUST(world, sadmm_world_record_events(world, MOST));
-        memset(&told, 0, sizeof told);
+        memset(&reported, 0, sizeof reported);
         step_world(world, 15);
-        follow(&told, take(world));
+        follow(&reported, take(world));
         for (int step = 0; step < 10; ++step) {
             sadmm_test_fail_allocations_after(n / 4);
             const sadmm_status status = sadmm_world_step(world);
             sadmm_test_fail_allocations_after(-1);
             ck_assert(status == SADMM_OK || status == SADMM_ERROR_OUT_OF_MEMORY);
-            follow(&told, take(world));
+            follow(&reported, take(world));
         }
         step_world(world, 1);
-        follow(&told, take(world));
-        look(world, &seen);
-        ck_assert(memcmp(&told, &seen, sizeof told) == 0);
+        follow(&reported, take(world));
+        inspect(world, &seen);
+        ck_assert(memcmp(&reported, &seen, sizeof reported) == 0);
         sadmm_world_destroy(world);
     }
 }

@@ -6,7 +6,7 @@
 #include "backend_ref/literal.h"
 #include "core/solve/certificate.h"
 #include "core/model/islands.h"
-#include "core/math/limit.h"
+#include "core/math/energy_limit.h"
 #include "core/math/weight.h"
 #include "core/solve/schedule.h"
 #include "core/model/system_math.h"
@@ -22,7 +22,7 @@ static void iterate(struct runner *r, int count, bool measure)
     CALL(r, r->k->iterate(r->c, count, measure, &r->error));
 }
 
-static void refresh_weights(struct runner *r)
+static void update_weights(struct runner *r)
 {
     CALL(r, r->k->update_weights(r->c, &r->error));
     CALL(r, r->k->factorize(r->c, &r->error));
@@ -66,13 +66,13 @@ START_TEST(tables_equal_ref)
             add(&primal, got.primal, wanted.primal);
             add(&dual, got.dual, wanted.dual);
         }
-        refresh_weights(&ref);
-        refresh_weights(&own);
+        update_weights(&ref);
+        update_weights(&own);
     }
-    if (ref.plan.limit) {
+    if (ref.plan.energy_limit) {
         int32_t wanted, got;
-        CALL(&ref, ref.k->limit_velocity(ref.c, &wanted, &ref.error));
-        CALL(&own, own.k->limit_velocity(own.c, &got, &own.error));
+        CALL(&ref, ref.k->limit_energy(ref.c, &wanted, &ref.error));
+        CALL(&own, own.k->limit_energy(own.c, &got, &own.error));
         ck_assert_int_eq(got, wanted);
         compare_solutions(&own, &ref, &v, &lambda);
     }
@@ -97,7 +97,7 @@ START_TEST(all_tables_run_fast)
 {
     bool both[2] = {false, false};
     for (int i = 0; i < table_count; ++i) {
-        ck_assert_msg(tables[i]->update_weights && tables[i]->limit_velocity, "%s", tables[i]->variant);
+        ck_assert_msg(tables[i]->update_weights && tables[i]->limit_energy, "%s", tables[i]->variant);
         both[tables[i]->precision] = true;
     }
     ck_assert(both[SADMM_F32] && both[SADMM_F64] && single_count > 0);
@@ -134,7 +134,7 @@ START_TEST(threads_do_not_matter)
             iterate(&r[t], batches[s], true);
             CALL(&r[0], table->measure_residuals(r[0].c, &wanted, &r[0].error));
             CALL(&r[t], table->measure_residuals(r[t].c, &got, &r[t].error));
-            if (s == 6) refresh_weights(&r[t]);
+            if (s == 6) update_weights(&r[t]);
             compare_solutions(&r[t], &r[0], &v, &lambda);
             ck_assert(v.difference == 0 && lambda.difference == 0);
             ck_assert(got.primal == wanted.primal && got.dual == wanted.dual);
@@ -143,7 +143,7 @@ START_TEST(threads_do_not_matter)
     for (int t = 0; t < 3; ++t) {
         struct spread v = {0, 0}, lambda = {0, 0};
         int32_t limited;
-        if (r[t].plan.limit) CALL(&r[t], table->limit_velocity(r[t].c, &limited, &r[t].error));
+        if (r[t].plan.energy_limit) CALL(&r[t], table->limit_energy(r[t].c, &limited, &r[t].error));
         compare_solutions(&r[t], &r[0], &v, &lambda);
         ck_assert(v.difference == 0 && lambda.difference == 0);
     }
@@ -288,15 +288,16 @@ START_TEST(few_iterations_of_a_problem_weigh_the_same)
 END_TEST
 
 /* Of an island that ends with 2 J: how far it goes along the free motion decides. */
-START_TEST(bounces_are_taken_back)
+START_TEST(rebounds_are_taken_out)
 {
-    const struct limit_energies bounce = {.now = 2, .free = 2}, pushed = {.now = 2, .free = 2, .work = 2};
-    ck_assert_double_eq(limit_factor(&bounce, 1e-16), 1);
-    ck_assert_double_eq(limit_bounce_factor(&bounce, 2, 1e-16), 1);
-    ck_assert_double_eq(limit_bounce_factor(&bounce, 1, 1e-16), 0.5);
-    ck_assert_double_eq(limit_bounce_factor(&bounce, -2, 1e-16), 0.25);
-    ck_assert_double_eq(limit_bounce_factor(&pushed, 1, 1e-16), 1);
-    ck_assert(limit_under_iterated(1, 59) && !limit_under_iterated(1, 60) && !limit_under_iterated(0, 59));
+    const struct island_energies rebound = {.now = 2, .free = 2}, pushed = {.now = 2, .free = 2, .work = 2};
+    ck_assert_double_eq(energy_limit_factor(&rebound, 1e-16), 1);
+    ck_assert_double_eq(energy_limit_rebound_factor(&rebound, 2, 1e-16), 1);
+    ck_assert_double_eq(energy_limit_rebound_factor(&rebound, 1, 1e-16), 0.5);
+    ck_assert_double_eq(energy_limit_rebound_factor(&rebound, -2, 1e-16), 0.25);
+    ck_assert_double_eq(energy_limit_rebound_factor(&pushed, 1, 1e-16), 1);
+    ck_assert(energy_limit_tests_rebound(1, 59) && !energy_limit_tests_rebound(1, 60) &&
+              !energy_limit_tests_rebound(0, 59));
 }
 END_TEST
 
@@ -304,15 +305,15 @@ END_TEST
  * of the motions left alone is no energy. */
 START_TEST(work_counts_by_its_share)
 {
-    const struct limit_energies none = {.now = 8, .free = 2, .work = 6, .drive = -1, .response = 1},
-                                half = {.now = 8, .free = 2, .work = 6, .drive = 1, .response = 2},
-                                all = {.now = 8, .free = 2, .work = 6, .drive = 3, .response = 2},
-                                rounding = {.now = 1e-16, .rigid = 1};
-    ck_assert_double_eq(limit_factor(&none, 1e-16), 0.5);
-    ck_assert_double_eq(limit_factor(&half, 1e-16), sqrt(5.0 / 8));
-    ck_assert_double_eq(limit_factor(&all, 1e-16), 1);
-    ck_assert_double_eq(limit_factor(&rounding, 1e-16), 1);
-    ck_assert_double_eq(limit_bounce_factor(&rounding, 0, 1e-16), 1);
+    const struct island_energies none = {.now = 8, .free = 2, .work = 6, .drive = -1, .response = 1},
+                                 half = {.now = 8, .free = 2, .work = 6, .drive = 1, .response = 2},
+                                 all = {.now = 8, .free = 2, .work = 6, .drive = 3, .response = 2},
+                                 rounding = {.now = 1e-16, .rigid = 1};
+    ck_assert_double_eq(energy_limit_factor(&none, 1e-16), 0.5);
+    ck_assert_double_eq(energy_limit_factor(&half, 1e-16), sqrt(5.0 / 8));
+    ck_assert_double_eq(energy_limit_factor(&all, 1e-16), 1);
+    ck_assert_double_eq(energy_limit_factor(&rounding, 1e-16), 1);
+    ck_assert_double_eq(energy_limit_rebound_factor(&rounding, 0, 1e-16), 1);
 }
 END_TEST
 
@@ -335,7 +336,7 @@ START_TEST(under_iterated_tables_equal_ref)
     struct runner *const runners[] = {&ref, &own, &three};
     for (int k = 0; k < 3; ++k) {
         iterate(runners[k], 5, false);
-        CALL(runners[k], runners[k]->k->limit_velocity(runners[k]->c, &limited[k], &runners[k]->error));
+        CALL(runners[k], runners[k]->k->limit_energy(runners[k]->c, &limited[k], &runners[k]->error));
         ck_assert_int_eq(limited[k], 1);
     }
     compare_solutions(&own, &ref, &v, &lambda);
@@ -360,7 +361,7 @@ START_TEST(solutions_are_not_slowed_down)
     for (int k = 0; k < 20; ++k) problem->contacts.points[k].gap = -1e-3;
     runner_start_settings(&r, table, &settings, problem);
     iterate(&r, 300, false);
-    CALL(&r, table->limit_velocity(r.c, &limited, &r.error));
+    CALL(&r, table->limit_energy(r.c, &limited, &r.error));
     ck_assert_int_eq(limited, 0);
     CALL(&r, table->read_solution(r.c, &r.error));
     ck_assert_double_gt(r.p->system.velocity[6 * 4 + 2], 2 * 9.81 * r.settings.dt);
@@ -413,8 +414,8 @@ START_TEST(blocks_have_no_unit)
     runner_start_method(&r[1], literal(), &scenes[11], scaled, 1, SADMM_METHOD_FAST);
     iterate(&r[0], 20, false);
     iterate(&r[1], 20, false);
-    refresh_weights(&r[0]);
-    refresh_weights(&r[1]);
+    update_weights(&r[0]);
+    update_weights(&r[1]);
     iterate(&r[0], 20, false);
     iterate(&r[1], 20, false);
     compare_solutions(&r[1], &r[0], &v, &lambda);
@@ -427,11 +428,12 @@ START_TEST(blocks_have_no_unit)
 }
 END_TEST
 
-/* The weight scale stays where the residuals are balanced, goes down where the momentum lags, up where the impulses
- * creep, by the power 0.3 of how far they are off and a factor of 4 at most a refresh; it never leaves [0.1, 5]. */
-START_TEST(weight_scales_follow_the_balance)
+/* The weight scale stays where the residuals are balanced, goes down where the momentum converges slower, up where the
+ * impulses creep, by the power 0.3 of how far they are off and a factor of 4 at most an update; it never leaves [0.1,
+ * 5]. */
+START_TEST(weight_scales_follow_the_imbalance)
 {
-    ck_assert(!weight_stalls(30) && weight_stalls(31));
+    ck_assert(!weight_stagnates(30) && weight_stagnates(31));
     for (double scale = 0.1; scale <= 5; scale *= 1.5) {
         ck_assert_double_eq(weight_next_scale(scale, 0.5), scale);
         ck_assert_double_eq(weight_next_scale(scale, 29), scale);
@@ -507,10 +509,10 @@ static struct sadmm_solve_report solve_with(struct contact_problem *problem, con
     sadmm_settings s = *wanted;
     s.warm_start = false;
     s.threads = 1;
-    s.certificate_momentum_tolerance = 1e-2; /* the natural map is what is looked at */
+    s.certificate_momentum_tolerance = 1e-2; /* the natural map is what is inspected */
     s.check_period = 5;
     struct sadmm_plan plan = sadmm_plan_make(&problem->system, &s);
-    plan.limit = plan.momentum = false; /* the problem, not a time step */
+    plan.energy_limit = plan.momentum = false; /* the problem, not a time step */
     ck_assert_int_eq(k->create(0, &c, &error), SADMM_OK);
     sadmm_status status = sadmm_schedule_solve(k, c, &problem->system, &s, &plan, &report, &error);
     ck_assert_msg(status == SADMM_OK, "%s", error.message);
@@ -527,7 +529,7 @@ static struct sadmm_solve_report solve_cold(struct contact_problem *problem, int
     return solve_with(problem, &s);
 }
 
-/* Iterations from nothing to a natural map of 1e-6 m/s, looked at every five; the problem is freed. */
+/* Iterations from nothing to a natural map of 1e-6 m/s, inspected every five; the problem is freed. */
 static int cold_iterations(struct contact_problem *problem, sadmm_method method, double relaxation)
 {
     sadmm_settings s = sadmm_settings_default();
@@ -543,7 +545,7 @@ static int cold_iterations(struct contact_problem *problem, sadmm_method method,
 }
 
 /* Over-relaxation is worth having; and to 1e-6 m/s fast takes a third of the iterations of paper, in the geometric
- * mean, as docs/internals/accuracy.md has it for problems whose loads are not predicted. `most` is a guard against
+ * mean, as docs/internals/accuracy.md has it for problems whose impulses are not initialised. `most` is a guard against
  * regressions and no more: what an over-relaxation of 1.2 takes. */
 START_TEST(cold_solves)
 {
@@ -780,13 +782,13 @@ int main(void)
     tcase_add_test(weights, deep_stacks_are_stiff);
     tcase_add_loop_test(weights, deep_stacks_equal_ref, 0, 2 * table_count);
     tcase_add_test(weights, few_iterations_of_a_problem_weigh_the_same);
-    tcase_add_test(weights, bounces_are_taken_back);
+    tcase_add_test(weights, rebounds_are_taken_out);
     tcase_add_test(weights, work_counts_by_its_share);
     tcase_add_loop_test(weights, under_iterated_tables_equal_ref, 0, 2 * table_count);
     tcase_add_loop_test(weights, solutions_are_not_slowed_down, 0, table_count + 1);
     tcase_add_loop_test(weights, small_gaps_are_eased, 0, 4);
     tcase_add_test(weights, blocks_have_no_unit);
-    tcase_add_test(weights, weight_scales_follow_the_balance);
+    tcase_add_test(weights, weight_scales_follow_the_imbalance);
     tcase_add_test(weights, contact_residuals_are_known);
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
     tcase_add_test(solutions, cold_solves);

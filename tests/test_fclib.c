@@ -798,7 +798,7 @@ static void huge_chunk(hid_t f)
 {
     const hsize_t count = DOFS, most = H5S_UNLIMITED, chunk = (hsize_t)1 << 28;
     hid_t space = H5Screate_simple(1, &count, &most), list = H5Pcreate(H5P_DATASET_CREATE);
-    char packed[64] = {0}; /* what the chunk holds is never looked at */
+    char packed[64] = {0}; /* what the chunk holds is never inspected */
     H5Pset_chunk(list, 1, &chunk);
     H5Pset_deflate(list, 9);
     drop(f, "/fclib_global/vectors/f");

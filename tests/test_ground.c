@@ -242,7 +242,7 @@ START_TEST(the_deepest_point_has_a_contact)
         for (size_t k = 0; k < sizeof shares / sizeof *shares; ++k) {
             position[2] = reach * (1 - shares[k]);
             const double depth = -deepest(kind, &shape, position, orientation);
-            /* 2 MANIFOLD_FLAT of the thinner body is what points are told apart by */
+            /* 2 MANIFOLD_FLAT of the thinner body is what points are distinguished by */
             ck_assert_msg(fabs(depth - shares[k] * reach) <= 2e-4 * size,
                           "form %d, pose %d, share %g: %g deep, should be %g", (int)form, pose, shares[k], depth,
                           shares[k] * reach);

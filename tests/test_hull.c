@@ -1,5 +1,5 @@
 /* Convex hulls: the polyhedron that points make, whatever their order, repetitions and company inside; what is refused,
- * and how it is told; the block that contact finding reads. */
+ * and how it is reported; the block that contact finding reads. */
 #include <check.h>
 
 #include "core/base/memory.h"
@@ -488,7 +488,7 @@ static const struct sadmm_hull_header *header_at(const double *pool, int offset)
 }
 
 /* The farthest vertex in any direction is found, from wherever a search begins: also where merged faces, which are not
- * flat, have more corners than are looked at one by one. */
+ * flat, have more corners than are inspected one by one. */
 START_TEST(the_farthest_vertex_is_found)
 {
     static const double merges[] = {0, 1e-6, 1e-3};

@@ -84,8 +84,8 @@ static const double restitutions[] = {0, 0.25, 0.5, 0.75, 1}, frictions[] = {0, 
 static const sadmm_shape_type shapes[] = {SADMM_SHAPE_SPHERE, SADMM_SHAPE_CAPSULE, SADMM_SHAPE_BOX};
 enum { SHAPES = 3, FRICTIONS = 3, RESTITUTIONS = 5, DTS = 3 };
 
-/* Of the energy at the start. Of 1e-5 a step may be rounding (LIMIT_ROUNDING), what the paper's iteration leaves after
- * so many is less than half of it. */
+/* Of the energy at the start. Of 1e-5 a step may be rounding (ENERGY_LIMIT_ROUNDING), what the paper's iteration leaves
+ * after so many is less than half of it. */
 #define ENERGY_GAIN 1e-5
 
 static void throw_body(int solver, sadmm_shape_type type, double restitution, double friction, double dt)
@@ -234,7 +234,7 @@ START_TEST(a_gram_carries_any_mass)
                 step_world(world, 1);
                 top = fmax(top, top_speed(world));
             }
-            /* Rest: what the predicted loads are rounded by. Landing: the fall's 0.14 m/s, and as much again. */
+            /* Rest: what the initialised impulses are rounded by. Landing: the fall's 0.14 m/s, and as much again. */
             ck_assert_msg(top < (h == 0 ? 1e-9 : 0.28), "%g, from %g m: %g m/s", ratios[r], heights[h], top);
             /* the slop, and what a landing leaves to be pushed out */
             ck_assert_double_eq_tol(body_state(world, id[0]).position[2], 0.1, h == 0 ? 2e-5 : 2e-4);

@@ -150,7 +150,7 @@ START_TEST(a_second_signal_ends_at_once)
     wait_for_part(child);
     kill(child, SIGINT);
     wait_until_taken(child); /* two that are pending would be one */
-    ck_assert_int_eq(waitpid(child, &status, WNOHANG), 0); /* asked to end, it goes on to the next look */
+    ck_assert_int_eq(waitpid(child, &status, WNOHANG), 0); /* asked to end, it goes on to the next poll */
     kill(child, SIGINT);
     status = end(child);
     ck_assert_msg(WIFSIGNALED(status) && WTERMSIG(status) == SIGINT, "status %d", status);

@@ -109,7 +109,7 @@ static struct convex_axis bare_axis(const struct pair_of *t)
     return axis;
 }
 
-/* How far a point of smooth shape s is from where the shape looks along n (world): from its one point there, or from
+/* How far a point of smooth shape s is from where the shape points along n (world): from its one point there, or from
  * the line between the two of its discs. Of others 0. */
 static double off_facing(const struct pair_of *t, int s, const double n[3], const double world[3])
 {
@@ -232,7 +232,7 @@ static void check_pair(const struct pair_of *t, struct pair_of *u, int depth, bo
     }
     if (depth <= TOUCHING)
         HOLDS(off_facing(t, 0, own, pa) <= 1e-10 * size && off_facing(t, 1, back, pb) <= 1e-10 * size,
-              "%s: nearest points look elsewhere, by %g and %g, size %g", what, off_facing(t, 0, own, pa),
+              "%s: nearest points point elsewhere, by %g and %g, size %g", what, off_facing(t, 0, own, pa),
               off_facing(t, 1, back, pb), size);
 
     /* the same two the other way round */

@@ -57,7 +57,8 @@ START_TEST(exchange_changes_nothing)
             n[1][k] = t_dot(u->R[1] + 3 * k, local[1]);
         }
         for (int k = 0; k < 3; ++k) turned = fmax(turned, fabs(n[0][k] + n[1][k]));
-        /* a face that is preferred, but is over the other one by less than clipping tells, is left to one of the two */
+        /* a face that is preferred, but is over the other one by less than clipping resolves, is left to one of the
+         * two */
         ck_assert_double_eq_tol(along(t, m.normal), along(u, w.normal), 0.01 * thin);
         if (turned > 1e-8) continue;
         ++alike;

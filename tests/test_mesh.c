@@ -29,7 +29,7 @@ static int corner_at(const struct mesh *m, int32_t triangle, vec3 x)
     return -1;
 }
 
-/* All pairs of triangles tell what the block says. */
+/* All pairs of triangles say what the block says. */
 static void check_neighbours(const struct mesh *m)
 {
     for (int32_t t = 0; t < m->triangles; ++t) {
@@ -380,7 +380,7 @@ END_TEST
 
 /* ---- what is read back ------------------------------------------------------------------------------------------- */
 
-/* Of a mesh, made again from what it tells of itself: the same triangles by the same numbers, in the same places. */
+/* Of a mesh, made again from what it returns of itself: the same triangles by the same numbers, in the same places. */
 static void check_made_again(const sadmm_mesh *mesh)
 {
     const int64_t vertices = sadmm_mesh_vertex_count(mesh), triangles = sadmm_mesh_triangle_count(mesh);

@@ -1,5 +1,5 @@
 /* Mesh files: a cube in every format and variant, faces that are not convex, what is passed over and counted, what is
- * refused and how it is told. All files are made here. */
+ * refused and how it is reported. All files are made here. */
 #include <check.h>
 #include <locale.h>
 #include <math.h>

@@ -116,7 +116,7 @@ static void set_velocity(sadmm_world *world, sadmm_body_id id, double vx, double
 }
 
 /* The contacts of the last step: how far normals are from `up`, the sum of the impulses along y. */
-static void look_at_contacts(sadmm_world *world, const double up[3], double *tilt, double *sideways)
+static void inspect_contacts(sadmm_world *world, const double up[3], double *tilt, double *sideways)
 {
     const int32_t count = sadmm_world_contact_count(world);
     *tilt = *sideways = 0;
@@ -170,7 +170,7 @@ START_TEST(flat_ground_is_a_plane)
             double tilt, sideways;
             step_world(worlds[0], 1);
             step_world(worlds[1], 1);
-            look_at_contacts(worlds[1], up, &tilt, &sideways);
+            inspect_contacts(worlds[1], up, &tilt, &sideways);
             /* the normal of a triangle is one of rounded numbers */
             ck_assert_msg(tilt <= 2e-15, "form %d on ground %d: step %d: a normal is %g off", (int)form, kind, i, tilt);
             /* a capsule that falls over from its end makes much of little */

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "core/base/parallel.h"
-#include "core/math/limit.h"
+#include "core/math/energy_limit.h"
 #include "momentum_worlds.h"
 #include "runner.h"
 
@@ -352,7 +352,7 @@ static void end_step(struct runner *r, double *before, double *after, size_t num
     int32_t limited;
     CALL(r, r->k->read_solution(r->c, &r->error));
     memcpy(before, r->p->system.velocity, numbers * sizeof *before);
-    CALL(r, r->k->limit_velocity(r->c, &limited, &r->error));
+    CALL(r, r->k->limit_energy(r->c, &limited, &r->error));
     ck_assert_int_eq(limited, 0);
     CALL(r, r->k->read_solution(r->c, &r->error));
     memcpy(after, r->p->system.velocity, numbers * sizeof *after);

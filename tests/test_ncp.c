@@ -133,7 +133,7 @@ START_TEST(redundant_contacts_near_rest_are_solved)
         uint32_t random = (uint32_t)(104729 * k + 3);
         make_corner(&p, speed, &random);
         memcpy(start, p.u, sizeof start);
-        inside += ncp_interior(&p.dense, 0) < 1e-4 * speed; /* near enough to tell what slips from what sticks */
+        inside += ncp_interior(&p.dense, 0) < 1e-4 * speed; /* near enough to separate what slips from what sticks */
         memcpy(p.u, start, sizeof start);
         memset(p.lambda, 0, sizeof p.lambda);
         ncp_newton(&p.dense, 1e-13);
@@ -425,8 +425,8 @@ START_TEST(constraints_left_out_are_not_forgotten)
 END_TEST
 
 /* A car on four wheels, whose loads are not unique: as much as two wheels across bear more, the others bear less. Of all
- * that solve, the least is that where the two are even. Without looking for it they are 0.8 N apart in the end, one way with
- * f64 and the other way with f32, and in the paper's hand scene a wheel bears nothing and ceases to roll. */
+ * that solve, the least is that where the two are even. Without searching for it they are 0.8 N apart in the end, one
+ * way with f64 and the other way with f32, and in the paper's hand scene a wheel bears nothing and ceases to roll. */
 START_TEST(wheels_bear_evenly)
 {
     static const double radius = 0.02, about_y[4] = {0.70710678118654752, -0.70710678118654752, 0, 0};

@@ -649,7 +649,7 @@ START_TEST(devices)
     ck_assert(first.certificate.ncp_max == second.certificate.ncp_max);
     sadmm_backend_info info;
     OK(sadmm_backend_query(SADMM_BACKEND_CUDA, &info));
-    if (info.available[SADMM_F64]) { /* the index is looked at where there is something to choose from */
+    if (info.available[SADMM_F64]) { /* the index is inspected where there is something to choose from */
         OK(sadmm_problem_set_device(p, 0));
         OK(sadmm_problem_solve(p, SADMM_BACKEND_CUDA, SADMM_F64, &s, &second));
         OK(sadmm_problem_set_device(p, 1000));

@@ -190,7 +190,7 @@ static int32_t run_towers(const struct sadmm_kernels *table, struct contact_prob
     settings.penalty_period = 0; /* (15) is one ratio for the whole system, by its largest residuals */
     contact_problem_seed(7);
     if (warm) contact_problem_warm(p, 0.3, 1);
-    else p->system.first = true; /* loads are predicted where they can be */
+    else p->system.first = true; /* impulses are initialised where they can be */
     return solve_rows(table, &p->system, &settings).limited;
 }
 
@@ -224,7 +224,7 @@ START_TEST(other_islands_keep_every_bit)
                 contact_problem_free(without);
                 contact_problem_free(with);
             }
-    ck_assert_int_gt(limited, 0); /* the limit of energies was at work beside the rows */
+    ck_assert_int_gt(limited, 0); /* the energy limit was at work beside the rows */
 }
 END_TEST
 

@@ -338,7 +338,7 @@ START_TEST(everything_comes_back)
 END_TEST
 
 /* What the text says is what the calls said. */
-START_TEST(everything_is_told)
+START_TEST(everything_is_reported)
 {
     static const char *const said[] = {
         "\"force\": [0.1, -2.0, 0.3333333333333333]",
@@ -611,7 +611,7 @@ int main(void)
     tcase_set_timeout(tests, 60);
     tcase_add_loop_test(tests, every_scene_comes_back, 0, (int)sadmm_scene_count());
     tcase_add_test(tests, everything_comes_back);
-    tcase_add_test(tests, everything_is_told);
+    tcase_add_test(tests, everything_is_reported);
     tcase_add_test(tests, a_state_of_a_run_comes_back);
     tcase_add_test(tests, what_is_left_out_is_the_default);
     tcase_add_test(tests, names_stand_for_bodies);

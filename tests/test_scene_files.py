@@ -297,15 +297,15 @@ def check_example(project, command, schema):
 
 def check_settings(command, document):
     """The schema's settings are the library's; how many iterations and sub-steps there are goes by method in a file."""
-    told = json.loads(run(command, "settings", "--json").stdout)["properties"]
+    reported = json.loads(run(command, "settings", "--json").stdout)["properties"]
     for name in ("iterations", "substeps"):
-        del told[name]["default"]
-    for properties in (told, have := document["$defs"]["settings"]["properties"]):
+        del reported[name]["default"]
+    for properties in (reported, have := document["$defs"]["settings"]["properties"]):
         for value in properties.values():
             value.pop("description", None)
-    for name in sorted({*told, *have}):
-        if told.get(name) != have.get(name):
-            fail(f"settings.{name}: the schema has {have.get(name)}, `subadmm settings --json` {told.get(name)}")
+    for name in sorted({*reported, *have}):
+        if reported.get(name) != have.get(name):
+            fail(f"settings.{name}: the schema has {have.get(name)}, `subadmm settings --json` {reported.get(name)}")
 
 
 def main():

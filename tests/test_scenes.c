@@ -49,7 +49,7 @@ static const struct table_row {
     const char *spec;
     int bodies, dt_ms, iterations, m;
     double contacts;
-    int settle, steps; /* the part of the run that this test looks at; the whole run: test_standing_slow */
+    int settle, steps; /* the part of the run that this test inspects; the whole run: test_standing_slow */
 } table[] = {
     { "sliding_cubes:100", 600 / 6, 5, 120, 30, 488, 0, 20 },
     { "sliding_cubes:500", 3000 / 6, 5, 120, 30, 3864, 0, 20 },
@@ -102,7 +102,7 @@ START_TEST(sliding_cubes_have_n_cubes)
 }
 END_TEST
 
-/* Contacts of the next step, from the geometry alone: every pair of bodies is looked at. For cubes that are not turned,
+/* Contacts of the next step, from the geometry alone: every pair of bodies is inspected. For cubes that are not turned,
  * above a ground at z = 0 (body 0): faces that lie over each other within reach make four. */
 static int32_t count_by_hand(sadmm_world *world, const sadmm_world_def *def)
 {

@@ -43,7 +43,7 @@ static bool stands_after(const struct list *list, enum sadmm_stage_kind kind, in
 static struct sadmm_plan contacts_plan(const sadmm_settings *settings, bool warm)
 {
     struct sadmm_plan plan = {.bodies = 2, .pairs = 1, .points = 4, .contact_rows = 3, .rigid = true, .threads = 1};
-    sadmm_plan_settle(&plan, settings, warm);
+    sadmm_plan_complete(&plan, settings, warm);
     return plan;
 }
 
@@ -75,7 +75,7 @@ START_TEST(substeps_repeat_what_a_step_does)
     }
     take_list(&three, &plan, &settings, false, 0);
     ck_assert_int_eq(count_of(&three, SADMM_STAGE_TURN), 0);
-    ck_assert_int_eq(count_of(&three, SADMM_STAGE_LIMIT), 1);
+    ck_assert_int_eq(count_of(&three, SADMM_STAGE_ENERGY_LIMIT), 1);
 }
 END_TEST
 
@@ -85,7 +85,7 @@ START_TEST(a_world_without_constraints)
     sadmm_settings settings = sadmm_settings_default();
     struct sadmm_plan plan = {.bodies = 1, .rigid = true, .threads = 1};
     settings.recover_wrenches = false;
-    sadmm_plan_settle(&plan, &settings, false);
+    sadmm_plan_complete(&plan, &settings, false);
     take_list(&list, &plan, &settings, true, 0);
     /* Step 1 once is exact; nothing that belongs to constraints is there. */
     static const enum sadmm_stage_kind wanted[] = {SADMM_STAGE_GATHER, SADMM_STAGE_HITS, SADMM_STAGE_FIND,
@@ -163,10 +163,10 @@ START_TEST(everything_stands_where_it_is_due)
             const bool last = done == s.iterations;
             const bool check = stops && (last || done % s.check_period == 0);
             const bool balance = plan.penalty_updates && !last && done % s.penalty_period == 0;
-            const bool renewal = plan.weight_refresh && !last && renews(done);
+            const bool renewal = plan.weight_updates && !last && renews(done);
             ck_assert_int_eq(stands_after(&list, SADMM_STAGE_CHECK, done), check);
             ck_assert_int_eq(stands_after(&list, SADMM_STAGE_BALANCE, done), balance);
-            ck_assert_int_eq(stands_after(&list, SADMM_STAGE_REWEIGH, done), renewal);
+            ck_assert_int_eq(stands_after(&list, SADMM_STAGE_WEIGHTS, done), renewal);
             checks += check;
             balances += balance;
             renewals += renewal;
@@ -175,8 +175,8 @@ START_TEST(everything_stands_where_it_is_due)
         }
         ck_assert_int_eq(count_of(&list, SADMM_STAGE_CHECK), checks);
         ck_assert_int_eq(count_of(&list, SADMM_STAGE_BALANCE), balances);
-        ck_assert_int_eq(count_of(&list, SADMM_STAGE_REWEIGH), renewals);
-        ck_assert_int_eq(count_of(&list, SADMM_STAGE_LIMIT), 1); /* in either method: momentum */
+        ck_assert_int_eq(count_of(&list, SADMM_STAGE_WEIGHTS), renewals);
+        ck_assert_int_eq(count_of(&list, SADMM_STAGE_ENERGY_LIMIT), 1); /* in either method: momentum */
     }
 }
 END_TEST
@@ -191,10 +191,10 @@ START_TEST(a_met_check_ends_the_iterations)
     s.check_period = 5; /* weights are due there as well */
     s.certificate_tolerance = 1e-6;
     struct sadmm_plan plan = contacts_plan(&s, false);
-    take_list(&list, &plan, &s, true, WEIGHT_FIRST_REFRESH);
+    take_list(&list, &plan, &s, true, WEIGHT_FIRST_UPDATE);
     ck_assert_int_eq(count_of(&list, SADMM_STAGE_ITERATE), 1);
-    ck_assert_int_eq(count_of(&list, SADMM_STAGE_REWEIGH), 0);
-    ck_assert_int_eq(count_of(&list, SADMM_STAGE_LIMIT), 1);
+    ck_assert_int_eq(count_of(&list, SADMM_STAGE_WEIGHTS), 0);
+    ck_assert_int_eq(count_of(&list, SADMM_STAGE_ENERGY_LIMIT), 1);
     ck_assert_int_eq(count_of(&list, SADMM_STAGE_SOLUTION), 1);
     ck_assert_int_eq(count_of(&list, SADMM_STAGE_COMMIT), 1);
 }

@@ -21,8 +21,8 @@ START_TEST(stands)
 END_TEST
 
 /* Method fast: 5,050 cubes in 100 rows, 10 iterations a step at 1/60 s, in single precision. Without what math/weight.h
- * says about deep stacks it has buckled after 500 steps (0.2 m). It starts from predicted loads that are its solution,
- * with faces that touch, so that no contact has reason to open or to sink by more than the slop. */
+ * says about deep stacks it has buckled after 500 steps (0.2 m). It starts from initialised impulses that are its
+ * solution, with faces that touch, so that no contact has reason to open or to sink by more than the slop. */
 START_TEST(tall_pyramid)
 {
     struct sadmm_scene scene = open_scene("pyramid:100");

@@ -284,7 +284,7 @@ START_TEST(mass_and_material_can_be_set)
 END_TEST
 
 /* Wrenches, moves and pairs are read back as they are now, and go with what they are of. */
-START_TEST(what_was_set_is_told)
+START_TEST(what_was_set_is_reported)
 {
     const double force[3] = {1, -2, 1.0 / 3}, torque[3] = {0, 0, 7}, there[3] = {0, 3, 1}, turned[4] = {0.6, 0, 0.8, 0};
     sadmm_body_id ground, ball, belt, a, b;
@@ -525,7 +525,7 @@ int main(void)
     tcase_add_test(cases, wrenches_on_static_bodies_are_refused);
     tcase_add_test(cases, forces_and_impulses_at_a_point);
     tcase_add_loop_test(cases, mass_and_material_can_be_set, 0, 2);
-    tcase_add_test(cases, what_was_set_is_told);
+    tcase_add_test(cases, what_was_set_is_reported);
     tcase_add_test(cases, user_data_goes_with_the_body);
     tcase_add_loop_test(cases, inertias_that_are_taken_can_be_stepped, 0, 2);
     tcase_add_loop_test(cases, residuals_are_measured_when_a_stop_rule_ends_the_step, 0, 2);

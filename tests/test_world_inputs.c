@@ -540,7 +540,7 @@ START_TEST(long_names_are_cut)
 }
 END_TEST
 
-/* Bodies that come and go by the hundred thousand, looked at one by one: work in proportion to their number. Any loop
+/* Bodies that come and go by the hundred thousand, inspected one by one: work in proportion to their number. Any loop
  * over all slots in one of these calls takes minutes here (the test's time limit). */
 START_TEST(many_bodies_come_and_go)
 {
@@ -552,7 +552,7 @@ START_TEST(many_bodies_come_and_go)
     sadmm_shape_def box = box_shape();
     sadmm_body_id *ids = malloc(COUNT * sizeof *ids), id;
     sadmm_shape_id shape;
-    long failed = 0, wrong = 0; /* counted: a million assertions take longer than what they look at */
+    long failed = 0, wrong = 0; /* counted: a million assertions take longer than what they check */
     for (int32_t i = 0; i < COUNT; ++i) {
         body.position[0] = i;
         failed += sadmm_world_add_body(world, &body, &ids[i]) != SADMM_OK;

@@ -56,7 +56,7 @@ SADMM_API int32_t sadmm_world_array_rows(const sadmm_world *world, sadmm_array a
 SADMM_API sadmm_status sadmm_world_get_array(sadmm_world *world, sadmm_array array, int32_t first, int32_t count,
                                              double *values);
 /* Set rows [first, first + count), each as the call named above does, with its ranges: all of them, or, after an error
- * in any, none. The message tells which row. Errors: INVALID_ARGUMENT (array, range, values), those of the calls named,
+ * in any, none. The message says which row. Errors: INVALID_ARGUMENT (array, range, values), those of the calls named,
  * DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_array(sadmm_world *world, sadmm_array array, int32_t first, int32_t count,
                                              const double *values);
@@ -73,7 +73,7 @@ SADMM_API sadmm_status sadmm_world_coupling_index(sadmm_world *world, sadmm_coup
 /* An array where the backend has it: in the memory of a device. Not to be written to. */
 typedef struct sadmm_device_array {
     const double *values; /* of the device: row r's column k is values[r * stride + k] */
-    int64_t rows, columns; /* a row a dynamic body: sadmm_world_dynamic_bodies tells which */
+    int64_t rows, columns; /* a row a dynamic body: sadmm_world_dynamic_bodies says which */
     int64_t stride;       /* doubles from row to row */
     int device;           /* its index, as in sadmm_world_def */
     void *stream;         /* CUDA: the stream (cudaStream_t) that steps run on. The values are there for what is enqueued

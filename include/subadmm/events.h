@@ -12,7 +12,7 @@
  * Two shapes touch in a step if one of their contact points carries an impulse, or has a gap <= 0 (sadmm_contact: a
  * point that is only foreseen does neither). With sub-steps: in the last one.
  *
- * A sensor is a shape that touches nothing (sadmm_shape_def.sensor). It tells which shapes overlap it where the step
+ * A sensor is a shape that touches nothing (sadmm_shape_def.sensor). It reports which shapes overlap it where the step
  * has left them: those that would meet it if it were no sensor (environment, category and mask, pairs of bodies without
  * contact, bodies that joints keep from meeting), that are on another body, and are no sensors themselves. Static
  * bodies' sensors see dynamic and kinematic bodies, those of the others see all.
@@ -20,10 +20,10 @@
  * Order: by step; in a step contacts first, then sensors; of either by the slots of a, then of b, and what ended before
  * what begun. Events are the same on all backends as far as their steps are, and do not depend on threads.
  *
- * Price: a step with events recorded is waited for (sadmm_world_step_async). On CUDA the device then tells which pairs
- * touch, and all contacts are read where something has begun; that time is in no report. With sensors, bodies are read
- * too, and the tree that queries use follows them (query.h). Worlds that record nothing pay nothing; a sensor that nobody
- * asks about costs nothing.
+ * Price: a step with events recorded is waited for (sadmm_world_step_async). On CUDA the device then reports which
+ * pairs touch, and all contacts are read where something has begun; that time is in no report. With sensors, bodies are
+ * read too, and the tree that queries use follows them (query.h). Worlds that record nothing pay nothing; a sensor that
+ * nobody asks about costs nothing.
  *
  * Threads: as in world.h, a world is used by one thread at a time.
  */

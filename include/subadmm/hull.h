@@ -56,7 +56,7 @@ SADMM_API int32_t sadmm_hull_face_count(const sadmm_hull *hull);
  * they were given. Of NULL: NULL. Valid as long as the hull. */
 SADMM_API const double *sadmm_hull_vertices(const sadmm_hull *hull);
 
-/* The definition's rounding, m. Of NULL: 0. What the other functions tell is the polyhedron inside. */
+/* The definition's rounding, m. Of NULL: 0. What the other functions return is the polyhedron inside. */
 SADMM_API double sadmm_hull_rounding(const sadmm_hull *hull);
 /* The definition's merge. Of NULL: 0. With it the vertices make the same hull again, bit for bit. */
 SADMM_API double sadmm_hull_merge(const sadmm_hull *hull);

@@ -86,7 +86,7 @@ SADMM_API const double *sadmm_mesh_file_vertices(const sadmm_mesh_file *file);
 
 /* 3 vertices each, in [0, vertex_count), in the order of the file's faces and with their winding. A face of more than
  * three corners a0 a1 a2 ... becomes triangles one after the other: a convex one the fan a0 a1 a2, a0 a2 a3, ...; of
- * others ears are cut off, in the order of the corners, as seen along the axis that the face looks along most. So one
+ * others ears are cut off, in the order of the corners, as seen along the axis that the face points along most. So one
  * that is not convex gets no triangle outside of it. Of NULL: NULL. Valid as long as the file. */
 SADMM_API const int32_t *sadmm_mesh_file_triangles(const sadmm_mesh_file *file);
 

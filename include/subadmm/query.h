@@ -46,7 +46,7 @@ SADMM_API sadmm_query_filter sadmm_query_filter_default(void);
 typedef struct sadmm_ray {
     double origin[3];    /* m, world, in [-1e9, 1e9] */
     double direction[3]; /* finite, not all 0; its length does not matter */
-    double length;       /* how far to look, m, >= 0; infinite: as far as there is */
+    double length;       /* how far to search, m, >= 0; infinite: as far as there is */
 } sadmm_ray;
 
 typedef struct sadmm_ray_hit {
@@ -61,8 +61,8 @@ typedef struct sadmm_ray_hit {
 
 /* What a ray hits: where it enters a shape. Every shape is hit once at most.
  *
- * Solids are closed: a ray that runs along a face or an edge, or touches a round in one point, hits, as far as rounding
- * can tell. On an edge or a corner the normal is that of one of the faces there. What the origin is inside of is hit at
+ * Solids are closed: a ray that runs along a face or an edge, or touches a round in one point, hits, to within
+ * rounding. On an edge or a corner the normal is that of one of the faces there. What the origin is inside of is hit at
  * distance 0, or with filter.from_inside = false not at all. An origin on a surface is outside as long as the ray leads
  * away from it, and may be on either side by rounding: rays that go on from a hit ignore its body, or begin a little
  * above it.

@@ -63,10 +63,10 @@ typedef struct sadmm_settings {
     int substeps;                /* of a world's step, in [1, SADMM_MOST_SUBSTEPS = 64], dt / substeps >= 1e-6 s;
                                     default 1. A step is made of so many sub-steps of dt / substeps with a share of
                                     `iterations` each, so that bodies in motion overlap less (docs/guide/choose.md).
-                                    Pairs of shapes that may touch are looked for once a step, all else is done in every
-                                    sub-step: states are those of `substeps` steps of dt / substeps, for less. External
-                                    wrenches act through all of them. What is read of a step: world.h. Problems have
-                                    none */
+                                    Pairs of shapes that may touch are searched for once a step, all else is done in
+                                    every sub-step: states are those of `substeps` steps of dt / substeps, for less.
+                                    External wrenches act through all of them. What is read of a step: world.h. Problems
+                                    have none */
     double gravity[3];           /* m/s^2, world frame, finite, norm <= 1e6; default (0, 0, -9.81) */
 
     sadmm_method method;         /* default SADMM_METHOD_FAST: the same solutions in fewer iterations that cost the same
@@ -90,7 +90,7 @@ typedef struct sadmm_settings {
                                     converged and keeps it from coming to rest (docs/internals/algorithm.md) */
     bool warm_start;             /* start from the previous step's impulses and velocities; default true.
                                     false: impulses start at 0 and velocities at A^-1 b. FAST, either way: problems
-                                    without impulses and first steps start from predicted loads
+                                    without impulses and first steps start from initialised impulses
                                     (docs/internals/algorithm.md) */
 
     int ncp_points;              /* worlds: islands with joints and at most so many contact points are solved directly

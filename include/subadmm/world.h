@@ -228,7 +228,7 @@ typedef struct sadmm_shape_def {
                                     of it, so that the caller may destroy it at once. Read back: the same pointer, which
                                     is the world's own then */
     const sadmm_mesh *mesh;      /* of MESH; the same for it */
-    bool sensor;                 /* touches nothing and tells what overlaps it (events.h); not of a MESH, which has no
+    bool sensor;                 /* touches nothing and reports what overlaps it (events.h); not of a MESH, which has no
                                     inside; default false */
 } sadmm_shape_def;
 

@@ -165,7 +165,7 @@ void bind_shapes(nb::module_ &m)
         .def_prop_rw("category", [](const S &s) { return s.def.category; }, [](S &s, whole x) { s.def.category = x.as_bits("category"); }, "Bits of what it is.")
         .def_prop_rw("mask", [](const S &s) { return s.def.mask; }, [](S &s, whole x) { s.def.mask = x.as_bits("mask"); }, "Categories that it meets.")
         .def_prop_rw("sensor", [](const S &s) { return s.def.sensor; }, [](S &s, bool x) { s.def.sensor = x; },
-                     "Touches nothing and tells what overlaps it: World.record_events, World.sensor_overlaps.")
+                     "Touches nothing and reports what overlaps it: World.record_events, World.sensor_overlaps.")
         .def("copy", [](const S &s) { return S(s); }, "Another definition of the same shape; hulls and meshes are shared.")
         .def("geometry", &geometry_of, "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.")
         .def_prop_ro("rounding", [](const S &s) { return sadmm_hull_rounding(s.def.hull); },

@@ -82,7 +82,7 @@ def _with(shape, options):
 
 def plane(**options):
     """Half-space z <= 0 of the shape's frame, for static bodies. Options of this and all shapes: position and orientation in
-    the body's frame, friction (0.5), restitution (0), category, mask, sensor (False: touches nothing, tells what overlaps it)."""
+    the body's frame, friction (0.5), restitution (0), category, mask, sensor (False: touches nothing, reports what overlaps it)."""
     return _with(Shape("plane"), options)
 
 
@@ -244,7 +244,7 @@ def _to_json(self, name=None, description=None, duration=None):
 
 def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(), category=0, mask=0, from_inside=True,
                from_behind=False, sensors=False):
-    """What rays hit: origins (n x 3, m, world), directions (n x 3, of any length), how far to look (m). A dict of arrays: shape
+    """What rays hit: origins (n x 3, m, world), directions (n x 3, of any length), how far to search (m). A dict of arrays: shape
     (n; index in World.shapes, -1: nothing), distance (n, m; infinite: nothing), point and normal (n x 3, world), triangle (n;
     of a mesh, else -1). ignore: a Body; types: of bodies, as ("dynamic",); category, mask: only what would meet a shape with
     these; from_inside: what the origin is inside of counts, at distance 0; from_behind: triangles count from behind too;

@@ -113,6 +113,6 @@ def _convert(source, file, said, duration, options):
     text = world.to_json(duration=duration, **named)
     file.write(text)
     if said is not None:
-        told = {"not_carried_over": [note._asdict() for note in notes], "joints": joints}
-        said.write(json.dumps(told, indent=1, ensure_ascii=False) + "\n")
+        reported = {"not_carried_over": [note._asdict() for note in notes], "joints": joints}
+        said.write(json.dumps(reported, indent=1, ensure_ascii=False) + "\n")
     return notes

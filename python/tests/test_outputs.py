@@ -80,8 +80,8 @@ def test_what_cannot_be_written_is_said_before_the_work(command, tmp_path, capsy
     before = left(tmp_path)
     for bad, said in cases:
         assert main([bad if argument == path else argument for argument in arguments]) == 1
-        told = capsys.readouterr().err
-        assert said in told and told.count("\n") == 1, told
+        reported = capsys.readouterr().err
+        assert said in reported and reported.count("\n") == 1, reported
     assert left(tmp_path) == before
 
 
@@ -221,8 +221,8 @@ def test_arguments_out_of_range_are_named(arguments, said, tmp_path, capsys):
     path = str(tmp_path / {"picture": "a.png", "record": "a.html", "convert": "a.json", "view": ""}[arguments[0]])
     output = {"view": [], "convert": [path]}.get(arguments[0], ["-o", path])
     assert main([arguments[0], "pyramid:2", *output, *arguments[1:]]) == 1
-    told = capsys.readouterr().err
-    assert said in told and told.count("\n") == 1, told
+    reported = capsys.readouterr().err
+    assert said in reported and reported.count("\n") == 1, reported
     assert not os.listdir(tmp_path)
 
 

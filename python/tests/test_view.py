@@ -48,8 +48,8 @@ def test_addresses_that_cannot_be_served_are_errors_and_no_server_is_waited_for(
         with pytest.raises(OSError, match="host: '" + host[:9]):
             View(Session(led_box), host=host, port=18441)
         assert main(["view", "pyramid:2", "--host", host, "--port", "18441"]) == 1
-        told = capsys.readouterr().err
-        assert said in told and told.count("\n") == 1
+        reported = capsys.readouterr().err
+        assert said in reported and reported.count("\n") == 1
     for port in (-1, 65536, 2**31 - 1):
         with pytest.raises(ValueError, match=f"port: {port}"):
             show.view.serve(led_box, port=port)

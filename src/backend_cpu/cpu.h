@@ -35,7 +35,7 @@
 #include "core/base/barrier.h"
 #include "core/base/parallel.h"
 #include "core/solve/kernels.h"
-#include "core/math/limit.h"
+#include "core/math/energy_limit.h"
 #include "core/math/packed6.h"
 #include "core/model/system_terms.h"
 #include "cpu_lanes.h"
@@ -46,7 +46,7 @@
 #define CPU(name) SADMM_JOIN(sadmm_cpu_##name, SADMM_VARIANT)
 
 enum { STATE_INV_BETA = 6 }; /* slot of a state row */
-/* Of weights: energy, kinetic, push, momentum residual; of the limit: now, free, along; then momentum
+/* Of weights: energy, kinetic, push, momentum residual; of the energy limit: now, free, along; then momentum
  * residual, drive, response. */
 enum { BODY_SUMS = 4 };
 
@@ -122,9 +122,9 @@ struct cpu_floating {
 struct cpu_island {
     struct weight_sums sums;
     struct weight_island weights;
-    double rescale;             /* not 0: the weights of pairs stay, times this */
-    bool rows;                  /* there are constraints by rows: no limit of energies, the weight scale stays 1 */
-    struct limit_energies limit;
+    double scale_weights;       /* not 0: the weights of pairs stay, times this */
+    bool rows;                  /* there are constraints by rows: no energy limit, the weight scale stays 1 */
+    struct island_energies energies;
     double along; /* v . A v_f / 2 */
 };
 
@@ -174,7 +174,7 @@ struct sadmm_context {
      * `change` holds J^T (lambda - lambda_prev) after a measured iteration, when `wrenches` holds J^T lambda. */
     real *wrenches, *change;
     size_t record_count, wrench_capacity, change_capacity;
-    bool settled;      /* Step 1 ran: bodies without constraints are at A^-1 b and need no more */
+    bool step1_done;   /* Step 1 ran: bodies without constraints are at A^-1 b and need no more */
     bool measured;     /* wrenches are split: the next Step 1 uses wrenches + ratio * change */
     double ratio;
     struct sadmm_residual residual; /* primal part of a measured iteration */
@@ -200,7 +200,7 @@ struct sadmm_context {
     double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
     double *pair_violation;     /* pair records: terms of the islands' sums */
     struct arm_sums *pair_arms; /* where contacts have three rows: of pair records on a and b, once a step */
-    int refreshes;              /* of the weights, in this solve */
+    int weight_updates;         /* in this solve */
     int exact_since;            /* iterations since the momentum residuals were taken */
     double *body_sums;          /* bodies x BODY_SUMS: terms of the islands' sums */
     size_t body_sum_capacity, island_capacity, A_inverse_capacity, pair_response_capacity,
@@ -260,7 +260,7 @@ sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
  * `wrenches` hold J^T lambda. */
 void CPU(add_up_imbalance)(struct sadmm_context *, int thread, int threads);
 void CPU(update_weight_scales)(struct sadmm_context *);
-sadmm_status CPU(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
+sadmm_status CPU(limit_energy)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 /* begin: islands, and which are floating (cpu_islands.c); false when memory runs out. */
 bool CPU(find_islands)(struct sadmm_context *);
 /* Motions of the floating islands; then their velocities, slowed down but for these (cpu_momentum.c). */
@@ -294,10 +294,10 @@ static inline bool cpu_sweep_measures(enum cpu_sweep sweep)
 }
 void CPU(sweep_pairs)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
 void CPU(sweep_rows)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
-/* Step 1 of a thread's share of the bodies; `settled`: all but the bodies without constraints. */
-void CPU(sweep_bodies)(struct sadmm_context *, int thread, int threads, bool settled);
+/* Step 1 of a thread's share of the bodies; `step1_done`: all but the bodies without constraints. */
+void CPU(sweep_bodies)(struct sadmm_context *, int thread, int threads, bool step1_done);
 /* The same for the method `fast`: velocities go `velocity` times as far, multipliers have gone `multipliers` times. */
-void CPU(sweep_bodies_fast)(struct sadmm_context *, int thread, int threads, bool settled, double velocity,
+void CPU(sweep_bodies_fast)(struct sadmm_context *, int thread, int threads, bool step1_done, double velocity,
                             double multipliers);
 /* fast: the momentum residuals of bodies [begin, end), recomputed, in double from v and lambda (cpu_residuals.c). */
 void CPU(recompute_residuals)(struct sadmm_context *, size_t begin, size_t end);

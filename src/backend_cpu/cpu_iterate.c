@@ -43,7 +43,7 @@ void CPU(sum_wrenches)(struct sadmm_context *c) { cpu_parallel(c, sum_share, c);
 void CPU(start_wrenches)(struct sadmm_context *c)
 {
     CPU(sum_wrenches)(c);
-    c->settled = false;
+    c->step1_done = false;
     c->measured = false;
     c->ratio = 1;
 }
@@ -61,14 +61,14 @@ static void velocity_share(void *context, int thread, int threads)
         join_wrenches(c, thread, threads);
         sadmm_barrier_wait(&c->barrier, threads);
     }
-    CPU(sweep_bodies)(c, thread, threads, c->settled);
+    CPU(sweep_bodies)(c, thread, threads, c->step1_done);
 }
 
 sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)
 {
     if (refuse_fast(c, error) != SADMM_OK) return SADMM_ERROR_UNSUPPORTED;
     cpu_parallel(c, velocity_share, c);
-    c->settled = true;
+    c->step1_done = true;
     c->measured = false;
     c->ratio = 1;
     return SADMM_OK;
@@ -117,14 +117,14 @@ static void iterate_fast(struct sadmm_context *c, int thread, int threads, int c
             CPU(recompute_residuals)(c, first, past);
             sadmm_barrier_wait(&c->barrier, threads);
         }
-        bool relaxes = relax_constraints(i, count), settled = c->settled || i > 0;
+        bool relaxes = relax_constraints(i, count), step1_done = c->step1_done || i > 0;
         update_constraints(c, thread, threads,
                            relaxes   ? CPU_SWEEP_RELAX
                            : measure ? CPU_SWEEP_PLAIN_MEASURE
                                      : CPU_SWEEP_PLAIN,
                            primal);
         sadmm_barrier_wait(&c->barrier, threads);
-        CPU(sweep_bodies_fast)(c, thread, threads, settled, relax_velocity(i, count, settled) ? relaxation : 1,
+        CPU(sweep_bodies_fast)(c, thread, threads, step1_done, relax_velocity(i, count, step1_done) ? relaxation : 1,
                                relaxes ? relaxation : 1);
         sadmm_barrier_wait(&c->barrier, threads);
     }
@@ -143,7 +143,7 @@ static void iterate_share(void *argument, int thread, int threads)
     if (c->fast) iterate_fast(c, thread, threads, s->count, s->measure, &primal);
     for (int i = 0; i < s->count && !c->fast; ++i) {
         bool last = s->measure && i + 1 == s->count;
-        CPU(sweep_bodies)(c, thread, threads, c->settled || i > 0);
+        CPU(sweep_bodies)(c, thread, threads, c->step1_done || i > 0);
         sadmm_barrier_wait(&c->barrier, threads);
         update_constraints(c, thread, threads, last ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
         sadmm_barrier_wait(&c->barrier, threads);
@@ -157,7 +157,7 @@ sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, stru
     (void)error;
     clear_max(c);
     cpu_parallel(c, iterate_share, &(struct batch){c, count, measure});
-    c->settled = c->settled || count > 0;
+    c->step1_done = c->step1_done || count > 0;
     if (count > 0) c->exact_since = (c->exact_since + count - 1) % RELAX_RESIDUAL_PERIOD + 1;
     c->measured = measure && !c->fast;
     c->ratio = 1;

@@ -79,11 +79,11 @@ static size_t first_body(const struct sadmm_context *c, size_t block)
     return body < (size_t)c->bodies ? body : (size_t)c->bodies;
 }
 
-static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool settled)
+static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool step1_done)
 {
     for (size_t index = begin; index < end; ++index) {
         if (c->general_lanes[index] == ALL_LANES) continue;
-        if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
+        if (step1_done && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
         const struct body_block *block = &c->body_blocks[index];
         lanes state[ROW];
         vec linear, angular;
@@ -104,12 +104,12 @@ static inline vec move_by(lanes v[3], vec step)
     return (vec){v[0] - before.x, v[1] - before.y, v[2] - before.z};
 }
 
-static void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end, bool settled, lanes velocity,
+static void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end, bool step1_done, lanes velocity,
                               lanes multipliers)
 {
     for (size_t index = begin; index < end; ++index) {
         if (c->general_lanes[index] == ALL_LANES) continue;
-        if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
+        if (step1_done && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
         struct body_block *block = &c->body_blocks[index];
         const row8 *rows = (const row8 *)c->state + index * (size_t)LANES;
         lanes state[ROW], g[ROW];
@@ -154,11 +154,11 @@ static inline row8 general_momentum_residual(const struct sadmm_context *c, size
     return g;
 }
 
-static void update_general(struct sadmm_context *c, size_t begin, size_t end, bool settled)
+static void update_general(struct sadmm_context *c, size_t begin, size_t end, bool step1_done)
 {
     for (size_t k = begin; k < end; ++k) {
         const size_t i = (size_t)c->general_bodies[k];
-        if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
+        if (step1_done && c->offsets[i] == c->offsets[i + 1]) continue;
         const row8 *H = (const row8 *)c->H_columns + 6 * k;
         row8 g = general_momentum_residual(c, k, i), step = {0};
         for (int j = 0; j < 6; ++j) step += H[j] * g[j];
@@ -166,12 +166,12 @@ static void update_general(struct sadmm_context *c, size_t begin, size_t end, bo
     }
 }
 
-static void update_general_fast(struct sadmm_context *c, size_t begin, size_t end, bool settled, real velocity,
+static void update_general_fast(struct sadmm_context *c, size_t begin, size_t end, bool step1_done, real velocity,
                                 real multipliers)
 {
     for (size_t k = begin; k < end; ++k) {
         const size_t i = (size_t)c->general_bodies[k];
-        if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
+        if (step1_done && c->offsets[i] == c->offsets[i + 1]) continue;
         const row8 *A = (const row8 *)c->A_columns + 6 * k, *H = (const row8 *)c->H_columns + 6 * k;
         row8 *momentum_residual = (row8 *)c->momentum_residuals + k;
         row8 sum = wrench_sum(c, i), g = *momentum_residual + 2 * sum, step = {0};
@@ -223,19 +223,19 @@ static struct body_share share_of(const struct sadmm_context *c, int thread, int
     return s;
 }
 
-void CPU(sweep_bodies)(struct sadmm_context *c, int thread, int threads, bool settled)
+void CPU(sweep_bodies)(struct sadmm_context *c, int thread, int threads, bool step1_done)
 {
     const struct body_share s = share_of(c, thread, threads);
-    update_rigid(c, s.begin, s.end, settled);
-    update_general(c, s.general_begin, s.general_end, settled);
+    update_rigid(c, s.begin, s.end, step1_done);
+    update_general(c, s.general_begin, s.general_end, step1_done);
 }
 
-void CPU(sweep_bodies_fast)(struct sadmm_context *c, int thread, int threads, bool settled, double velocity,
+void CPU(sweep_bodies_fast)(struct sadmm_context *c, int thread, int threads, bool step1_done, double velocity,
                             double multipliers)
 {
     const struct body_share s = share_of(c, thread, threads);
-    update_rigid_fast(c, s.begin, s.end, settled, fill((real)velocity), fill((real)multipliers));
-    update_general_fast(c, s.general_begin, s.general_end, settled, (real)velocity, (real)multipliers);
+    update_rigid_fast(c, s.begin, s.end, step1_done, fill((real)velocity), fill((real)multipliers));
+    update_general_fast(c, s.general_begin, s.general_end, step1_done, (real)velocity, (real)multipliers);
 }
 
 double CPU(dual_residual)(const struct sadmm_context *c, int thread, int threads)

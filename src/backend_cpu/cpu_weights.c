@@ -176,8 +176,8 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index)
         double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
         double load = sums[l] / pair->count;
         double response = c->pair_response[index * (size_t)LANES + (size_t)l];
-        *B = island->rescale > 0 ? *B * island->rescale
-                                 : weight_of_pair(&island->weights, load, most_of(c, pair), response);
+        *B = island->scale_weights > 0 ? *B * island->scale_weights
+                                       : weight_of_pair(&island->weights, load, most_of(c, pair), response);
         block->inv_s[l] = (real)(pair->body_a >= 0 && pair->body_b >= 0 ? *B / 2 : *B);
     }
 }
@@ -231,15 +231,16 @@ static void assemble_C(struct sadmm_context *c, size_t i)
 static void update_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
-    const bool rescales = c->refreshes >= WEIGHT_FIRST_SCALE;
-    const bool eases = c->refreshes == 0 && c->plan.warm && c->plan.rigid; /* world level: gaps, a slop and a step */
+    const bool scales = c->weight_updates >= WEIGHT_FIRST_SCALE;
+    /* world level: gaps, a slop and a step */
+    const bool eases = c->weight_updates == 0 && c->plan.warm && c->plan.rigid;
     size_t begin, end;
     cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) add_up_body(c, i, &c->body_sums[BODY_SUMS * i]);
-    if (rescales) CPU(add_up_imbalance)(c, thread, threads);
+    if (scales) CPU(add_up_imbalance)(c, thread, threads);
     sadmm_barrier_wait(&c->barrier, threads);
     if (thread == 0) add_up_loads(c);
-    if (thread == 0 && rescales) CPU(update_weight_scales)(c);
+    if (thread == 0 && scales) CPU(update_weight_scales)(c);
     sadmm_barrier_wait(&c->barrier, threads);
     sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
@@ -255,7 +256,7 @@ static void update_share(void *context, int thread, int threads)
 sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    ++c->refreshes;
+    ++c->weight_updates;
     c->exact_since = 0;
     CPU(sum_wrenches)(c);
     cpu_parallel(c, update_share, c);
@@ -283,12 +284,12 @@ sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *erro
     cpu_parallel(c, respond_share, c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         c->islands[i].weights = weight_new_island();
-        c->islands[i].rescale = 0;
+        c->islands[i].scale_weights = 0;
         c->islands[i].rows = false;
     }
     for (size_t k = 0; k < sadmm_row_constraint_count(c->system); ++k)
         cpu_island_of(c, c->system->rows->constraints[k].body_a, c->system->rows->constraints[k].body_b)->rows = true;
-    c->refreshes = -1; /* the first weights are none */
-    c->settled = c->measured = false;
+    c->weight_updates = -1; /* the first weights are none */
+    c->step1_done = c->measured = false;
     return CPU(update_weights)(c, error);
 }

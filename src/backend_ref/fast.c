@@ -198,7 +198,8 @@ static void update_weight_scales(struct sadmm_context *c)
             pair_violation(c, &contacts->pairs[p]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
-        if (island->label == i && !island->rows) island->rescale = weight_rescale(&island->weights, &island->sums);
+        if (island->label == i && !island->rows)
+            island->scale_weights = weight_update_scale(&island->weights, &island->sums);
     }
 }
 
@@ -238,8 +239,8 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
         load += sqrt(lambda2);
     }
     const struct ref_body *island = island_of(c, &c->constraints[pair->first]);
-    double B = island->rescale > 0
-                   ? c->constraints[pair->first].B[0] * island->rescale
+    double B = island->scale_weights > 0
+                   ? c->constraints[pair->first].B[0] * island->scale_weights
                    : weight_of_pair(&island->weights, load / pair->count, most_of(c, pair), pair_response(c, pair));
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         struct ref_constraint *constraint = &c->constraints[k];
@@ -288,9 +289,9 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
     (void)error;
     size_t points = c->system->contacts->point_count;
     add_up_islands(c);
-    if (++c->refreshes >= WEIGHT_FIRST_SCALE) update_weight_scales(c);
+    if (++c->weight_updates >= WEIGHT_FIRST_SCALE) update_weight_scales(c);
     for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p]);
-    if (c->refreshes == 0 && c->plan->warm && c->plan->rigid)
+    if (c->weight_updates == 0 && c->plan->warm && c->plan->rigid)
         for (size_t k = 0; k < points; ++k) {
             struct ref_constraint *contact = &c->constraints[k];
             double share = weight_gap_share(island_of(c, contact)->weights.stack_depth, c->settings->iterations);
@@ -315,13 +316,13 @@ sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error 
     sadmm_ref_label_islands(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         c->bodies[i].weights = weight_new_island();
-        c->bodies[i].rescale = 0;
+        c->bodies[i].scale_weights = 0;
         c->bodies[i].rows = false;
     }
     for (size_t k = c->system->contacts->point_count; k < c->constraint_count; ++k)
         island_of(c, &c->constraints[k])->rows = true;
-    c->refreshes = -1; /* the first weights are none */
-    c->settled = false;
+    c->weight_updates = -1; /* the first weights are none */
+    c->step1_done = false;
     return sadmm_ref_update_weights(c, error);
 }
 
@@ -394,8 +395,8 @@ sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *c, int count)
     double relaxation = c->settings->relaxation;
     for (int i = 0; i < count; ++i) {
         step_multipliers(c, relax_constraints(i, count) ? relaxation : 1);
-        step_velocity(c, relax_velocity(i, count, c->settled) ? relaxation : 1);
-        c->settled = true;
+        step_velocity(c, relax_velocity(i, count, c->step1_done) ? relaxation : 1);
+        c->step1_done = true;
     }
     return SADMM_OK;
 }

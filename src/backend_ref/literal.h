@@ -14,7 +14,7 @@
 
 #include "core/solve/kernels.h"
 #include "core/math/trapezoid.h"
-#include "core/math/limit.h"
+#include "core/math/energy_limit.h"
 
 /* One side of a constraint: the paper's subscript (i,k) or (j,k). */
 struct ref_side {
@@ -49,9 +49,9 @@ struct ref_body {
     int32_t label;                   /* the smallest body of its island; that one keeps the island's sums */
     struct weight_sums sums;
     struct weight_island weights;
-    double rescale;                  /* not 0: the weights of pairs stay, times this */
+    double scale_weights;            /* not 0: the weights of pairs stay, times this */
     bool rows;                       /* the island has constraints given by rows */
-    struct limit_energies limit;
+    struct island_energies energies;
     double along; /* v . A v_f / 2 of the island */
     /* of the island that it names, in either method */
     struct momentum_sums momentum;
@@ -71,8 +71,8 @@ struct sadmm_context {
     size_t body_capacity;
     struct ref_constraint *constraints; /* contact points in order, then constraints given by rows */
     size_t constraint_capacity, constraint_count;
-    bool settled;                    /* fast: Step 1 ran */
-    int refreshes;                   /* fast: of the weights, in this solve */
+    bool step1_done;                 /* fast: Step 1 ran */
+    int weight_updates;              /* fast: in this solve */
     double primal;                   /* fast: of the last iteration */
 };
 
@@ -105,7 +105,7 @@ void sadmm_ref_find_motions(struct sadmm_context *);
 /* Body i of an island that is slowed down to `factor`, but for those motions, in which it keeps its momentum. */
 void sadmm_ref_move_island(struct sadmm_context *, int32_t i, double factor);
 
-/* limit.c */
-sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
+/* energy_limit.c */
+sadmm_status sadmm_ref_limit_energy(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 
 #endif

@@ -1,5 +1,5 @@
-/* Momentum that no contact may change, and the limit of energies, after the last iteration (math/momentum.h, limit.h),
- * from dense matrices: G_i of every body, rows of the literal Jacobians times G_i. */
+/* Momentum that no contact may change, and the energy limit, after the last iteration (math/momentum.h,
+ * energy_limit.h), from dense matrices: G_i of every body, rows of the literal Jacobians times G_i. */
 #include <string.h>
 
 #include "literal.h"

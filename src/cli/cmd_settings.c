@@ -1,5 +1,5 @@
-/* subadmm settings: what a step can be told, from the list of settings (core/base/settings_fields.h); and the option --set
- * of other commands. */
+/* subadmm settings: what a step can be set to, from the list of settings (core/base/settings_fields.h); and the option
+ * --set of other commands. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>

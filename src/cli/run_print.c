@@ -111,7 +111,7 @@ static void print_result(const struct sadmm_scene_result *result)
     }
 }
 
-/* Set what only a step tells, or null before the first. */
+/* Set what only a step reports, or null before the first. */
 static void set_or_null(json_t *o, const char *name, const struct run_record *record, json_t *value)
 {
     if (record->steps > 0) {

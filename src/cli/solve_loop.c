@@ -11,7 +11,7 @@
 static const double factors[] = {1, 1, 10, 0.1, 100, 0.01, 1e3, 1e-3};
 enum { LANES = sizeof factors / sizeof *factors };
 
-/* In batches: the first lane stalls when its measure has not halved in PATIENCE; rates are measured over RATE. */
+/* In batches: the first lane stagnates when its measure has not halved in PATIENCE; rates are measured over RATE. */
 enum { PATIENCE = 6, RATE = 10 };
 
 struct lane {
@@ -138,7 +138,7 @@ static bool has_other_lanes(const struct solve_plan *plan)
     return plan->offset <= 0 && plan->settings.method == SADMM_METHOD_PAPER;
 }
 
-/* The first lane alone, until the end or, when there are others, until it stalls. */
+/* The first lane alone, until the end or, when there are others, until it stagnates. */
 static sadmm_status run_first(struct loop *l)
 {
     struct lane *lane = &l->lanes[0];

@@ -2,11 +2,11 @@
  *
  * Batches of iterations, each a warm continuation of the one before, with the certificate between them. The penalty is
  * beta = M Tr(A)/Tr(C) + c (eq. 13) with M = 0 unless asked for: near-uniform weights converge where mass-proportional
- * ones stall, but the best offset c differs by decades from problem to problem, and updates by eq.
- * (15) help most problems and ruin some. So the loop starts from the mean mass of the bodies with updates. When the
- * measure stalls, other offsets without updates start from nothing beside it, and from then on the one runs that will
- * be the first to arrive if it goes on at its present rate. The method fast has no offset to choose: it recomputes its
- * weights in every batch.
+ * ones stagnate, but the best offset c differs by decades from problem to problem, and updates by eq. (15) help most
+ * problems and ruin some. So the loop starts from the mean mass of the bodies with updates. When the measure stagnates,
+ * other offsets without updates start from nothing beside it, and from then on the one runs that will be the first to
+ * arrive if it goes on at its present rate. The method fast has no offset to choose: it recomputes its weights in every
+ * batch.
  */
 #ifndef SADMM_CLI_SOLVE_LOOP_H
 #define SADMM_CLI_SOLVE_LOOP_H

@@ -204,7 +204,7 @@ SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const st
                                            double dt, struct proxy_place *of_b);
 
 struct first_touch {
-    double ahead; /* s: when it touches, or up to when it was looked at */
+    double ahead; /* s: when it touches, or up to when it was inspected */
     bool missed;  /* nothing touches before the end of the step */
 };
 

@@ -91,7 +91,7 @@ static void list_movers(struct sadmm_candidates *c)
         c->movers[c->mover_count++] = ordered_key((uint32_t)e->group, (uint32_t)slot);
         if (bits_of((uint64_t)e->group) > bits) bits = bits_of((uint64_t)e->group);
     }
-    /* slots ascend already: the sort is stable, but it looks at whole keys */
+    /* slots ascend already: the sort is stable, but it compares whole keys */
     sadmm_radix_sort(c->movers, c->movers + c->mover_count, c->mover_count, 32 + bits);
 }
 
@@ -163,8 +163,8 @@ static bool merge_found(struct sadmm_candidates *c)
     return true;
 }
 
-static sadmm_status refresh_list(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool one_by_one,
-                                 struct sadmm_error *error)
+static sadmm_status update_list(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool one_by_one,
+                                struct sadmm_error *error)
 {
     sadmm_status status;
     c->found.count = 0;
@@ -234,7 +234,7 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     status = c->kind->update(c->broad_phase, c->entries, slots, c->changed, c->changed_count, error);
     if (status != SADMM_OK) return status;
     c->broad_phase_valid = true;
-    status = refresh_list(c, input, one_by_one, error);
+    status = update_list(c, input, one_by_one, error);
     c->list_valid = status == SADMM_OK;
     return status;
 }

@@ -102,7 +102,7 @@ static inline uint64_t sadmm_pair_in_order(const struct sadmm_candidates *c, uin
     return rank_high < rank_low ? ordered_key(high, low) : key;
 }
 
-/* Do the two shapes of a pair in the list come together within this step, as far as their boxes tell (bounds.h)? */
+/* Do the two shapes of a pair in the list come together within this step, as far as their boxes show (bounds.h)? */
 SADMM_INLINE bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input,
                                         uint32_t a, uint32_t b)
 {

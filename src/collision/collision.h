@@ -23,7 +23,7 @@ enum { SADMM_MOST_CHILDREN = 65535 }; /* the children of a pair are counted in 3
 /* What a shape is made of, apart from where it is and what it is like to touch. Shapes refer to it by a handle, so that
  * several may share one. A geometry has children, the pieces that collide: a pair of shapes has a manifold for each
  * pair of their children, at most. Most types have one child, the whole; where one is given more, each is the whole.
- * The children of a mesh are its triangles: those of a pair are not counted out, but looked for (mesh_walk.h). */
+ * The children of a mesh are its triangles: those of a pair are not counted out, but searched for (mesh_walk.h). */
 struct sadmm_geometry {
     int32_t type;     /* sadmm_shape_type */
     int32_t children; /* in [1, SADMM_MOST_CHILDREN]; of MESH 0 */

@@ -98,13 +98,13 @@ SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_imp
     for (k = 0; k < 3; ++k) out[k] = carries ? along * normal[k] + scale * t[k] : out[k];
 }
 
-/* Of the points of the old pair the one of this feature, -1: none. A feature occurs once in a manifold; `guess`: its
+/* Of the points of the old pair the one of this feature, -1: none. A feature occurs once in a manifold; `hint`: its
  * index in the new one, for most are where they were. */
 SADMM_INLINE int32_t contact_find_feature(const struct sadmm_contact_point *points, int32_t count, uint32_t feature,
-                                          int32_t guess)
+                                          int32_t hint)
 {
     int32_t k;
-    if (guess < count && points[guess].feature == feature) return guess;
+    if (hint < count && points[hint].feature == feature) return hint;
     for (k = 0; k < count; ++k)
         if (points[k].feature == feature) return k;
     return -1;
@@ -112,11 +112,11 @@ SADMM_INLINE int32_t contact_find_feature(const struct sadmm_contact_point *poin
 
 /* The impulse of the old pair's point of this feature; false: there is none. ratio: step_ratio. */
 SADMM_INLINE bool contact_carry(const struct sadmm_contact_pair *old, const struct sadmm_contact_point *old_points,
-                                int32_t guess, const double normal[3], double friction, double ratio,
+                                int32_t hint, const double normal[3], double friction, double ratio,
                                 struct sadmm_contact_point *point)
 {
     const struct sadmm_contact_point *from = old_points + old->first;
-    const int32_t k = contact_find_feature(from, old->count, point->feature, guess);
+    const int32_t k = contact_find_feature(from, old->count, point->feature, hint);
     if (k >= 0) impulse_carry(old->normal, from[k].impulse, normal, friction, ratio, point->impulse);
     return k >= 0;
 }
@@ -144,7 +144,7 @@ SADMM_INLINE bool contact_is_beside(const struct sadmm_contact_pair *old, uint32
  * the same plane. Only points of the body are the same on both (mesh_leaves_out). [first, last): the old pairs of the
  * two shapes. */
 SADMM_INLINE void contact_carry_across(const struct sadmm_contact_pair *pairs, int64_t first, int64_t last,
-                                       const struct sadmm_contact_point *old_points, uint32_t revision, int32_t guess,
+                                       const struct sadmm_contact_point *old_points, uint32_t revision, int32_t hint,
                                        const double normal[3], double friction, double ratio,
                                        struct sadmm_contact_point *point)
 {
@@ -152,7 +152,7 @@ SADMM_INLINE void contact_carry_across(const struct sadmm_contact_pair *pairs, i
     if (!contact_is_of_body(point->feature)) return;
     for (i = first; i < last; ++i)
         if (contact_is_beside(&pairs[i], revision, normal) &&
-            contact_carry(&pairs[i], old_points, guess, normal, friction, ratio, point))
+            contact_carry(&pairs[i], old_points, hint, normal, friction, ratio, point))
             return;
 }
 

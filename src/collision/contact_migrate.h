@@ -271,10 +271,10 @@ SADMM_INLINE bool migrate_arm(double share, const double arm[3], const double ol
     return dot3(change, change) <= MIGRATION_MOST * MIGRATION_MOST * dot3(arm, arm);
 }
 
-/* The point goes on to the step's end; false: it has no migration worth keeping. guess: its index in the pair; normal:
+/* The point goes on to the step's end; false: it has no migration worth keeping. hint: its index in the pair; normal:
  * halfway. */
 SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                const struct migration_pair *pair, struct migration_set old, int32_t guess,
+                                const struct migration_pair *pair, struct migration_set old, int32_t hint,
                                 double radius, double dt, const double normal[3], struct sadmm_contact_point *point,
                                 struct sadmm_contact_migration *out)
 {
@@ -291,7 +291,7 @@ SADMM_INLINE bool migrate_point(const struct sadmm_proxy *a, const struct sadmm_
     if (!pair->before) return true;
     if (both && pair->round) migrate_from_halfway(a, b, dt, normal, point);
     if (!pair->across || contact_is_of_body(point->feature))
-        at = contact_find_feature(old.points + pair->before->first, pair->before->count, point->feature, guess);
+        at = contact_find_feature(old.points + pair->before->first, pair->before->count, point->feature, hint);
     if (at >= 0) {
         const struct sadmm_contact_point *from = &old.points[pair->before->first + at];
         const struct sadmm_contact_migration *own =

@@ -48,7 +48,7 @@ struct convex_meeting {
     uint32_t feature[CONVEX_POINTS];
 };
 
-/* A straight line of a smooth body that looks along d (own frame) to within 8 degrees. */
+/* A straight line of a smooth body that points along d (own frame) to within 8 degrees. */
 SADMM_INLINE bool convex_line(const struct convex *c, vec3 d, struct convex_facing *out)
 {
     const real r = real_sqrt(d.x * d.x + d.y * d.y);
@@ -112,7 +112,7 @@ SADMM_INLINE void convex_polytope_facing(const struct polytope *p, vec3 d, struc
     }
 }
 
-/* What of c looks along d (own frame). */
+/* What of c points along d (own frame). */
 SADMM_CALLED void convex_facing_of(const struct convex *c, vec3 d, struct convex_facing *out)
 {
     const int flat = convex_flat(c, d, MANIFOLD_COS_NEAR);

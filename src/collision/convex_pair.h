@@ -1,6 +1,6 @@
 /* Two convex bodies while their manifold is computed, in the frame of b: the points of their Minkowski difference a -
  * b, distance by the walk of gjk.h and a first idea of the depth by the growth of epa.h, over points that are no longer
- * finitely many: both end near what they look for, and convex_axis.h goes on from there. */
+ * finitely many: both end near what they search for, and convex_axis.h goes on from there. */
 #ifndef SADMM_COLLISION_CONVEX_PAIR_H
 #define SADMM_COLLISION_CONVEX_PAIR_H
 
@@ -61,7 +61,7 @@ SADMM_INLINE void convex_pair_make(const struct sadmm_geometry *a, const struct 
 
 SADMM_INLINE real convex_radii(const struct convex_pair *pair) { return pair->a.p.radius + pair->b.p.radius; }
 
-/* Points of the two where a's surface looks along n, and b's against it. */
+/* Points of the two where a's surface points along n, and b's against it. */
 SADMM_INLINE vec3 convex_point_a(const struct convex_pair *pair, int piece, vec3 n)
 {
     return v3_add(m3_mul(pair->R, convex_point(&pair->a, piece, m3_tmul(pair->R, n))), pair->t);

@@ -47,7 +47,7 @@ struct sadmm_swept_pair {
     const double *hulls;
     uint32_t child;
     double threshold; /* points that approach slower than this are left out, m/s */
-    bool lost;        /* out: it took too many looks to tell */
+    bool lost;        /* out: it took too many tests to decide */
 };
 
 /* Where they touch. */

@@ -80,7 +80,7 @@ struct touch_moment {
     double manifold_normal[3];
 };
 
-SADMM_CALLED void touch_look(const struct sadmm_swept_pair *p, double t, struct touch_moment *at)
+SADMM_CALLED void touch_test(const struct sadmm_swept_pair *p, double t, struct touch_moment *at)
 {
     vec3 n;
     touch_place(&p->a, t, &at->a);
@@ -91,7 +91,7 @@ SADMM_CALLED void touch_look(const struct sadmm_swept_pair *p, double t, struct 
 }
 
 /* By the points that come near. */
-SADMM_CALLED void touch_look_closely(const struct sadmm_swept_pair *p, struct touch_moment *at)
+SADMM_CALLED void touch_test_closely(const struct sadmm_swept_pair *p, struct touch_moment *at)
 {
     at->m.count = 0;
     at->m.cache = 0;
@@ -208,7 +208,7 @@ SADMM_RARE bool swept_touch_of(struct sadmm_swept_pair *p, double from, double t
     if (!touch_balls_meet(p, from, to)) return false;
     for (int move = 0; move < TOUCH_MOVES; ++move) {
         double separation = 0, next, most;
-        touch_look(p, t, &at);
+        touch_test(p, t, &at);
         most = touch_closing(p, &at, to - t);
         if (at.distance > TOUCH_NEAR * thin) {
             if (!(most > p->threshold)) return false;
@@ -216,7 +216,7 @@ SADMM_RARE bool swept_touch_of(struct sadmm_swept_pair *p, double from, double t
             if (!(t <= to)) return false;
             continue;
         }
-        touch_look_closely(p, &at);
+        touch_test_closely(p, &at);
         most = touch_closing(p, &at, to - t); /* what touches has no distance to have a normal of */
         next = touch_first_point(p, &at, &separation);
         if (next < HUGE_VAL &&

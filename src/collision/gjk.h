@@ -19,7 +19,7 @@ struct gjk_simplex {
 enum gjk_end {
     GJK_FAR,   /* farther apart than asked for */
     GJK_APART, /* v is the shortest vector of a - b */
-    GJK_MEET   /* or too near to tell: the simplex is a start for what is inside */
+    GJK_MEET   /* or too near to decide: the simplex is a start for what is inside */
 };
 
 /* The walk of the distance, and how it has ended. */

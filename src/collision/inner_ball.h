@@ -73,7 +73,7 @@ struct inner_ball {
 };
 
 /* a, b: the pair. ball, its proxy: of b where of_b. child: of a mesh. from: when the pair does not touch yet; ahead: when
- * the ball is looked at if it does not hit. False: nothing is near. */
+ * the ball is inspected if it does not hit. False: nothing is near. */
 SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                    const struct sadmm_proxy *ball, bool of_b, const double *hulls, uint32_t child,
                                    double from, double gravity, double dt, double ahead, struct inner_ball *found)

@@ -1,6 +1,6 @@
 /* Contacts of bodies that were hit within the step (core/world/hits.c): before the later of both hits the pair was never
- * where it is taken to come from. It is looked for in what is left of the step, and what overlaps at the start alone does
- * not overlap. */
+ * where it is taken to come from. It is searched for in what is left of the step, and what overlaps at the start alone
+ * does not overlap. */
 #ifndef SADMM_COLLISION_LATER_H
 #define SADMM_COLLISION_LATER_H
 

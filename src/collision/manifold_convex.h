@@ -3,7 +3,7 @@
  *   1. The flat of the last step: where the points of what faces along its normal prove that nothing is nearer, that is
  *      all. What stands on a cap, or lies on a face, asks for nothing else.
  *   2. The direction along which the two are farthest apart, or least deep in each other (convex_axis.h).
- *   3. A flat whose normal is that direction, as far as rounding can tell, gives its own: what rolls has its true
+ *   3. A flat whose normal is that direction, to within rounding, gives its own: what rolls has its true
  *      normal, and what stands has one that does not shiver.
  *   4. The points of what faces along it (convex_facing.h); the nearest points as well where these do not have them.
  */

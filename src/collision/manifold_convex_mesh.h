@@ -16,7 +16,7 @@
 #include "manifold_convex.h"
 #include "manifold_mesh.h"
 
-/* Halvings of the angle between the two sides of an edge, in which the best direction is looked for. */
+/* Halvings of the angle between the two sides of an edge, in which the best direction is searched for. */
 enum { CONVEX_ARC_STEPS = 24 };
 
 struct convex_triangle {
@@ -106,7 +106,7 @@ SADMM_INLINE bool convex_at_flat_side(const struct convex_triangle *p, vec3 x)
     return false;
 }
 
-/* Is u the face's normal, as far as mesh_allows can tell? The distance along that is the same, to its square. */
+/* Is u the face's normal, to within mesh_allows? The distance along that is the same, to its square. */
 #define CONVEX_FRONT (16 * MESH_ACROSS)
 SADMM_INLINE bool convex_is_front(const struct mesh_triangle *t, vec3 u)
 {

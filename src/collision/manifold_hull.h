@@ -68,7 +68,7 @@ SADMM_INLINE bool hull_is_proven(const struct polytope_pair *pair, const struct 
         if (m->points[k].separation < m->points[deepest].separation) deepest = k;
     }
     /* two points of the cores as near to each other as the planes are: nothing is nearer, and no plane parts them
-     * further; of sharp ones as near as their points are told apart by (hull_add_nearest) */
+     * further; of sharp ones as near as their points are distinguished by (hull_add_nearest) */
     if (axis->separation >= -pair_radii(pair))
         return m->points[deepest].separation <=
                axis->separation + (pair_radii(pair) > 0 ? 2 * pair->slack : MANIFOLD_FLAT * pair->thin);
@@ -277,7 +277,7 @@ SADMM_INLINE bool hull_recall(const struct polytope_pair *pair, uint32_t cache, 
 }
 
 /* What the last step's axis says by itself: true, and the manifold is there, or there is none. Else *start is a
- * direction to look for the nearest points along; `known`: *kept is an axis. */
+ * direction to search for the nearest points along; `known`: *kept is an axis. */
 SADMM_INLINE bool hull_by_memory(const struct polytope_pair *pair, real limit, uint32_t cache, struct polytope_axis *kept,
                                  bool *known, vec3 *start, struct manifold *m)
 {

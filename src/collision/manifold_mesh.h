@@ -236,7 +236,7 @@ SADMM_INLINE real mesh_way_in(const struct mesh_triangle *t, vec3 from, vec3 to)
                : 2;
 }
 
-/* Is a body with its middle at `from` at `to`, inside of the surface, because it came through what looks along n? The
+/* Is a body with its middle at `from` at `to`, inside of the surface, because it came through what points along n? The
  * surface is asked where the way there first goes in: of what the body is deep in that is where it came from, whatever
  * triangles are near. */
 SADMM_RARE bool mesh_came_through(const struct mesh *m, vec3 from, vec3 to, vec3 n)
@@ -260,7 +260,7 @@ SADMM_RARE bool mesh_came_through(const struct mesh *m, vec3 from, vec3 to, vec3
         share = mesh_way_in(&t, from, to);
         if (share > 1) continue;
         same = v3_dot(t.normal, n);
-        /* through an edge, as far as rounding can tell: either side */
+        /* through an edge, to within rounding: either side */
         if (share < first - 64 * SADMM_EPSILON) along = same;
         else if (share <= first + 64 * SADMM_EPSILON) along = real_max(along, same);
         else continue;
@@ -281,7 +281,7 @@ SADMM_INLINE bool mesh_came_through_front(const struct mesh *mesh, const struct 
     return mesh_came_through(mesh, v3_add(middle, t->origin), v3_add(x, t->origin), t->normal);
 }
 
-/* A point inside of the body, as near to its middle as its corners tell. */
+/* A point inside of the body, as near to its middle as its corners allow. */
 SADMM_INLINE vec3 mesh_middle_of(const struct polytope_pair *pair)
 {
     vec3 sum = v3(0, 0, 0);

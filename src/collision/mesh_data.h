@@ -61,7 +61,7 @@ enum {
 /* A node's subtree is all nodes up to `next`. */
 struct mesh_node {
     float lo[3], hi[3];
-    int32_t next;  /* where a walk goes on that has nothing to look for here */
+    int32_t next;  /* where a walk goes on that has nothing to search for here */
     int32_t first; /* of a leaf: triangle << 3 | how many; of others -1 */
 };
 enum { MESH_NODE_DOUBLES = 4, MESH_LEAF = 4 };

@@ -6,7 +6,7 @@
  * step, so that the broad phase runs once a step unless velocities change much in it. */
 #define ENLARGED_BY 0.1
 #define STEPS_AHEAD 4
-/* How far sub-steps look, as a share of the way that is left: the first one farthest, so that no later one finds, by
+/* How far sub-steps search, as a share of the way that is left: the first one farthest, so that no later one finds, by
  * its rounding, what that one has not. */
 #define SUBSTEPS_AHEAD 1.1
 

@@ -77,7 +77,7 @@ SADMM_INLINE vec3 edge_outward(const struct polytope *p, int e)
     return v3_add(polytope_normal(p, p->edge_face[2 * e]), polytope_normal(p, p->edge_face[2 * e + 1]));
 }
 
-/* False: the edges are parallel, as far as rounding can tell. */
+/* False: the edges are parallel, to within rounding. */
 SADMM_INLINE bool axis_of_edges(const struct polytope_pair *pair, int ea, int eb, struct polytope_axis *axis)
 {
     vec3 from;

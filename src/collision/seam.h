@@ -28,9 +28,9 @@
 /* Pieces are flush within this share of the thinner shape's extent: as even as what lies on them may lie
  * (MANIFOLD_FLAT). */
 #define SEAM_FLUSH  MANIFOLD_FLAT
-/* How far beside a point its surface is looked at, as a share of the thinner extent. */
+/* How far beside a point its surface is inspected, as a share of the thinner extent. */
 #define SEAM_BESIDE 0.05
-/* What faces along a direction: slopes, and turns of the direction by which its surface is looked for. */
+/* What faces along a direction: slopes, and turns of the direction by which its surface is searched for. */
 #define SEAM_SLOPE  2e-3
 #define SEAM_TURN   1e-3
 enum { SEAM_DIRECTIONS = 8 };
@@ -98,7 +98,7 @@ SADMM_INLINE real seam_hull_outside(const struct sadmm_geometry *g, const double
     return most - p.radius;
 }
 
-/* How far x is outside of the shape, or, negative, inside, as far as that tells whether it has x, to a tolerance. */
+/* How far x is outside of the shape, or, negative, inside, as far as that shows whether it has x, to a tolerance. */
 SADMM_INLINE real seam_outside(const struct sadmm_geometry *g, const double *hulls, vec3 x)
 {
     const vec3 size = v3_load(g->size);

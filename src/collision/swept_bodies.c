@@ -6,7 +6,7 @@
 #include "fast_pair.h"
 #include "pipeline.h"
 
-/* Does it press? Its first point mostly tells. */
+/* Does it press? Its first point mostly decides. */
 static bool presses(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
 {
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k)

@@ -15,7 +15,7 @@ enum sadmm_swept_kind { SADMM_SWEPT_NONE, SADMM_SWEPT_FIXED, SADMM_SWEPT_DYNAMIC
 
 struct sadmm_pair_list;
 
-/* Candidates of the step; sadmm_collision_find then does not look for them again. */
+/* Candidates of the step; sadmm_collision_find then does not search for them again. */
 sadmm_status sadmm_collision_look_ahead(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                                         struct sadmm_error *error);
 
@@ -27,7 +27,7 @@ void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const
                                   unsigned char *kinds);
 
 /* The pairs of shapes, as (a << 32 | b) in the order of pairs, that approach faster than the threshold, at least as far
- * as their velocities and boxes tell, and of which either has restitution (bounces: any shape has), or which pass
+ * as their velocities and boxes show, and of which either has restitution (bounces: any shape has), or which pass
  * (fast_pair.h): other pairs come as far as the surface in the step in which they are found, as the solve has it. After look_ahead. False:
  * out of memory. */
 bool sadmm_collision_list_fast(struct sadmm_collision *collision, const struct sadmm_collision_input *input,

@@ -126,7 +126,7 @@ static void fan(const int32_t *corners, int32_t size, int32_t **out)
     for (int32_t i = 1; i + 1 < size; ++i) write_triangle(corners, 0, i, i + 1, out);
 }
 
-/* True: an ear was found whenever one was looked for, and what is left of them does not lie the wrong way around. */
+/* True: an ear was found whenever one was searched for, and what is left of them does not lie the wrong way around. */
 static bool cut_ears(struct outline *o, const int32_t *corners, int32_t size, int32_t **out)
 {
     bool found = true;

@@ -365,7 +365,7 @@ static double fastest(const struct sadmm_scene *scene, const struct line *line, 
 }
 
 /* On the track: how it rolls on the ramp, how far it is from the axis, whether it is through. */
-static void look_at_track(const struct sadmm_scene *scene, const struct line *line, int marble, double t,
+static void inspect_track(const struct sadmm_scene *scene, const struct line *line, int marble, double t,
                           const sadmm_body_def *body, double memory[])
 {
     const vec3 x = v3_load(body->position), start = start_at(line, marble);
@@ -382,7 +382,7 @@ static void look_at_track(const struct sadmm_scene *scene, const struct line *li
 }
 
 /* In the funnel, or under it. */
-static void look_at_funnel(const struct line *line, int marble, double t, const sadmm_body_def *body, double memory[])
+static void inspect_funnel(const struct line *line, int marble, double t, const sadmm_body_def *body, double memory[])
 {
     const vec3 d = v3_sub(v3_load(body->position), funnel_at(line));
     const double bottom = cone * (hole - rim), z = body->position[2];
@@ -456,8 +456,8 @@ static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world,
         if (status != SADMM_OK) return sadmm_scene_world_error(world, status, error);
         energy += energy_of(scene, &body);
         weight -= body.mass * scene->def.settings.gravity[2];
-        if (memory[PASSED + i] == 0) look_at_track(scene, &line, i, t, &body, memory);
-        else look_at_funnel(&line, i, t, &body, memory);
+        if (memory[PASSED + i] == 0) inspect_track(scene, &line, i, t, &body, memory);
+        else inspect_funnel(&line, i, t, &body, memory);
     }
     if (status != SADMM_OK) return status;
     add_energy(energy, memory);

@@ -79,8 +79,8 @@ static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, st
 }
 
 /* Those that are not in the yard, and the fastest of all. */
-static sadmm_status look(const struct sadmm_scene *scene, sadmm_world *world, double *outside, double *speed,
-                         struct sadmm_error *error)
+static sadmm_status inspect(const struct sadmm_scene *scene, sadmm_world *world, double *outside, double *speed,
+                            struct sadmm_error *error)
 {
     const double half = half_width(scene->n);
     *outside = *speed = 0;
@@ -109,7 +109,7 @@ static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world,
     if (task->finished) return SADMM_OK;
     sadmm_status status = sadmm_scene_world_error(world, sadmm_world_report(world, &report), error);
     const bool finished = t >= scene->info->duration - 1e-9;
-    if (status == SADMM_OK && finished) status = look(scene, world, &outside, &speed, error);
+    if (status == SADMM_OK && finished) status = inspect(scene, world, &outside, &speed, error);
     if (status != SADMM_OK) return status;
     result->memory[0] = fmax(result->memory[0], report.penetration_max);
     task->name = "settle";

@@ -16,7 +16,7 @@
  * bolt, whose mesh has 60 steps a turn: far below the play, as they have to be. A chord of the ridge's inner edge is 4
  * um inside of its circle; there is room.
  *
- * Contacts are looked for within what turning may move any point of a shape in a step, whichever way, 0.9 mm at 45
+ * Contacts are searched for within what turning may move any point of a shape in a step, whichever way, 0.9 mm at 45
  * rad/s. So the wedges are 2 mm off the bolt: a body with some hundred contacts that say nothing needs more iterations.
  *
  * How fast a nut runs down is known. A screw of lead angle a (tan a = c / r) under the weight m (g - z'') is turned by
@@ -282,8 +282,8 @@ struct nut {
     double mass, spin;
 };
 
-static sadmm_status look(const struct sadmm_scene *scene, sadmm_world *world, long i, struct nut *nut,
-                         struct sadmm_error *error)
+static sadmm_status inspect(const struct sadmm_scene *scene, sadmm_world *world, long i, struct nut *nut,
+                            struct sadmm_error *error)
 {
     sadmm_shape_id first;
     sadmm_shape_def shape;
@@ -364,7 +364,7 @@ static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world,
     sadmm_status status = sadmm_scene_world_error(world, sadmm_world_report(world, &report), error);
     for (long i = 0; i < scene->n && status == SADMM_OK; ++i) {
         struct nut nut = {0};
-        status = look(scene, world, i, &nut, error);
+        status = inspect(scene, world, i, &nut, error);
         memory[OFF] = larger(memory[OFF], fabs(nut.off));
         tight = larger(tight, fabs(0.5 * play - nut.off));
         spin = larger(spin, nut.spin);

@@ -106,7 +106,7 @@ static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, st
 }
 
 /* The peg's axis in the world, and the middle of its lower end: its shape says where they are in the body. */
-static sadmm_status look(sadmm_world *world, vec3 *axis, vec3 *end, struct sadmm_error *error)
+static sadmm_status inspect(sadmm_world *world, vec3 *axis, vec3 *end, struct sadmm_error *error)
 {
     sadmm_shape_id id;
     sadmm_shape_def shape;
@@ -142,7 +142,7 @@ static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world,
     result->task_count = 1;
     if (task->finished) return SADMM_OK;
     sadmm_status status = sadmm_scene_world_error(world, sadmm_world_report(world, &report), error);
-    if (status == SADMM_OK) status = look(world, &axis, &end, error);
+    if (status == SADMM_OK) status = inspect(world, &axis, &end, error);
     if (status != SADMM_OK) return status;
     const double down = 2 * bottom + depth - end.z, tilt = atan2(hypot(axis.x, axis.y), axis.z);
     result->memory[0] = fmax(result->memory[0], report.penetration_max);

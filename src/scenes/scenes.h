@@ -121,7 +121,7 @@ struct sadmm_scene_result {
     double memory[SADMM_SCENE_MEMORY]; /* what the scene has to remember from one step to another; its own */
 };
 
-/* Look at the world: call before the first step (`step` = 0) and after every one (`step`: steps done). It waits for
+/* Inspect the world: call before the first step (`step` = 0) and after every one (`step`: steps done). It waits for
  * steps begun where the scene has a measure, and does nothing where it has none. Errors: INVALID_ARGUMENT, those of the
  * world's read-outs. */
 sadmm_status sadmm_scene_observe(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,

@@ -9,7 +9,7 @@
  * as a whole and no contact is lost on the way. The grid is turned against the downhill direction: friction that is
  * not isotropic would bend the path.
  *
- * Doors beside the raft, which meet nothing, tell what bodies with joints cost a scene that has few of them.
+ * Doors beside the raft, which meet nothing, show what bodies with joints cost a scene that has few of them.
  */
 #include <math.h>
 #include <string.h>

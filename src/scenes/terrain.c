@@ -240,7 +240,7 @@ static double larger(double a, double b)
     return a > b || isnan(a) ? a : b;
 }
 
-static void look_at_body(long n, const sadmm_shape_def *shape, const sadmm_body_def *body, struct found *found)
+static void inspect_body(long n, const sadmm_shape_def *shape, const sadmm_body_def *body, struct found *found)
 {
     const quat turn = q_load(body->orientation);
     const mat3 R = q_matrix(q_normalize(q_mul(turn, q_load(shape->orientation))));
@@ -265,8 +265,8 @@ static void look_at_body(long n, const sadmm_shape_def *shape, const sadmm_body_
     }
 }
 
-static sadmm_status look(const struct sadmm_scene *scene, sadmm_world *world, struct found *found,
-                         struct sadmm_error *error)
+static sadmm_status inspect(const struct sadmm_scene *scene, sadmm_world *world, struct found *found,
+                            struct sadmm_error *error)
 {
     *found = (struct found){0};
     for (int32_t i = 0; i < scene->n; ++i) {
@@ -278,7 +278,7 @@ static sadmm_status look(const struct sadmm_scene *scene, sadmm_world *world, st
         if (status == SADMM_OK) status = sadmm_world_shape_def(world, id, &shape, &of);
         if (status == SADMM_OK) status = sadmm_world_body_def(world, of, &body);
         if (status != SADMM_OK) return sadmm_scene_world_error(world, status, error);
-        look_at_body(scene->n, &shape, &body, found);
+        inspect_body(scene->n, &shape, &body, found);
     }
     return SADMM_OK;
 }
@@ -296,7 +296,7 @@ static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world,
     if (stay->finished) return SADMM_OK;
     sadmm_status status = sadmm_scene_world_error(world, sadmm_world_report(world, &report), error);
     const bool finished = t >= scene->info->duration - 1e-9;
-    if (status == SADMM_OK && finished) status = look(scene, world, &found, error);
+    if (status == SADMM_OK && finished) status = inspect(scene, world, &found, error);
     if (status != SADMM_OK) return status;
     result->memory[0] = larger(result->memory[0], report.penetration_max);
     stay->name = "stay";

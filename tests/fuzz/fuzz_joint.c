@@ -53,7 +53,7 @@ static uint64_t mix_coordinate(uint64_t hash, const sadmm_joint_coordinate *c)
     return mix(hash, &c->limited, sizeof c->limited);
 }
 
-static uint64_t look_at_others(sadmm_world *world)
+static uint64_t inspect_others(sadmm_world *world)
 {
     uint64_t hash = UINT64_C(0xcbf29ce484222325);
     for (int32_t k = 0; k < sadmm_world_coupling_count(world); ++k) {
@@ -84,7 +84,7 @@ static uint64_t look_at_others(sadmm_world *world)
     return hash;
 }
 
-static struct picture look(sadmm_world *world)
+static struct picture inspect(sadmm_world *world)
 {
     struct picture p = {.joints = UINT64_C(0xcbf29ce484222325)};
     MUST(sadmm_world_state_hash(world, &p.states) == SADMM_OK, "state hash");
@@ -116,7 +116,7 @@ static struct picture look(sadmm_world *world)
             for (int n = 0; n < 2; ++n) p.joints = mix(p.joints, numbers[n], (size_t)points * sizeof **numbers);
         }
     }
-    p.others = look_at_others(world);
+    p.others = inspect_others(world);
     return p;
 }
 
@@ -479,14 +479,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     add_bodies(&m);
 
     for (int call = 0; call < MAX_CALLS && bytes_left(&m.in); ++call) {
-        const struct picture before = look(m.world);
+        const struct picture before = inspect(m.world);
         if (take_rarely(&m.in, 32)) sadmm_test_fail_allocations_after(take_choice(&m.in, 32));
         sadmm_status status = make_call(&m);
         sadmm_test_fail_allocations_after(-1);
         if (status == SADMM_OK) continue;
         MUST(status > SADMM_OK && status < SADMM_STATUS_COUNT, "status %d", (int)status);
         MUST(sadmm_world_message(m.world)[0], "%s without a message", sadmm_status_name(status));
-        const struct picture after = look(m.world);
+        const struct picture after = inspect(m.world);
         MUST(after.states == before.states && after.bodies == before.bodies, "%s: a body changed",
              sadmm_status_name(status));
         MUST(after.joints == before.joints && after.count == before.count, "%s: a joint changed",

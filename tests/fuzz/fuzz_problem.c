@@ -29,7 +29,7 @@ struct picture {
     sadmm_problem_block block[MAX_BLOCKS];
 };
 
-static void look(sadmm_problem *problem, struct picture *p)
+static void inspect(sadmm_problem *problem, struct picture *p)
 {
     memset(p, 0, sizeof *p);
     p->bodies = sadmm_problem_body_count(problem);
@@ -235,7 +235,7 @@ static sadmm_status solve(struct machine *m)
         sadmm_problem_solve(m->problem, table == 0 ? SADMM_BACKEND_REF : SADMM_BACKEND_CPU,
                             table == 1 ? SADMM_F32 : SADMM_F64, take_rarely(&m->in, 64) ? NULL : &settings, &report);
     if (status != SADMM_OK) return status;
-    look(m->problem, &after);
+    inspect(m->problem, &after);
     MUST(all_finite(after.v, 6 * after.bodies) && all_finite(after.impulse, 3 * after.contacts) &&
              all_finite(after.lambda, 6 * after.blocks),
          "a solution that is not finite");
@@ -261,7 +261,7 @@ static sadmm_status certify(struct machine *m)
     sadmm_certificate certificate;
     sadmm_status status = sadmm_problem_certify(m->problem, take_rarely(&m->in, 64) ? NULL : &certificate);
     if (status != SADMM_OK) return status;
-    look(m->problem, &now);
+    inspect(m->problem, &now);
     must_be_good(&certificate, &now);
     return SADMM_OK;
 }
@@ -294,14 +294,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct machine m = {.in = bytes_of(data, size)};
     MUST(sadmm_problem_create(&m.problem) == SADMM_OK, "a problem");
     for (int call = 0; call < MAX_CALLS && bytes_left(&m.in); ++call) {
-        look(m.problem, &before);
+        inspect(m.problem, &before);
         if (take_rarely(&m.in, 32)) sadmm_test_fail_allocations_after(take_choice(&m.in, 32));
         sadmm_status status = call == 0 ? set_bodies(&m) : make_call(&m);
         sadmm_test_fail_allocations_after(-1);
         if (status == SADMM_OK) continue;
         MUST(status > SADMM_OK && status < SADMM_STATUS_COUNT, "status %d", (int)status);
         MUST(sadmm_problem_message(m.problem)[0], "%s without a message", sadmm_status_name(status));
-        look(m.problem, &after);
+        inspect(m.problem, &after);
         MUST(memcmp(&before, &after, sizeof before) == 0, "%s: %s: the problem changed", sadmm_status_name(status),
              sadmm_problem_message(m.problem));
     }

@@ -47,7 +47,7 @@ static uint64_t mix(uint64_t hash, const void *data, size_t size)
     return hash;
 }
 
-static struct picture look(sadmm_world *world)
+static struct picture inspect(sadmm_world *world)
 {
     struct picture p;
     memset(&p, 0, sizeof p);
@@ -90,7 +90,7 @@ static struct picture look(sadmm_world *world)
 
 static void must_be_as_before(sadmm_world *world, const struct picture *before, sadmm_status status)
 {
-    struct picture after = look(world);
+    struct picture after = inspect(world);
     const char *name = sadmm_status_name(status);
     MUST(after.states == before->states, "%s: a state changed", name);
     MUST(after.bodies == before->bodies && after.shapes == before->shapes, "%s: bodies or shapes came or went", name);
@@ -581,7 +581,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     MUST(sadmm_problem_create(&m.problem) == SADMM_OK, "a problem");
 
     for (int call = 0; call < MAX_CALLS && bytes_left(&m.in); ++call) {
-        struct picture before = look(m.world);
+        struct picture before = inspect(m.world);
         if (take_rarely(&m.in, 32)) sadmm_test_fail_allocations_after(take_choice(&m.in, 32));
         sadmm_status status = make_call(&m);
         sadmm_test_fail_allocations_after(-1);

@@ -13,7 +13,7 @@ template <bool ENERGIES, bool JOINTS>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     int32_t i = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
     if (i >= v.model.bodies || v.model.live->abort_code) return; /* may run before the step's contacts are known */
     if (i == 0) clear_counts(v.islands);
@@ -122,7 +122,7 @@ template <bool FAST, bool BOUNCES>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), p = t / v.contacts.lanes,
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);

@@ -76,7 +76,7 @@ static __device__ row_data solver_row(const struct raw_row &raw, bool cone, bool
 
 static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t k = thread_index();
     if (k >= live_rows(v.model, v.rows)) return;
     const struct sadmm_row_constraint from = v.raw.constraints[k];

@@ -3,7 +3,7 @@
  * The hierarchy is Karras' (Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees, HPG 2012) over
  * sorted keys, ties broken by position. An inner node i covers a range of leaves that begins or ends at i; the right
  * child of a node split after leaf r is numbered r + 1. The node after a subtree whose last leaf is r is therefore
- * either inner node r + 1 or leaf r + 1, and the keys around r tell which: walks need no stack (the observation is
+ * either inner node r + 1 or leaf r + 1, and the keys around r say which: walks need no stack (the observation is
  * Prokopenko and Lebrun-Grandie's, Revising Apetrei's Bounding Volume Hierarchy Construction Algorithm to Allow
  * Stackless Traversal).
  */
@@ -42,7 +42,7 @@ struct grid_sample {
  * block; a thread takes an axis of the body of its share of the slots and finds the rank by comparing with all. */
 static __global__ void __launch_bounds__(3 * GRID_SAMPLES) grid_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     COLLISION_SHARED(grid_sample, shared);
     const int t = (int)threadIdx.x % GRID_SAMPLES, axis = (int)threadIdx.x / GRID_SAMPLES;
     const int32_t slot = (int32_t)((int64_t)v.body_count * t / GRID_SAMPLES);
@@ -146,7 +146,7 @@ template <int FOR, bool MANY>
 static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __grid_constant__ collision_view v)
 {
     static_assert(PLACE_THREADS == 32, "a block is a warp");
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     COLLISION_SHARED(placed_pieces, memory);
     placed_pieces *const shared = MANY ? &memory : nullptr;
     const int64_t i = collision_thread(PLACE_THREADS);
@@ -218,7 +218,7 @@ static __device__ __forceinline__ int32_t node_after(const collision_view &v, in
 
 static __global__ void __launch_bounds__(TREE_THREADS) build_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     const int64_t thread = collision_thread(TREE_THREADS);
     if (thread >= v.leaf_count) return;
     const int32_t i = (int32_t)thread, first_leaf = v.leaf_count - 1;
@@ -278,7 +278,7 @@ static __device__ __forceinline__ refit_links links_of(const collision_view &v, 
  * the order. A node's right child is the node after its left one. */
 static __global__ void __launch_bounds__(TREE_THREADS) refit_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     const int64_t thread = collision_thread(TREE_THREADS);
     if (thread >= v.leaf_count) return;
     int32_t from = v.leaf_count - 1 + (int32_t)thread, at = v.parents[from];
@@ -311,7 +311,7 @@ static __global__ void __launch_bounds__(TREE_THREADS) refit_kernel(const __grid
 /* What a radix sort of the whole capacity needs. */
 static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     const int64_t i = collision_thread(COLLISION_THREADS);
     if (i < v.candidate_capacity) v.found[i] = ~UINT64_C(0);
 }
@@ -465,7 +465,7 @@ static __device__ void walk(const collision_view &v, int32_t i, struct walk_leav
 
 static __global__ void __launch_bounds__(TREE_THREADS) walk_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     COLLISION_SHARED(walk_leaves, shared);
     const int64_t thread = collision_thread(TREE_THREADS);
     struct batch out;
@@ -537,7 +537,7 @@ static __device__ __forceinline__ void write_hits(const collision_view &v, const
 template <int ROWS, int COLUMNS>
 static __global__ void __launch_bounds__(ROWS) tiles_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     COLLISION_SHARED(tile<COLUMNS>, shared);
     const int32_t t = (int32_t)threadIdx.x, columns = tile_columns(v.leaf_count, COLUMNS);
     const int32_t row = (int32_t)blockIdx.x / columns, column = (int32_t)blockIdx.x % columns - 1;

@@ -69,7 +69,8 @@ sadmm_status COLLISION(read_hits)(struct sadmm_cuda_collision *collision, void *
 /* A set's pointers; counts are not filled. */
 struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_collision *collision, int which);
 /* Which set is the current one, and with how much in it, after enqueued finds. */
-void COLLISION(settle)(struct sadmm_cuda_collision *collision, int current, struct sadmm_cuda_contact_counts counts);
+void COLLISION(set_current)(struct sadmm_cuda_collision *collision, int current,
+                            struct sadmm_cuda_contact_counts counts);
 int COLLISION(current)(const struct sadmm_cuda_collision *collision);
 
 /* Put back the set that the last successful find replaced. Does nothing when the last find failed or was undone. */

@@ -4,7 +4,7 @@
  *   list      candidates that are fast; bodies that something presses on; the step's start is copied
  *   foresee   when each of these pairs of swept bodies first touches               a thread a pair
  *   take      hits in the order of time, and what the two come near from then on   a block a group
- *   replace   shapes of what was hit, where they are now; the list of hits; the candidates are looked for again
+ *   replace   shapes of what was hit, where they are now; the list of hits; the candidates are searched for again
  *   later     manifolds of what was hit, in what is left of the step               a thread a candidate, after `narrow`
  *   reopen    their points, and gaps of swept bodies                               after `emit`
  *
@@ -37,7 +37,7 @@ enum {
 #endif
     TAKE_BLOCKS = 1024,      /* which go on to other groups */
     TAKE_SHAPES = 64,        /* of a body that was hit, ... */
-    TAKE_LOOKS = 1 << 18,    /* ... shapes that are looked at in a (sub-)step, ... */
+    TAKE_TESTS = 1 << 18,    /* ... shapes that are tested in a (sub-)step, ... */
     HIT_ROOM = 64,           /* ... hits that are foreseen at a time, ... */
     HIT_ROOM_A_SHAPE = 4,    /* ... and so many more a shape, ... */
     HIT_RECORDS = 32,        /* ... points of a step's hits, ... */
@@ -100,7 +100,7 @@ struct hits_view {
     struct swept_body *swept_bodies; /* by body slot */
     double *since;                   /* by body slot: of its last hit, s */
     double *impulse;                 /* by body slot x 6: what its hits gave it, N s, N m s */
-    int32_t *listed;                 /* candidates; ~ of one that took too many looks to tell */
+    int32_t *listed;                 /* candidates; ~ of one that took too many tests to decide */
     struct foreseen_hit *foreseen;
     struct sadmm_box3 *boxes;       /* of leaves, as `present`: from the last hit on */
     uint64_t *near;                 /* keys */
@@ -119,7 +119,7 @@ struct hits_kernels {
     struct hits_launch list, foresee, take, replace, later, reopen, give;
 };
 
-/* Of swept bodies of the (sub-)step that were looked at the times + 1st time. */
+/* Of swept bodies of the (sub-)step that were tested the times + 1st time. */
 static __device__ __forceinline__ uint64_t followed_mark(uint64_t epoch, int times)
 {
     return epoch * TAKE_TIMES + (uint64_t)times;

@@ -61,10 +61,10 @@ static __device__ void pack_records(const hits_view &v, struct packing *shared)
     if (t == 0) state->records[into] = shared->end;
 }
 
-/* And the candidates are none: they are looked for again. */
+/* And the candidates are none: they are searched for again. */
 static __global__ void __launch_bounds__(HIT_THREADS) replace_kernel(const __grid_constant__ hits_view v)
 {
-    follow_if(v.c.early);
+    pdl_wait_if(v.c.pdl);
     COLLISION_SHARED(packing, shared);
     if (blockIdx.x == 0 && !aborted(v.c)) pack_records(v, &shared);
     const int64_t thread = collision_thread(HIT_THREADS), stride = (int64_t)gridDim.x * HIT_THREADS;
@@ -117,7 +117,7 @@ static __device__ __noinline__ void find_on_mesh(const hits_view &v, const struc
 /* As find_later on the host. */
 static __global__ void __launch_bounds__(NARROW_THREADS) later_kernel(const __grid_constant__ hits_view v)
 {
-    wait_if(v.c.early);
+    pdl_wait_only_if(v.c.pdl);
     const int64_t thread = collision_thread(NARROW_THREADS), stride = (int64_t)gridDim.x * NARROW_THREADS;
     if (v.state->quiet) return;
     const struct collision_step step = step_of(v.c);
@@ -207,7 +207,7 @@ static __device__ __forceinline__ void open_gaps(const hits_view &v, const struc
 
 static __global__ void __launch_bounds__(HIT_THREADS) reopen_kernel(const __grid_constant__ hits_view v)
 {
-    follow_if(v.c.early);
+    pdl_wait_if(v.c.pdl);
     const int64_t thread = collision_thread(HIT_THREADS), stride = (int64_t)gridDim.x * HIT_THREADS;
     const bool quiet = v.state->quiet;
     if (aborted(v.c) || !v.state->followed) return;
@@ -229,7 +229,7 @@ static __global__ void __launch_bounds__(HIT_THREADS) reopen_kernel(const __grid
 /* What hits give bodies, beside contacts, once these have been added up (sadmm_world_add_hit_wrenches). */
 static __global__ void __launch_bounds__(HIT_THREADS) give_kernel(const __grid_constant__ hits_view v)
 {
-    follow_if(v.c.early);
+    pdl_wait_if(v.c.pdl);
     const int64_t thread = collision_thread(HIT_THREADS), stride = (int64_t)gridDim.x * HIT_THREADS;
     if (aborted(v.c) || v.state->quiet) return;
     const double dt = step_of(v.c).dt, all = 1 / (dt * v.step.substeps), /* the last sub-step makes sums means */

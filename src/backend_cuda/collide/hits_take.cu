@@ -29,7 +29,7 @@ static __device__ __forceinline__ bool pair_presses(const hits_view &v, const st
 
 static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_constant__ hits_view v)
 {
-    follow_if(v.c.early);
+    pdl_wait_if(v.c.pdl);
     const int64_t thread = collision_thread(HIT_THREADS), stride = (int64_t)gridDim.x * HIT_THREADS;
     if (thread == 0) v.state->quiet = 1;
     if (aborted(v.c)) return;
@@ -106,7 +106,7 @@ static __device__ __forceinline__ struct sadmm_swept_shape swept_shape(const hit
 }
 
 /* When do two shapes of the group hit each other, from `from` on? Into its list; what does not fit is counted. False: it
- * took too many looks to tell. */
+ * took too many tests to decide. */
 static __device__ __noinline__ bool foresee(const hits_view &v, int32_t group, uint64_t key, const struct swept_body *a,
                                             const struct swept_body *b, double from, uint64_t mark)
 {
@@ -173,7 +173,7 @@ static __device__ __forceinline__ void follow_on_meshes(const hits_view &v, int6
     }
 }
 
-/* A listed pair; those that took too many looks to tell are marked by their sign. */
+/* A listed pair; those that took too many tests to decide are marked by their sign. */
 static __device__ __forceinline__ struct candidate listed_pair(const hits_view &v, int64_t j)
 {
     const int32_t at = v.listed[j];
@@ -183,7 +183,7 @@ static __device__ __forceinline__ struct candidate listed_pair(const hits_view &
 /* Beside it all swept bodies and boxes for `take`. */
 static __global__ void __launch_bounds__(FORESEE_THREADS) foresee_kernel(const __grid_constant__ hits_view v)
 {
-    follow_if(v.c.early);
+    pdl_wait_if(v.c.pdl);
     const int64_t thread = collision_thread(FORESEE_THREADS), stride = (int64_t)gridDim.x * FORESEE_THREADS;
     if (aborted(v.c)) return;
     const int64_t count = (int64_t)v.state->listed;
@@ -219,7 +219,7 @@ struct take_shared {
     int64_t item[TAKE_THREADS];
     struct foreseen_hit next;
     struct hit_group own;
-    unsigned long long shapes, near, looks; /* of a body that was hit; near one of these; in all */
+    unsigned long long shapes, near, tests; /* of a body that was hit; near one of these; in all */
     int64_t count;               /* of the list */
     int32_t listed[TAKE_SHAPES], leaves[TAKE_SHAPES]; /* of a body that was hit: as they come, and in order */
     int32_t group, record_count, hit_count, found, taken;
@@ -395,9 +395,9 @@ static __device__ void list_shapes(const hits_view &v, int32_t body, struct take
         shared->leaves[rank] = shared->listed[k];
     }
     if (threadIdx.x == 0) {
-        shared->looks += (shared->shapes + 1) *
+        shared->tests += (shared->shapes + 1) *
                          (unsigned long long)(shared->own.leaf_count + v.shared_leaf_count + v.c.plane_count);
-        if (shared->shapes > TAKE_SHAPES || shared->looks > TAKE_LOOKS) shared->fails = true;
+        if (shared->shapes > TAKE_SHAPES || shared->tests > TAKE_TESTS) shared->fails = true;
     }
     __syncthreads();
 }
@@ -417,8 +417,8 @@ static __device__ __forceinline__ void add_near(const hits_view &v, uint64_t key
 }
 
 /* If the leaf, of a body that was hit, comes near the other one: sadmm_collision_list_near. */
-static __device__ __forceinline__ void look_at(const hits_view &v, int32_t number, const struct sadmm_box3 &box,
-                                               int32_t i, int32_t except, struct take_shared *shared)
+static __device__ __forceinline__ void test_near(const hits_view &v, int32_t number, const struct sadmm_box3 &box,
+                                                 int32_t i, int32_t except, struct take_shared *shared)
 {
     const struct collision_leaf &own = v.c.placed[number], &other = v.c.placed[i];
     if (i == number || other.filter.body == except || !boxes_overlap(&v.boxes[i], &box) ||
@@ -439,9 +439,9 @@ static __device__ void list_near(const hits_view &v, int32_t number, int32_t exc
     const struct collision_leaf &own = v.c.placed[number];
     const struct sadmm_box3 box = v.boxes[number];
     for (int32_t j = (int32_t)threadIdx.x; j < shared->own.leaf_count; j += TAKE_THREADS)
-        look_at(v, number, box, v.group_leaves[shared->own.leaf_first + j], except, shared);
+        test_near(v, number, box, v.group_leaves[shared->own.leaf_first + j], except, shared);
     for (int32_t j = (int32_t)threadIdx.x; j < v.shared_leaf_count; j += TAKE_THREADS)
-        look_at(v, number, box, v.shared_leaves[j], except, shared);
+        test_near(v, number, box, v.shared_leaves[j], except, shared);
     for (int32_t p = (int32_t)threadIdx.x; p < v.c.plane_count; p += TAKE_THREADS) {
         const uint64_t entry = v.c.planes[p], group = entry >> 32;
         const uint32_t plane = (uint32_t)entry;
@@ -569,14 +569,14 @@ static __device__ void take_group(const hits_view &v, int32_t group, uint64_t ep
         shared->group = group;
         shared->own = v.groups[group];
         shared->taken = 0;
-        shared->looks = 0;
+        shared->tests = 0;
     }
     __syncthreads();
     struct taking_marks marks = {0, (int64_t)v.progress[group].foreseen};
     __syncthreads();
     if (leads) /* what is sure to be more than it may take is not begun */
         shared->fails = marks.initial > own.room ||
-                        marks.initial * (own.leaf_count + v.shared_leaf_count + v.c.plane_count) > TAKE_LOOKS;
+                        marks.initial * (own.leaf_count + v.shared_leaf_count + v.c.plane_count) > TAKE_TESTS;
     __syncthreads();
     bool done = false;
     for (int times = 0; times < TAKE_TIMES && !done && !shared->fails; ++times) {
@@ -612,7 +612,7 @@ static __device__ void take_group(const hits_view &v, int32_t group, uint64_t ep
 
 static __global__ void __launch_bounds__(TAKE_THREADS) take_kernel(const __grid_constant__ hits_view v)
 {
-    follow_if(v.c.early);
+    pdl_wait_if(v.c.pdl);
     COLLISION_SHARED(take_shared, shared);
     if (aborted(v.c) || v.state->listed == 0) return;
     const uint64_t epoch = v.state->epoch + 1;

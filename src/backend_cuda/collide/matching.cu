@@ -172,7 +172,7 @@ struct emit_pieces {
 static __global__ void __launch_bounds__(COLLISION_THREADS, EMIT_BLOCKS)
 emit_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     COLLISION_SHARED(emit_pieces, shared);
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
     const int32_t lane = (int32_t)(thread % POINT_LANES), found = usable_candidates(v);
@@ -213,7 +213,7 @@ struct emit_sums {
 static __global__ void __launch_bounds__(EMIT_CANDIDATES *POINT_LANES)
 emit_few_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     COLLISION_SHARED(emit_sums, shared);
     const int32_t t = (int32_t)threadIdx.x, first = (int32_t)blockIdx.x * EMIT_CANDIDATES;
     const int32_t i = first + t / POINT_LANES, lane = t % POINT_LANES, found = usable_candidates(v);
@@ -284,7 +284,7 @@ static __device__ __forceinline__ void emit_general(const collision_view &v, con
 static __global__ void __launch_bounds__(GENERAL_THREADS)
 emit_general_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     const int64_t thread = collision_thread(GENERAL_THREADS), stride = (int64_t)gridDim.x * GENERAL_THREADS;
     const int64_t count = (int64_t)v.candidate_count[COUNT_GENERAL];
     if (usable_candidates(v) == 0 || v.after.counts->points > v.point_capacity) return;
@@ -310,7 +310,7 @@ static __device__ bool goes_on(const collision_view &v, int32_t match, int32_t l
 
 static __global__ void __launch_bounds__(COLLISION_THREADS) carry_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
     const int32_t lane = (int32_t)(thread % POINT_LANES);
     if (i >= usable_candidates(v) || lane >= v.sizes[i] || v.after.counts->points > v.point_capacity) return;

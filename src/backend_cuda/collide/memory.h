@@ -160,7 +160,7 @@ static inline sadmm_status begin_work(struct sadmm_cuda_collision *c, void *stre
 {
     if (c->pending) TRY(wait(c, error));
     c->stream = (cudaStream_t)stream;
-    c->view.early = false;
+    c->view.pdl = false;
     c->pending = true;
     return SADMM_OK;
 }
@@ -227,7 +227,7 @@ static inline sadmm_status launch_view(struct sadmm_cuda_collision *c, const Lau
 #else
     const dim3 grid(blocks), threads_a_block((unsigned)what.threads);
     void *parameters[] = {const_cast<View *>(&view)};
-    cudaError_t code = launch_on(c->stream, c->view.early, (const void *)what.kernel, grid, threads_a_block, 0, parameters);
+    cudaError_t code = launch_on(c->stream, c->view.pdl, (const void *)what.kernel, grid, threads_a_block, 0, parameters);
 #endif
     CUDA_CALL(c, code, what.name);
     return SADMM_OK;
@@ -272,8 +272,8 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
                                    struct sadmm_cuda_contact_counts *counts, struct sadmm_error *error);
 sadmm_status COLLISION(reserve_set)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
                                       struct sadmm_error *error);
-/* Hits (hits.h): from candidates to where what was hit is, before they are looked for again; after the narrow phase; and
- * after `emit`. */
+/* Hits (hits.h): from candidates to where what was hit is, before they are searched for again; after the narrow phase;
+ * and after `emit`. */
 void COLLISION(free_hits)(struct sadmm_cuda_collision *c);
 sadmm_status COLLISION(take_hits)(struct sadmm_cuda_collision *c, const struct sadmm_cuda_hits *step,
                                   struct sadmm_error *error);

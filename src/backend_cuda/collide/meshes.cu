@@ -1,6 +1,6 @@
 /* Pairs with a mesh: which triangles they may touch.
  *
- * The pairs stage lists such pairs without order. A warp looks through the mesh for each (mesh_lanes.h) and appends a
+ * The pairs stage lists such pairs without order. A warp searches the mesh for each (mesh_lanes.h) and appends a
  * candidate a triangle; from there on these are candidates like all others, sorted with them.
  */
 #include "batch.h"
@@ -12,7 +12,7 @@
 enum { EXPAND_WARPS = 1024 };
 static_assert((int)MESH_THREADS == (int)WARP_LANES, "a block is a warp");
 
-/* The box of the shape that is no mesh, in all of the time that candidates are looked for. */
+/* The box of the shape that is no mesh, in all of the time that candidates are searched for. */
 template <bool SUBSTEPS>
 static __device__ struct sadmm_box3 box_of_candidates(const collision_view &v, const struct collision_step &step,
                                                       uint32_t slot, const struct sadmm_proxy &proxy)
@@ -49,7 +49,7 @@ static __device__ void expand(const collision_view &v, const struct collision_st
 template <bool SUBSTEPS>
 static __global__ void __launch_bounds__(MESH_THREADS) expand_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     COLLISION_SHARED(waiting_nodes, waiting);
     const unsigned long long listed = v.candidate_count[COUNT_MESH_PAIRS];
     const struct collision_step step = step_of(v);

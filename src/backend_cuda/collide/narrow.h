@@ -42,11 +42,11 @@ struct near_keys {
     int64_t first;
 };
 
-/* guess: any number will do. */
-static __device__ __forceinline__ near_keys near_keys_of(const uint64_t *keys, int64_t count, int64_t guess)
+/* hint: any number will do. */
+static __device__ __forceinline__ near_keys near_keys_of(const uint64_t *keys, int64_t count, int64_t hint)
 {
     struct near_keys near;
-    near.first = (guess < 0 ? 0 : guess < count ? guess : count) - NEAR / 2;
+    near.first = (hint < 0 ? 0 : hint < count ? hint : count) - NEAR / 2;
     for (int k = 0; k < NEAR; ++k) {
         const int64_t at = near.first + k;
         const uint64_t there = keys[at >= 0 && at < count ? at : 0];
@@ -55,7 +55,7 @@ static __device__ __forceinline__ near_keys near_keys_of(const uint64_t *keys, i
     return near;
 }
 
-/* Do these keys tell where `key` is? Then *at is its index, -1: not there. */
+/* Do these keys say where `key` is? Then *at is its index, -1: not there. */
 static __device__ __forceinline__ bool find_key_near(const struct near_keys &near, uint64_t key, int64_t *at)
 {
     int smaller = 0;
@@ -103,7 +103,7 @@ static __device__ double first_touch(const collision_view &v, const struct candi
 }
 
 /* By which find of a step: in later sub-steps the pair that a candidate goes on from is known. ANY: a kernel for all
- * three, which the view tells apart, where compiling it takes minutes. */
+ * three, which the view distinguishes, where compiling it takes minutes. */
 enum narrow_for { NARROW_ONE, NARROW_FIRST, NARROW_AGAIN, NARROW_ANY };
 template <int FOR> static __device__ __forceinline__ int narrow_find(const collision_view &v)
 {
@@ -271,7 +271,7 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
 {
     const int64_t readable = i < v.candidate_capacity ? i : 0;
     const struct candidate own = candidate_of(v, v.candidates[readable]);
-    const int64_t guess = v.pair_of[readable], count = v.before.counts->pairs;
+    const int64_t hint = v.pair_of[readable], count = v.before.counts->pairs;
     const struct collision_step step = step_of(v);
     const int find = narrow_find<FOR>(v);
     const bool had_points = find == NARROW_AGAIN && v.sizes[i] > 0;
@@ -279,16 +279,16 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
         v.sizes[i] = 0;
         return true;
     }
-    const int64_t likely = guess >= 0 && guess < count ? guess : 0;
+    const int64_t likely = hint >= 0 && hint < count ? hint : 0;
     const struct sadmm_proxy *pa = wide_at(v.proxies, own.a), *pb = wide_at(v.proxies, own.b);
-    const struct near_keys near = near_keys_of(v.before.keys, find == NARROW_AGAIN ? 0 : count, guess);
+    const struct near_keys near = near_keys_of(v.before.keys, find == NARROW_AGAIN ? 0 : count, hint);
     struct sadmm_contact_pair old = load_wide(&v.before.pairs[likely]);
     const struct sadmm_proxy a = *pa, b = *pb;
     if (find != NARROW_ONE && !meet_now(v, step, own, a, b)) {
         v.sizes[i] = 0;
         return true;
     }
-    int64_t before = had_points ? guess : -1;
+    int64_t before = had_points ? hint : -1;
     /* where pairs have several manifolds, keys come more than once */
     const bool known = find == NARROW_AGAIN || ((int)find_key_near(near, ordered_key(own.a, own.b), &before) &
                                                (int)(v.child_bits == 0));

@@ -4,8 +4,8 @@
  * Most pairs take little: they are slow, and those with a hull go on as they were, or are too far apart. The few others (a
  * twentieth in a heap of hulls) take ten times as long, and a warp with one of them would wait for it: so they are listed,
  * and done together, in as many warps as run at once: no two of them go the same way for long. Those with a hull go on
- * from where the walk of the distance, which said that they are near, has ended. The list has no order; what is found does not depend on it. The kernel after
- * them is not let begin (device/early.h): terrain took 1 % longer where it was.
+ * from where the walk of the distance, which said that they are near, has ended. The list has no order; what is found
+ * does not depend on it. The kernel after them is not triggered (device/pdl.h): terrain took 1 % longer where it was.
  */
 #ifndef SADMM_CUDA_COLLIDE_NARROW_LISTED_H
 #define SADMM_CUDA_COLLIDE_NARROW_LISTED_H
@@ -16,7 +16,7 @@ template <int FOR, int HOW>
 static __global__ void __launch_bounds__(NARROW_THREADS, NARROW_BLOCKS)
 at_once_kernel(const __grid_constant__ collision_view v)
 {
-    wait_if(v.early);
+    pdl_wait_only_if(v.pdl);
     const int64_t i = collision_thread(NARROW_THREADS);
     struct gjk_walk walk;
     walk.end = GJK_FAR;
@@ -35,7 +35,7 @@ template <int FOR, int HOW>
 static __global__ void __launch_bounds__(NARROW_THREADS)
 listed_kernel(const __grid_constant__ collision_view v)
 {
-    wait_if(v.early);
+    pdl_wait_only_if(v.pdl);
     const int64_t width = NARROW_THREADS, most = LISTED_WARPS, all = (v.candidate_capacity + width - 1) / width,
                   warps = all < most ? all : most, count = (int64_t)v.candidate_count[COUNT_LISTED],
                   wanted = (count + warps - 1) / warps, lanes = wanted < width ? wanted : width,

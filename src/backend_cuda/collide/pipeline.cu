@@ -194,8 +194,8 @@ extern "C" struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_col
     return out;
 }
 
-extern "C" void COLLISION(settle)(struct sadmm_cuda_collision *c, int current,
-                                  struct sadmm_cuda_contact_counts counts)
+extern "C" void COLLISION(set_current)(struct sadmm_cuda_collision *c, int current,
+                                       struct sadmm_cuda_contact_counts counts)
 {
     c->current = current;
     c->counts[current].pairs = counts.pairs;

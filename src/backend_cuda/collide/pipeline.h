@@ -30,12 +30,12 @@ struct sadmm_cuda_collision_stats {
     int64_t visits;      /* of nodes of the tree; counted on the emulated device only */
 };
 
-/* A find that is enqueued: from one set into another. In a step of several sub-steps the first one looks for the pairs
- * that may touch in any of them, and the others take these (view.h). */
+/* A find that is enqueued: from one set into another. In a step of several sub-steps the first one searches for the
+ * pairs that may touch in any of them, and the others take these (view.h). */
 struct sadmm_cuda_find {
     int from, into;
     int substep, substeps; /* substeps 1: nothing is taken from, or left for, another find */
-    bool early;            /* kernels are launched early (device/early.h) */
+    bool pdl;              /* kernels are launched with PDL (device/pdl.h) */
     const struct sadmm_cuda_hits *hits; /* NULL: there are none to be taken */
     const double *threshold; /* of restitution, on the device; not NULL: is any pair faster (contact_counts.fast)? */
 };

@@ -21,7 +21,7 @@ static __device__ __forceinline__ void stage(const collision_view &v, int32_t ba
 
 static __global__ void __launch_bounds__(RANK_KEYS *RANK_SHARES) rank_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     COLLISION_SHARED(ranking, shared);
     const int32_t t = (int32_t)threadIdx.x, lane = t % RANK_KEYS, share = t / RANK_KEYS;
     const int32_t first = (int32_t)blockIdx.x * RANK_KEYS, own = first + lane;

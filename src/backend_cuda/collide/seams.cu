@@ -20,7 +20,7 @@ static __device__ __forceinline__ struct manifold load_manifold(const collision_
 
 static __global__ void __launch_bounds__(NARROW_THREADS) seam_kernel(const __grid_constant__ collision_view v)
 {
-    wait_if(v.early);
+    pdl_wait_only_if(v.pdl);
     /* What takes the time are rounds to memory: what can be asked for together is. */
     const int64_t i = collision_thread(NARROW_THREADS), readable = i < v.candidate_capacity ? i : 0;
     const uint64_t key = v.candidates[readable];

@@ -362,7 +362,7 @@ extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void 
 {
     const bool tree = c->view.leaf_count >= c->tree_from;
     c->stream = (cudaStream_t)stream;
-    c->view.early = find->early;
+    c->view.pdl = find->pdl;
     c->pending = true;
     c->view.substeps = find->substeps;
     c->view.substep = find->substep;
@@ -386,7 +386,7 @@ extern "C" sadmm_status COLLISION(enqueue_hits)(struct sadmm_cuda_collision *c, 
     const bool tree = c->view.leaf_count >= c->tree_from;
     int32_t *const abort_code = c->view.abort_code;
     c->stream = (cudaStream_t)stream;
-    c->view.early = find->early;
+    c->view.pdl = find->pdl;
     c->pending = true;
     c->view.substeps = 1;
     c->view.substep = 0;
@@ -398,7 +398,7 @@ extern "C" sadmm_status COLLISION(enqueue_hits)(struct sadmm_cuda_collision *c, 
         TRY(launch(c, c->kernels.build, c->view.leaf_count, error));
         TRY(launch(c, c->kernels.refit, c->view.leaf_count, error));
     }
-    c->view.abort_code = &c->hits.state->quiet; /* nothing was hit: nothing is looked for again */
+    c->view.abort_code = &c->hits.state->quiet; /* nothing was hit: nothing is searched for again */
     const sadmm_status status = find_candidates(c, tree, false, error);
     c->view.abort_code = abort_code;
     return status;

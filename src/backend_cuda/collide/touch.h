@@ -8,7 +8,7 @@
 template <int FOR>
 static __global__ void __launch_bounds__(MESH_THREADS) touch_kernel(const __grid_constant__ collision_view v)
 {
-    follow_if(v.early);
+    pdl_wait_if(v.pdl);
     const int64_t i = collision_thread(MESH_THREADS);
     if (i >= usable_candidates(v)) return;
     const struct candidate own = candidate_of(v, v.candidates[i]);

@@ -6,18 +6,18 @@
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
  *            (a pair with a mesh is listed; a warp of `expand` finds its triangles: meshes.cu)
  *   sort     candidates by (slot of a, slot of b, child), the host's order
- *   hits     where they are planned: swept bodies hit each other, and the candidates are looked for again: hits.h
- *   narrow   the last step's pair (a guess or a search), manifold by candidate     a thread a candidate
+ *   hits     where they are planned: swept bodies hit each other, and the candidates are searched for again: hits.h
+ *   narrow   the last step's pair (a hint or a search), manifold by candidate     a thread a candidate
  *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
  *   seams    where shapes have neighbours: manifolds that their union does not have  the same
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *   carry    where there are meshes: impulses from triangle to triangle            the same
  *
- * In a step of several sub-steps the first one looks for candidates of the whole step (collision_reach); the others go
- * from `place`, which sees to it that these are enough, to `narrow` at once, and know the pair that a candidate goes on
- * from. `narrow` then passes over candidates that do not meet in its sub-step, so that contacts are those of a step by
- * itself.
+ * In a step of several sub-steps the first one searches for candidates of the whole step (collision_reach); the others
+ * go from `place`, which sees to it that these are enough, to `narrow` at once, and know the pair that a candidate goes
+ * on from. `narrow` then passes over candidates that do not meet in its sub-step, so that contacts are those of a step
+ * by itself.
  *
  * Candidates are appended in any order (an integer counter) and then sorted: keys are unique, so the result does not
  * depend on timing. The counter also counts what does not fit, hence a stage whose capacity is too small says exactly
@@ -44,8 +44,8 @@
 
 #include <cuda_runtime.h>
 
-#include "backend_cuda/device/early.h"
 #include "backend_cuda/device/layout.h"
+#include "backend_cuda/device/pdl.h"
 #include "backend_cuda/device/wide.h"
 #include "collision/contact_emit.h"
 #include "collision/gjk.h"
@@ -84,7 +84,7 @@ struct alignas(16) collision_filter {
 };
 enum { FILTER_RANK = 0xff, FILTER_MOVES = 0x100 };
 
-/* A shape that is no plane, with all that is asked of it when candidates are looked for: what lies elsewhere would be
+/* A shape that is no plane, with all that is asked of it when candidates are searched for: what lies elsewhere would be
  * another round to memory, for one pair after the other. */
 struct alignas(16) collision_leaf {
     struct sadmm_box3 box;
@@ -109,8 +109,8 @@ struct alignas(8) collision_groups {
     int32_t low, high;
 };
 
-/* Key of a leaf: class, group, Morton code. Small movers come first, large ones and static shapes last: a walk looks for
- * later leaves only, so that no single thread finds everything that a large shape touches. */
+/* Key of a leaf: class, group, Morton code. Small movers come first, large ones and static shapes last: a walk searches
+ * for later leaves only, so that no single thread finds everything that a large shape touches. */
 enum { LEAF_CLASS_BITS = 2, LEAF_LARGE = 1, LEAF_STATIC = 2 };
 
 /* Where the Morton grid lies. Only speed depends on it. */
@@ -125,7 +125,7 @@ struct collision_step {
 
 /* Where a shape may be in the sub-steps to come: its box, larger by as much as velocities are likely to change, on its
  * way with the velocity that the step begins with. Boxes that stay in their reaches meet only where these do; a shape
- * that leaves its own aborts the step, which is then repeated with candidates looked for in every sub-step. */
+ * that leaves its own aborts the step, which is then repeated with candidates searched for in every sub-step. */
 struct collision_reach {
     struct sadmm_box3 box; /* at the step's start */
     double velocity[3];
@@ -179,7 +179,7 @@ struct collision_view {
     int32_t group_bits;                            /* of the leaf keys */
     double large;                                  /* radius from which a mover is large, m */
     int32_t body_count;                            /* slots */
-    bool early;                                    /* kernels are launched early (device/early.h) */
+    bool pdl;                                      /* kernels are launched with PDL (device/pdl.h) */
     struct collision_grid *grid;                   /* of this step */
     int32_t *abort_code;                           /* not NULL and not 0: do nothing */
     const double *dt, *gravity;                    /* not NULL: of the step, in the place of step's (step_of) */
@@ -231,7 +231,7 @@ static __device__ __forceinline__ collision_step step_of(const collision_view &v
     return step;
 }
 
-/* The time that candidates are looked for: of the whole step. */
+/* The time that candidates are searched for: of the whole step. */
 static __device__ __forceinline__ double time_of_candidates(const collision_view &v, const collision_step &step)
 {
     return step.dt * v.substeps;
@@ -294,7 +294,7 @@ enum { SIZES_BEYOND = 4 };
 struct collision_launch {
     void (*kernel)(const collision_view);
     int threads;   /* a block */
-    size_t shared; /* bytes; what the emulated device must be told */
+    size_t shared; /* bytes; what the emulated device must know */
     const char *name;
 };
 

@@ -129,7 +129,7 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
     v->iteration.residual = (unsigned long long *)b[BUFFER_SCALARS].data;
     v->iteration.ratio = (double *)(v->iteration.residual + 2);
     v->islands.limited = (int32_t *)(v->iteration.residual + 3);
-    v->islands.suspects = v->islands.limited + 1;
+    v->islands.candidates = v->islands.limited + 1;
     v->iteration.barrier = (unsigned *)(v->iteration.residual + 4); /* a sector of its own */
     v->islands.stop = (cuda_stop *)(v->iteration.residual + 8);
     v->islands.moved = (int32_t *)(v->iteration.residual + 11);

@@ -216,7 +216,7 @@ sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_sett
 enum { MOST_ATTRIBUTES = 2 };
 
 /* Blocks of a partition run side by side in clusters (`cluster` > 1), or all of them (GRID: a cooperative launch). */
-static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct cuda_partition *partition, bool early,
+static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct cuda_partition *partition, bool pdl,
                                     cudaLaunchAttribute attribute[MOST_ATTRIBUTES])
 {
     cudaLaunchConfig_t launch = {};
@@ -236,10 +236,10 @@ static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct 
         next->val.clusterDim.y = next->val.clusterDim.z = 1;
     }
 #ifndef SADMM_CUDA_EMULATED
-    if (early && partition->tier != SADMM_CUDA_TIER_GRID)
-        attribute[launch.numAttrs++] = early_attribute();
+    if (pdl && partition->tier != SADMM_CUDA_TIER_GRID)
+        attribute[launch.numAttrs++] = pdl_attribute();
 #else
-    (void)early;
+    (void)pdl;
 #endif
     return launch;
 }
@@ -253,11 +253,11 @@ cudaError_t CUDA(active_clusters)(const struct sadmm_context *c, cuda_kernel ker
 }
 
 static sadmm_status launch_configured(struct sadmm_context *c, cuda_kernel kernel, const char *name,
-                                      const struct cuda_partition *partition, bool early, const cuda_args *args,
+                                      const struct cuda_partition *partition, bool pdl, const cuda_args *args,
                                       struct sadmm_error *error)
 {
     cudaLaunchAttribute attributes[MOST_ATTRIBUTES];
-    const cudaLaunchConfig_t launch = configure(c, partition, early, attributes);
+    const cudaLaunchConfig_t launch = configure(c, partition, pdl, attributes);
     c->kernel = name;
 #ifdef SADMM_CUDA_EMULATED
     cudaError_t code = cuda_emulation_launch(&launch, kernel, c->view, *args);
@@ -279,34 +279,34 @@ sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel,
                                     const struct cuda_partition *partition, const cuda_args *args,
                                     struct sadmm_error *error)
 {
-    return launch_configured(c, kernel, name, partition, begins_early(c), args, error);
+    return launch_configured(c, kernel, name, partition, uses_pdl(c), args, error);
 }
 
 static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
-                                  int threads, bool early, const cuda_args *args, struct sadmm_error *error)
+                                  int threads, bool pdl, const cuda_args *args, struct sadmm_error *error)
 {
     struct cuda_partition plain = {};
     if (blocks <= 0) return SADMM_OK;
     plain.parts = (int32_t)blocks;
     plain.cluster = 1;
     plain.threads = threads;
-    return launch_configured(c, kernel, name, &plain, early, args, error);
+    return launch_configured(c, kernel, name, &plain, pdl, args, error);
 }
 
 sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
                              const cuda_args *args, struct sadmm_error *error)
 {
-    return launch_blocks(c, kernel, name, blocks, threads, all_begin_early(c), args, error);
+    return launch_blocks(c, kernel, name, blocks, threads, all_use_pdl(c), args, error);
 }
 
-sadmm_status CUDA(launch_early)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
-                                int threads, const cuda_args *args, struct sadmm_error *error)
+sadmm_status CUDA(launch_pdl)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                              int threads, const cuda_args *args, struct sadmm_error *error)
 {
-    return launch_blocks(c, kernel, name, blocks, threads, begins_early(c), args, error);
+    return launch_blocks(c, kernel, name, blocks, threads, uses_pdl(c), args, error);
 }
 
-sadmm_status CUDA(launch_late)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
-                               int threads, const cuda_args *args, struct sadmm_error *error)
+sadmm_status CUDA(launch_without_pdl)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                      int threads, const cuda_args *args, struct sadmm_error *error)
 {
     return launch_blocks(c, kernel, name, blocks, threads, false, args, error);
 }

@@ -24,7 +24,7 @@ enum cuda_buffer_name {
     BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
     BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_SETTINGS, BUFFER_WEIGHTS, BUFFER_SIDES, BUFFER_MOTIONS, BUFFER_TOUCH,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_MIGRATIONS, BUFFER_RAW_ROWS, BUFFER_OUT,
-    BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
+    BUFFER_WORLD_BODIES, BUFFER_WORLD_EXTRAPOLATION, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
     BUFFER_WORLD_SLOTS, BUFFER_WORLD_PLACES, BUFFER_WORLD_CONTROL, BUFFER_WORLD_HIT, BUFFER_WORLD_KINEMATIC,
     BUFFER_WORLD_SUPPORT,
     BUFFER_JOINTS, BUFFER_GEARS, BUFFER_TABLES, BUFFER_JOINT_MEMORY, BUFFER_COUPLING_MEMORY, BUFFER_JOINT_ROWS, BUFFER_JOINT_TOUCH,
@@ -32,7 +32,7 @@ enum cuda_buffer_name {
     BUFFER_ARTICULATIONS, BUFFER_ARTICULATION_SIDES, BUFFER_PUSH, BUFFER_PUSHED, BUFFER_PUSH_SORT,
     /* pinned */
     PINNED_LIVE, PINNED_SETTINGS, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_MIGRATIONS, PINNED_ROWS, PINNED_OUT,
-    PINNED_REPORTS, PINNED_EDITS,
+    PINNED_REPORTS, PINNED_UPDATES,
     BUFFER_COUNT
 };
 
@@ -44,7 +44,7 @@ struct sadmm_context {
     cudaStream_t joint_side;  /* likewise: joints */
     cudaEvent_t joint_join;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
-    bool cooperative, clusters, early; /* what the device can launch, with the code that was loaded for it */
+    bool cooperative, clusters, pdl;   /* what the device can launch, with the code that was loaded for it */
 
     const struct sadmm_system *system;
     struct sadmm_plan plan;
@@ -52,15 +52,15 @@ struct sadmm_context {
     double numbers[SADMM_SETTING_NUMBERS]; /* that are, or will be, in BUFFER_SETTINGS; dt = 0: unknown */
     cuda_view view;
     cuda_buffer buffers[BUFFER_COUNT];
-    bool starting; /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
-    bool placed;   /* pairs and row blocks know the places of their sides */
-    bool backward; /* the next sweeps go over bodies and constraints from the last one to the first */
-    bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
-    bool rescaled; /* ... by view.iteration.ratio; else it is 1 */
-    bool fast;     /* the method */
-    bool bounces;  /* some contact may have restitution: kernels that know of it take more registers */
-    bool settled;  /* fast: Step 1 ran in this solve */
-    int refreshes; /* fast: of the weights, in this solve */
+    bool starting;      /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
+    bool placed;        /* pairs and row blocks know the places of their sides */
+    bool backward;      /* the next sweeps go over bodies and constraints from the last one to the first */
+    bool measured;      /* records and change are apart: the next Step 1 uses records + ratio change */
+    bool rescaled;      /* ... by view.iteration.ratio; else it is 1 */
+    bool fast;          /* the method */
+    bool bounces;       /* some contact may have restitution: kernels that know of it take more registers */
+    bool step1_done;    /* fast: Step 1 ran in this solve */
+    int weight_updates; /* fast: in this solve */
     int exact_since; /* fast: iterations since the momentum residuals were taken */
     int checks;     /* fast: at the stop rule, in this step */
     bool prologue; /* fast: the iterating kernels of the step enqueued do prologue and epilogue (iterate/prologue.h) */
@@ -90,14 +90,14 @@ sadmm_status CUDA(fail)(struct sadmm_context *, cudaError_t code, const char *wh
 void CUDA(release_buffers)(struct sadmm_context *);
 /* At least `bytes` in a buffer; what it held is lost when it grows. */
 sadmm_status CUDA(reserve)(struct sadmm_context *, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error);
-/* Are kernels launched early (early.h)? In recorded steps, but for cooperative launches: in small worlds all of them but
- * first sweeps of tier STREAM; in others, where they are long, those from the islands on (launch_early,
- * launch_partition). With all of them early, when sweeps fetched nothing before they waited, pile:100000 and pile:20000
- * took 1 to 2 % longer, with none 2 and 0.5. */
-static inline bool begins_early(const struct sadmm_context *c) { return c->early && c->recording; }
-static inline bool all_begin_early(const struct sadmm_context *c)
+/* Are kernels launched with PDL (pdl.h)? In recorded steps, but for cooperative launches: in small worlds all of them
+ * but first sweeps of tier STREAM; in others, where they are long, those from the islands on (launch_pdl,
+ * launch_partition). With PDL for all of them, when sweeps fetched nothing before they waited, pile:100000 and
+ * pile:20000 took 1 to 2 % longer, with none 2 and 0.5. */
+static inline bool uses_pdl(const struct sadmm_context *c) { return c->pdl && c->recording; }
+static inline bool all_use_pdl(const struct sadmm_context *c)
 {
-    return begins_early(c) && all_early(c->view.model.bodies);
+    return uses_pdl(c) && all_pdl(c->view.model.bodies);
 }
 /* Launch blocks of THREADS on the stream; 0 blocks: nothing to do. */
 sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
@@ -105,15 +105,15 @@ sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char
 /* The same with blocks of so many threads. */
 sadmm_status CUDA(launch_of)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
                              const cuda_args *args, struct sadmm_error *error);
-/* The same, early in large worlds, too; and early in none, for what reads before it waits whatever came before. */
-sadmm_status CUDA(launch_early)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
-                                int threads, const cuda_args *args, struct sadmm_error *error);
-sadmm_status CUDA(launch_late)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
-                               int threads, const cuda_args *args, struct sadmm_error *error);
+/* The same, with PDL in large worlds, too; and never with PDL, for what reads before it waits, whatever came before. */
+sadmm_status CUDA(launch_pdl)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
+                              int threads, const cuda_args *args, struct sadmm_error *error);
+sadmm_status CUDA(launch_without_pdl)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
+                                      int threads, const cuda_args *args, struct sadmm_error *error);
 /* How many of the partition's clusters the device runs side by side; 0: clusters that large do not exist. */
 cudaError_t CUDA(active_clusters)(const struct sadmm_context *, cuda_kernel kernel,
                                   const struct cuda_partition *partition, int *clusters);
-/* Launch a kernel on the partition's blocks; early, too. */
+/* Launch a kernel on the partition's blocks; with PDL, too. */
 sadmm_status CUDA(launch_partition)(struct sadmm_context *, cuda_kernel kernel, const char *name,
                                     const struct cuda_partition *partition, const cuda_args *args,
                                     struct sadmm_error *error);

@@ -38,7 +38,7 @@ sadmm_status CUDA(update_constraints)(struct sadmm_context *, bool measure, stru
 sadmm_status CUDA(iterate)(struct sadmm_context *, int count, bool measure, struct sadmm_error *);
 sadmm_status CUDA(measure_residuals)(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *);
 sadmm_status CUDA(update_penalty)(struct sadmm_context *, double ratio, struct sadmm_error *);
-sadmm_status CUDA(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
+sadmm_status CUDA(limit_energy)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status CUDA(read_solution)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(read_penalty)(struct sadmm_context *, double *beta, struct sadmm_error *);
 sadmm_status CUDA(integrate)(struct sadmm_context *, struct sadmm_rigid *next, struct sadmm_error *);
@@ -47,11 +47,11 @@ sadmm_status CUDA(recover_wrenches)(struct sadmm_context *, double *wrench, stru
 /* core/solve/resident.h */
 sadmm_status CUDA(load_world)(struct sadmm_context *, const struct sadmm_resident_world *,
                               const struct sadmm_settings *, struct sadmm_error *);
-sadmm_status CUDA(step_world)(struct sadmm_context *, const struct sadmm_settings *, const struct sadmm_resident_edit *,
-                              size_t, struct sadmm_error *);
+sadmm_status CUDA(step_world)(struct sadmm_context *, const struct sadmm_settings *,
+                              const struct sadmm_resident_update *, size_t, struct sadmm_error *);
 sadmm_status CUDA(wait_world)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);
-sadmm_status CUDA(read_bodies)(struct sadmm_context *, struct sadmm_rigid *, struct sadmm_steady *, double *wrench,
-                               struct sadmm_error *);
+sadmm_status CUDA(read_bodies)(struct sadmm_context *, struct sadmm_rigid *, struct sadmm_extrapolation *,
+                               double *wrench, struct sadmm_error *);
 sadmm_status CUDA(read_kinematic)(struct sadmm_context *, struct sadmm_kinematic_body *, double *wrench,
                                   double *velocity, struct sadmm_error *);
 sadmm_status CUDA(read_contacts)(struct sadmm_context *, struct sadmm_contact_set *, struct sadmm_error *);

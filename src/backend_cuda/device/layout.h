@@ -1,7 +1,7 @@
 /* The constraint graph of a step on the device: what is known where, and how it is split among thread blocks.
  *
- * Graph statistics are on the device, guesses on the host: launches are sized by the capacities, kernels learn the
- * true counts from `cuda_live` and do nothing once a step of the queue has failed.
+ * Graph statistics are on the device, speculated ones on the host: launches are sized by the capacities, kernels learn
+ * the true counts from `cuda_live` and do nothing once a step of the queue has failed.
  *
  * Bodies have slots, so that an island's bodies are neighbours; where islands do not matter (GRID and STREAM in the
  * method `paper`, but for steps of worlds) a body's slot is its raw index. Pairs and row blocks keep their raw order:

@@ -33,21 +33,21 @@ static __device__ __forceinline__ void stamp_solved(const cuda_step_view &step)
 static __device__ __forceinline__ bool contacts_as_planned(const model_view &model, const cuda_step_view &step)
 {
     const struct cuda_graph_statistics *statistics = model.statistics;
-    return plan_contact_rows(model.live->pairs, statistics->rough) == step.guess.contact_rows &&
-           statistics->point_slots <= step.guess.point_slots;
+    return plan_contact_rows(model.live->pairs, statistics->rough) == step.speculation.contact_rows &&
+           statistics->point_slots <= step.speculation.point_slots;
 }
 /* Is the step? Known once its joints are. */
 static __device__ __forceinline__ bool as_planned(const model_view &model, const cuda_step_view &step)
 {
     const struct cuda_graph_statistics *statistics = model.statistics;
-    const struct cuda_step_guess guess = step.guess;
+    const struct cuda_step_speculation speculation = step.speculation;
     const int32_t pairs = model.live->pairs;
-    const bool joints = guess.rows >= 0;
+    const bool joints = speculation.rows >= 0;
     const int32_t constraints = joints ? step.control->joints.constraints : 0;
     const int32_t warm =
         plan_mostly_warm(pairs + constraints, statistics->warm + (joints ? step.control->joints.warm : 0));
-    return contacts_as_planned(model, step) && (guess.warm < 0 || warm == guess.warm) &&
-           (!joints || guess.rows == (constraints > 0)) && !(guess.apart && step.control->joints.together);
+    return contacts_as_planned(model, step) && (speculation.warm < 0 || warm == speculation.warm) &&
+           (!joints || speculation.rows == (constraints > 0)) && !(speculation.apart && step.control->joints.together);
 }
 
 /* The grid's first thread compares the statistics with the plan; what runs now and what was assembled is of no use when
@@ -59,8 +59,8 @@ static __device__ __forceinline__ void check_plan(const model_view &model, const
     stamp_assembled(step);
     iteration.residual[0] = iteration.residual[1] = 0;
     *iteration.barrier = 0;
-    /* a branch beside this one may still count joints that are apart: finish, turn and commit look at them */
-    const bool planned = step.guess.apart ? contacts_as_planned(model, step) : as_planned(model, step);
+    /* a branch beside this one may still count joints that are apart: finish, turn and commit read them */
+    const bool planned = step.speculation.apart ? contacts_as_planned(model, step) : as_planned(model, step);
     if (!model.live->abort_code && !planned) model.live->abort_code = ABORT_PLAN;
 }
 

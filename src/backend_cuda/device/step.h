@@ -1,6 +1,6 @@
 /* Whole steps on the device (core/solve/resident.h): what the world is there, and how the host follows.
  *
- *     edit        states, wrenches, targets and settings' numbers set since the last step (where there are any)
+ *     update      states, wrenches, targets and settings' numbers set since the last step (where there are any)
  *     start       where a solve starts from; bodies as collision sees them
  *     find        contacts, from one set into the other (collide/view.h); beside it A, b of the bodies, rows of joints
  *                 (where there are kinematic bodies A and b wait for the layout: step/kinematic.cu)
@@ -21,8 +21,8 @@
  * be like it until the report of a step that failed says what they are.
  *
  * Articulations (step/articulation.cu) are solved beside `layout`, or behind it where parts are large, and once more
- * beside `finish`. Where they are apart (cuda_step_guess) all about joints is a branch from `start` to `finish`, and
- * whether the step was one for that is known when it has come to its end.
+ * beside `finish`. Where they are apart (cuda_step_speculation) all about joints is a branch from `start` to `finish`,
+ * and whether the step was one for that is known when it has come to its end.
  *
  * Whether an island is pushed apart without a velocity (core/solve/push.h) is known when the step has been solved: its
  * contacts say so in `finish`. A step in which one is has a graph of its own: there they say so behind the layout, e of
@@ -36,13 +36,13 @@
  *
  * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, warm or
  * cold. All of it goes into a graph that is launched again and again, two of them in turn, because states and contact
- * sets change places at every step; where edits come often steps with them have two of their own. Where a plan does
+ * sets change places at every step; where updates come often steps with them have two of their own. Where a plan does
  * not hold, the step sets cuda_live.abort_code (with c->prologue only its last kernel does: what runs until then keeps
  * to what was planned for), what was enqueued behind it does nothing, and the host, when it sees the report, reads the
  * statistics, plans again and enqueues the same steps again: a repeated step starts from the same state, settings
  * included, and gives the same bits. The settings' numbers are data in device memory, so that a change of them is an
- * edit like others: nothing is recorded again or waited for.
- * Reports and edits travel through pinned memory, a ring of STEPS_AHEAD, written and read by the device itself.
+ * update like others: nothing is recorded again or waited for.
+ * Reports and updates travel through pinned memory, a ring of STEPS_AHEAD, written and read by the device itself.
  */
 #ifndef SADMM_CUDA_DEVICE_STEP_H
 #define SADMM_CUDA_DEVICE_STEP_H
@@ -85,14 +85,14 @@ struct cuda_step_report {
     struct cuda_graph_statistics statistics;
     double depth, primal, dual;
     struct cuda_joint_counts joints; /* of the sub-step that contacts were found for last */
-    int32_t apart;      /* as in cuda_step_guess */
+    int32_t apart;      /* as in cuda_step_speculation */
     struct cuda_step_totals totals;
     int64_t ready;      /* sequence + 1, once all else is there; the host sets 0 before the step. What follows in the
                            stream finds the step done; its last blocks may still move bodies when this is seen */
 };
 
-/* Written by the host: the edits of a step, which follow. */
-struct cuda_edits {
+/* Written by the host: the updates of a step, which follow. */
+struct cuda_updates {
     int64_t count;
 };
 
@@ -109,7 +109,7 @@ struct cuda_step_control {
 };
 
 /* What the step was planned for. */
-struct cuda_step_guess {
+struct cuda_step_speculation {
     int32_t contact_rows; /* 0: no contacts */
     int32_t point_slots;
     int32_t warm;         /* most pairs, and constraints of joints, carry an impulse; -1: does not matter */
@@ -121,8 +121,8 @@ struct cuda_step_guess {
 struct cuda_step_view {
     const struct sadmm_rigid *before;
     struct sadmm_rigid *after;
-    const struct sadmm_steady *steady_before;
-    struct sadmm_steady *steady_after;
+    const struct sadmm_extrapolation *extrapolation_before;
+    struct sadmm_extrapolation *extrapolation_after;
     double *wrench;                       /* of the contacts; bodies x 6 */
     double *start_impulse;                /* points x 3 */
     double *start_velocity;               /* bodies x 6 */
@@ -131,15 +131,15 @@ struct cuda_step_view {
     struct sadmm_collision_body *bodies;  /* by world slot */
     const struct sadmm_cuda_contact_counts *counts;
     int64_t candidate_capacity, point_capacity;
-    struct cuda_step_guess guess;
+    struct cuda_step_speculation speculation;
     struct cuda_step_control *control;
     struct cuda_step_report *reports;     /* pinned: STEPS_AHEAD */
-    const struct cuda_edits *edits;       /* likewise, each with edit_capacity places behind it (edits_of_step) */
-    int32_t edit_capacity;
+    const struct cuda_updates *updates;   /* likewise, each with update_capacity places behind it (updates_of_step) */
+    int32_t update_capacity;
     int32_t measured;                     /* residuals of the last iteration are in view.iteration.residual */
     int32_t limits;                       /* there are contacts: momentum is restored, energies are limited
                                              (view.islands) */
-    int32_t leaves_hits;                  /* none are looked for: a step in which some pair is fast is made again */
+    int32_t leaves_hits;                  /* none are searched for: a step in which some pair is fast is made again */
     int32_t substep, substeps;
 };
 

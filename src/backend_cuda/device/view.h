@@ -51,7 +51,7 @@
 #include "core/solve/kernels.h"
 #include "layout.h"
 #include "line.h"
-#include "early.h"
+#include "pdl.h"
 #include "step.h"
 
 typedef SADMM_REAL solver_real;
@@ -84,13 +84,13 @@ struct alignas(16) real4 {
 /* Of an island, at its label. paper: slow_down and anchored alone, in worlds. */
 struct cuda_island {
     struct weight_island weights;
-    double rescale;      /* not 0: weights of pairs are those taken last, times this */
-    double slow_down;    /* math/limit.h: the factor of its velocities */
-    int32_t anchored;    /* not floating (math/momentum.h): some pair anchors it, nothing touches it, or there are
-                            rows */
-    int32_t rows;        /* there are constraints given by rows: the weight scale stays 1, energies have no limit; and,
-                            once iterations have ended, a kinematic body pushes */
-    int32_t stopped;     /* iterations after which a check found the tolerances met; 0: not yet */
+    double scale_weights; /* not 0: weights of pairs are those taken last, times this */
+    double slow_down;     /* math/energy_limit.h: the factor of its velocities */
+    int32_t anchored;     /* not floating (math/momentum.h): some pair anchors it, nothing touches it, or there are
+                             rows */
+    int32_t rows;         /* there are constraints given by rows: the weight scale stays 1, energies have no limit; and,
+                             once iterations have ended, a kinematic body pushes */
+    int32_t stopped;      /* iterations after which a check found the tolerances met; 0: not yet */
 };
 
 /* fast: of a step's stop rule (iterate/stop_rule.h). */
@@ -210,7 +210,7 @@ struct island_view {
     int32_t *touch;               /* worlds with contacts: bodies: bits (math/trapezoid.h), of the body and, at labels,
                                      of the island; else NULL */
     int32_t *again;               /* worlds: whether bodies have to be moved again; enum cuda_again */
-    int32_t *suspects;            /* not 0: some anchored island may have to be */
+    int32_t *candidates;          /* not 0: some anchored island may need slowing down */
     int32_t *floating;            /* fast: not 0: there are floating islands */
     cuda_stop *stop;
 };
@@ -294,7 +294,7 @@ struct joint_view {
     struct sadmm_resident_gear *gear;
     const double *gear_before;      /* gears: force along the first coordinate, of the last (sub-)step; */
     double *gear_after;             /* of this one */
-    int32_t apart;                  /* as in cuda_step_guess */
+    int32_t apart;                  /* as in cuda_step_speculation */
     const int32_t *is_articulated;  /* bodies: of articulations (step/articulation.cu) 1 + the first body of its part;
                                        else 0. Then constraints: not 0. Those: */
     struct cuda_articulation_body *bodies; /* bodies */
@@ -367,16 +367,16 @@ struct cuda_view {
     struct push_view push;           /* likewise */
 };
 
-/* In pinned memory: the edits of step `sequence`; and them, one after the other. */
-static __host__ __device__ inline const struct cuda_edits *edits_of_step(const struct cuda_edits *ring, int32_t capacity,
-                                                                         int64_t sequence)
+/* In pinned memory: the updates of step `sequence`; and them, one after the other. */
+static __host__ __device__ inline const struct cuda_updates *updates_of_step(const struct cuda_updates *ring,
+                                                                             int32_t capacity, int64_t sequence)
 {
-    const size_t bytes = sizeof *ring + (size_t)capacity * sizeof(struct sadmm_resident_edit);
-    return (const struct cuda_edits *)((const char *)ring + (size_t)(sequence % STEPS_AHEAD) * bytes);
+    const size_t bytes = sizeof *ring + (size_t)capacity * sizeof(struct sadmm_resident_update);
+    return (const struct cuda_updates *)((const char *)ring + (size_t)(sequence % STEPS_AHEAD) * bytes);
 }
-static __host__ __device__ inline const struct sadmm_resident_edit *first_edit(const struct cuda_edits *edits)
+static __host__ __device__ inline const struct sadmm_resident_update *first_update(const struct cuda_updates *updates)
 {
-    return (const struct sadmm_resident_edit *)(edits + 1);
+    return (const struct sadmm_resident_update *)(updates + 1);
 }
 
 /* In a whole step: is what the solve gives relative to the motion of the bodies' support? */
@@ -421,14 +421,14 @@ static __device__ __forceinline__ int32_t live_rows(const model_view &model, con
 static __device__ __forceinline__ void clear_counts(const island_view &islands)
 {
     const cuda_stop none = {};
-    *islands.limited = *islands.suspects = *islands.floating = *islands.moved = 0;
+    *islands.limited = *islands.candidates = *islands.floating = *islands.moved = 0;
     for (int k = 0; k < AGAIN_WHYS; ++k) islands.again[k] = 0;
     *islands.stop = none;
 }
 
 /* What an iterating kernel does about energies after its last iteration: it says whether an island may have too much,
  * or it sees to everything (BLOCK). */
-enum cuda_limit { LIMIT_NONE, LIMIT_SUSPECTS, LIMIT_WHOLE };
+enum cuda_energy_limit { LIMIT_NONE, LIMIT_CANDIDATES, LIMIT_WHOLE };
 
 /* What differs between launches of a kernel. */
 struct cuda_args {
@@ -441,13 +441,13 @@ struct cuda_args {
     int32_t rescaled;   /* ratio is iteration.ratio, else 1 */
     int32_t backward;   /* thread blocks in descending order */
     int32_t in_order;   /* slots are raw indices */
-    int32_t settled;    /* fast: Step 1 ran before in this solve */
+    int32_t step1_done; /* fast: Step 1 ran before in this solve */
     int32_t goes_on;    /* fast: the batch does not end with these iterations */
     int32_t warm;       /* fast: the step starts warm */
     int32_t checks;      /* fast: of the stop rule, in this step so far */
     int32_t begin;      /* fast, BLOCK: weights, C and factors first */
-    int32_t limit;      /* fast: of energies; enum cuda_limit */
-    int32_t bounces;    /* fast: and of islands that bounce (math/limit.h) */
+    int32_t energy_limit; /* fast; enum cuda_energy_limit */
+    int32_t rebounds;   /* fast: islands are tested for a rebound, too (math/energy_limit.h) */
     int32_t paper;      /* the method: energies are compared, nothing is slowed down */
     int32_t relax;      /* fast, STREAM: bits of enum cuda_relax */
     double factor;

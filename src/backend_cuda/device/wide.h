@@ -13,7 +13,7 @@ struct alignas(16) wide_piece {
 
 /* All below is of memory whose arrays begin at multiples of a piece, as all device buffers do. */
 
-/* Record i, of which a part is wanted: a compiler that is told of pieces asks for two numbers at a time. */
+/* Record i, of which a part is wanted: a compiler that is given pieces asks for two numbers at a time. */
 template <class T> static __device__ __forceinline__ T *wide_at(T *records, size_t i)
 {
     static_assert(sizeof(T) % sizeof(wide_piece) == 0, "whole pieces");

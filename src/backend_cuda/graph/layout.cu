@@ -38,7 +38,7 @@ static size_t place_arrays(const struct sadmm_context *c, int32_t *base, struct 
     return used * sizeof(int32_t);
 }
 
-static struct layout_stream stream_of(const struct sadmm_context *c) { return {c->stream, all_begin_early(c)}; }
+static struct layout_stream stream_of(const struct sadmm_context *c) { return {c->stream, all_use_pdl(c)}; }
 
 /* 0, 1, ...: values of the sorts, the same in every step. */
 static sadmm_status number(struct sadmm_context *c, size_t count, struct sadmm_error *error)

@@ -20,7 +20,7 @@ static int64_t few_blocks_for(const struct layout_view *v, int64_t threads)
 
 static __global__ void clear_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
-    wait_for_stream();
+    pdl_wait();
     if (v.live->abort_code) return;
     const int32_t i = thread_index();
     if (i == 0) {
@@ -48,7 +48,7 @@ static __device__ __forceinline__ void find_statistics(const layout_view &v, int
 static __global__ void __launch_bounds__(LAYOUT_THREADS)
     records_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
-    wait_for_stream();
+    pdl_wait();
     if (v.live->abort_code) return;
     const int32_t pairs = v.live->pairs, records = v.pair_capacity + v.rows;
     find_statistics(v, records, [&](int32_t record, cuda_graph_statistics *own) {
@@ -58,14 +58,14 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
 
 static __global__ void flatten_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
-    wait_for_stream();
+    pdl_wait();
     const int32_t i = thread_index();
     if (i < v.bodies && !v.live->abort_code) flatten_body(v, i);
 }
 
 static __global__ void join_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
-    wait_for_stream();
+    pdl_wait();
     const int32_t record = thread_index();
     if (record < v.pair_capacity + v.rows && !v.live->abort_code) join_record(v, record);
 }
@@ -73,7 +73,7 @@ static __global__ void join_kernel(const __grid_constant__ layout_view v, const 
 static __global__ void __launch_bounds__(LAYOUT_THREADS)
     bodies_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
-    wait_for_stream();
+    pdl_wait();
     if (v.live->abort_code) return;
     find_statistics(v, v.bodies,
                     [&](int32_t i, cuda_graph_statistics *own) { statistics_of_body<false>(v, i, args.islands, own); });
@@ -83,14 +83,14 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
 
 static __global__ void slots_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
-    wait_for_stream();
+    pdl_wait();
     const int32_t s = thread_index();
     if (s < v.bodies && !v.live->abort_code) v.slot_of[v.body_of[s]] = s;
 }
 
 static __global__ void side_slots_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
-    wait_for_stream();
+    pdl_wait();
     const int32_t h = thread_index();
     if (h >= 2 * (v.pair_capacity + v.rows) || v.live->abort_code) return;
     const int32_t body = v.side_body[h];
@@ -100,7 +100,7 @@ static __global__ void side_slots_kernel(const __grid_constant__ layout_view v, 
 /* Where each body's sides begin among the sorted ones; slots that are raw indices. */
 static __global__ void offsets_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
-    wait_for_stream();
+    pdl_wait();
     const int32_t s = thread_index();
     if (s > v.bodies || v.live->abort_code) return;
     int32_t first = 0, last = v.statistics->sides;
@@ -117,14 +117,14 @@ static __global__ void offsets_kernel(const __grid_constant__ layout_view v, con
 static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
     parts_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
-    wait_for_stream();
+    pdl_wait();
     LAYOUT_SHARED(memory);
     if (!v.live->abort_code) make_parts(v, args.partition, ONE_BLOCK_THREADS, (int32_t *)memory);
 }
 
 static __global__ void number_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
-    wait_for_stream();
+    pdl_wait();
     const int32_t i = thread_index();
     if (i < v.bodies) v.label[i] = i;
 }

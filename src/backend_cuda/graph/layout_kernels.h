@@ -23,7 +23,7 @@
 #include <cuda_runtime.h>
 
 #include "core/model/system.h"
-#include "backend_cuda/device/early.h"
+#include "backend_cuda/device/pdl.h"
 #include "backend_cuda/device/layout.h"
 
 enum { LAYOUT_THREADS = 256, ONE_BLOCK_THREADS = 1024 };
@@ -35,10 +35,10 @@ struct layout_args {
     struct cuda_partition partition;
 };
 
-/* Where kernels go; early: in a recorded step (device/early.h). */
+/* Where kernels go; pdl: in a recorded step (device/pdl.h). */
 struct layout_stream {
     cudaStream_t stream;
-    bool early;
+    bool pdl;
 };
 
 static __host__ __device__ inline bool slots_by_island(const struct cuda_partition *partition)
@@ -52,7 +52,7 @@ static __host__ __device__ inline bool slots_by_island(const struct cuda_partiti
 #define LAYOUT(name) sadmm_cuda_layout_##name
 #endif
 
-/* On failure *kernel tells what was launched; after success, what was launched last. */
+/* On failure *kernel says what was launched; after success, what was launched last. */
 cudaError_t LAYOUT(statistics)(const struct layout_view *, bool islands, const struct layout_stream &stream, const char **kernel);
 cudaError_t LAYOUT(make)(const struct layout_view *, const struct cuda_partition *, const struct layout_stream &stream,
                          const char **kernel);
@@ -86,7 +86,7 @@ static inline cudaError_t layout_launch(layout_kernel kernel, int64_t blocks, in
     return cuda_emulation_launch(kernel, (unsigned)blocks, (unsigned)threads, shared, *view, *args);
 #else
     void *parameters[] = {const_cast<layout_view *>(view), const_cast<layout_args *>(args)};
-    return launch_on(stream.stream, stream.early, (const void *)kernel, dim3((unsigned)blocks), dim3((unsigned)threads),
+    return launch_on(stream.stream, stream.pdl, (const void *)kernel, dim3((unsigned)blocks), dim3((unsigned)threads),
                      shared, parameters);
 #endif
 }

@@ -222,8 +222,8 @@ static __device__ void list_sides(const layout_view &v, const layout_view &globa
 static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
     one_block_kernel(const __grid_constant__ layout_view global, const __grid_constant__ layout_args args)
 {
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     LAYOUT_SHARED(memory);
     one_block_memory m;
     layout_view v = global; /* with the arrays in shared memory where there is one */

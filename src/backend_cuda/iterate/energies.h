@@ -1,4 +1,4 @@
-/* Energies of islands, and by what the method `fast` slows them down (math/limit.h). In double, from this
+/* Energies of islands, and by what the method `fast` slows them down (math/energy_limit.h). In double, from this
  * precision's data; eight lanes a body. */
 #ifndef SADMM_CUDA_ITERATE_ENERGIES_H
 #define SADMM_CUDA_ITERATE_ENERGIES_H
@@ -64,25 +64,25 @@ static __device__ __forceinline__ double energies_of_body(const cuda_view &v, co
 }
 
 /* From its terms. */
-static __device__ __forceinline__ struct limit_energies energies_of(const double term[TERMS])
+static __device__ __forceinline__ struct island_energies energies_of(const double term[TERMS])
 {
-    const struct limit_energies energies = {term[0], term[1], term[3], term[2], term[5], 0, 0};
+    const struct island_energies energies = {term[0], term[1], term[3], term[2], term[5], 0, 0};
     return energies;
 }
 
 /* By what an island is slowed down. */
-static __device__ __forceinline__ double factor_of(const struct limit_energies &energies, double along, bool bounces)
+static __device__ __forceinline__ double factor_of(const struct island_energies &energies, double along, bool rebounds)
 {
-    const double allowed = limit_factor(&energies, SOLVER_EPSILON);
-    return bounces ? min_of(allowed, limit_bounce_factor(&energies, along, SOLVER_EPSILON)) : allowed;
+    const double allowed = energy_limit_factor(&energies, SOLVER_EPSILON);
+    return rebounds ? min_of(allowed, energy_limit_rebound_factor(&energies, along, SOLVER_EPSILON)) : allowed;
 }
 
 /* What follows from their sums over an anchored island; !slows: it is counted, no more. One thread of it. */
 static __device__ __forceinline__ void limit_island(const island_view &islands, cuda_island *island,
-                                                    const double sum[TERMS], bool bounces, bool slows)
+                                                    const double sum[TERMS], bool rebounds, bool slows)
 {
-    const struct limit_energies energies = energies_of(sum);
-    const double factor = factor_of(energies, sum[4], bounces);
+    const struct island_energies energies = energies_of(sum);
+    const double factor = factor_of(energies, sum[4], rebounds);
     if (island->rows) return; /* the energies are those of contacts alone; slow_down stays 1 */
     island->slow_down = slows ? factor : 1;
     if (factor != 1) atomicAdd(islands.limited, 1);

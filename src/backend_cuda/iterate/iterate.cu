@@ -5,25 +5,25 @@
 #include "iterate.h"
 #include "sweep.h"
 
-#include "core/math/limit.h"
+#include "core/math/energy_limit.h"
 
 /* ---- fused: BLOCK, CLUSTER and GRID ---------------------------------------------------------------------------- */
 
-static sadmm_status persistent_iterations(struct sadmm_context *c, int count, enum cuda_limit limit, bool goes_on,
-                                          struct sadmm_error *error)
+static sadmm_status persistent_iterations(struct sadmm_context *c, int count, enum cuda_energy_limit limit,
+                                          bool goes_on, struct sadmm_error *error)
 {
     const struct cuda_partition *partition = &c->partition;
     const char *name = nullptr;
     cuda_args args = CUDA(weight_args)(c); /* of a solve that begins with them */
-    args.begin = c->prologue && !c->settled;
+    args.begin = c->prologue && !c->step1_done;
     args.count = count;
     args.join = c->measured;
     args.rescaled = c->rescaled;
     args.start = c->starting || args.begin;
-    args.settled = c->settled;
+    args.step1_done = c->step1_done;
     args.goes_on = goes_on;
-    args.limit = limit;
-    args.bounces = limit_under_iterated(c->plan.warm, c->settings.iterations);
+    args.energy_limit = limit;
+    args.rebounds = energy_limit_tests_rebound(c->plan.warm, c->settings.iterations);
     args.checks = c->checks;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
@@ -32,7 +32,7 @@ static sadmm_status persistent_iterations(struct sadmm_context *c, int count, en
     if (partition->tier == SADMM_CUDA_TIER_GRID) TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
     TRY(CUDA(launch_partition)(c, kernel, name, partition, &args, error));
     c->starting = false;
-    c->settled = true;
+    c->step1_done = true;
     return SADMM_OK;
 }
 
@@ -48,14 +48,14 @@ static sadmm_status measured_batch(struct sadmm_context *c, int count, struct sa
 }
 
 /* Up to `count` iterations, the last ones of the batch unless it goes on. */
-static sadmm_status iterations_of_tier(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
+static sadmm_status iterations_of_tier(struct sadmm_context *c, int count, bool measure, enum cuda_energy_limit limit,
                                        bool goes_on, struct sadmm_error *error)
 {
     if (c->partition.tier == SADMM_CUDA_TIER_STREAM) return CUDA(stream_iterations)(c, count, measure, goes_on, error);
     return measure ? measured_batch(c, count, error) : persistent_iterations(c, count, limit, goes_on, error);
 }
 
-sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
+sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool measure, enum cuda_energy_limit limit,
                                       struct sadmm_error *error)
 {
     TRY(CUDA(clear_primal)(c, measure, error));
@@ -87,7 +87,7 @@ extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool m
 /* (17) as the momentum residual A v - b - J^T lambda. */
 static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     int32_t i = (int32_t)(blockIdx.x * (unsigned)THREADS + threadIdx.x) / LANES, r = (int32_t)threadIdx.x % LANES;
     double dual = 0;
     if (i < live_bodies(v.model) && r < 6) {

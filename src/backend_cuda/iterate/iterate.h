@@ -4,10 +4,10 @@
 
 #include "backend_cuda/device/context.h"
 
-/* ---- iterate.cu, residuals.cu, stop_rule.cu, limit.cu ---- */
+/* ---- iterate.cu, residuals.cu, stop_rule.cu, energy_limit.cu ---- */
 
-/* Iterations, as the entry; limit: what is wanted for the limit of energies after the last. */
-sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, enum cuda_limit limit,
+/* Iterations, as the entry; limit: what is wanted for the energy limit after the last. */
+sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, enum cuda_energy_limit limit,
                                       struct sadmm_error *error);
 /* (16) and (17) of the iteration that was measured, into view.iteration.residual. */
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
@@ -17,13 +17,13 @@ sadmm_status CUDA(enqueue_momentum_residuals)(struct sadmm_context *, struct sad
 sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: a convergence check after `done` iterations of a step. */
 sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *, int done, struct sadmm_error *error);
-/* fast: by what islands are to be slowed down (slow.h), and how many, in *view.islands.limited. `suspected`: the
- * iterations have found out whether any is. */
-/* Before the limit: islands that kinematic bodies push are left alone, if there are any. */
+/* fast: by what islands are to be slowed down (slow.h), and how many, in *view.islands.limited. `candidates`: the
+ * iterations have found whether there are any. */
+/* Before the energy limit: islands that kinematic bodies push are left alone, if there are any. */
 sadmm_status CUDA(enqueue_pushed)(struct sadmm_context *, struct sadmm_error *error);
-/* motions: once it is known what is anchored; before the limit. */
+/* motions: once it is known what is anchored; before the energy limit. */
 sadmm_status CUDA(enqueue_motions)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct sadmm_error *error);
+sadmm_status CUDA(enqueue_energy_limit)(struct sadmm_context *, bool candidates, struct sadmm_error *error);
 
 /* ---- streamed.cu ---- */
 

@@ -3,7 +3,7 @@
  * this precision's b and v; eight lanes a body.
  *
  * Which motions an island may restore does not depend on velocities: where a kernel can run beside the iterations they
- * are found there (limit.cu), and what is left for the end are twelve sums and a few products. */
+ * are found there (energy_limit.cu), and what is left for the end are twelve sums and a few products. */
 #ifndef SADMM_CUDA_ITERATE_MOTIONS_H
 #define SADMM_CUDA_ITERATE_MOTIONS_H
 
@@ -155,15 +155,15 @@ static __device__ __forceinline__ void take_motions(const double *known, struct 
  * none), the island's factor (!slows: 1). motions: with the momentum along them. One thread of it. */
 static __device__ __forceinline__ void restore_island(const island_view &islands, cuda_island *island,
                                                       const struct momentum_motions &motions, const double *term,
-                                                      bool bounces, bool slows, double *place)
+                                                      bool rebounds, bool slows, double *place)
 {
     double factor = 1;
     if (term && !island->rows) {
         const struct momentum_energies rigid = momentum_energies_of(&motions);
-        struct limit_energies energies = energies_of(term);
+        struct island_energies energies = energies_of(term);
         double along = term[4];
-        limit_take_rigid(&energies, &along, &rigid);
-        factor = factor_of(energies, along, bounces);
+        energy_limit_subtract_rigid(&energies, &along, &rigid);
+        factor = factor_of(energies, along, rebounds);
         if (factor != 1) atomicAdd(islands.limited, 1);
         if (!slows) factor = 1;
     }
@@ -200,7 +200,7 @@ static __device__ __forceinline__ void find_motions(const cuda_view &v, const bo
 /* Restores the momentum of the islands of bodies that are `on`, whole ones, along these motions. `energies`: `term` are
  * the lanes' terms of them. Every lane of the warp comes here. */
 static __device__ __forceinline__ void restore_islands(const cuda_view &v, const body_thread &t, bool on, bool energies,
-                                                       double term, bool bounces, bool slows)
+                                                       double term, bool rebounds, bool slows)
 {
     if (__ballot_sync((unsigned)ALL_LANES, on) == 0) return;
     if (on && energies && t.lane < TERMS) motion_place(v, t.slot)[MOTION_ENERGIES + t.lane] = term;
@@ -212,7 +212,7 @@ static __device__ __forceinline__ void restore_islands(const cuda_view &v, const
     take_motions(place + MOTION_KNOWN, &motions);
     momentum_measure(&motions, place);
     restore_island(v.islands, &v.islands.info[label], motions, energies ? place + MOTION_ENERGIES : nullptr,
-                   bounces, slows, place);
+                   rebounds, slows, place);
 }
 
 #endif

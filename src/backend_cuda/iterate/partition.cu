@@ -319,7 +319,7 @@ sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_g
     case SADMM_CUDA_TIER_STREAM: choice = choose_stream(); break;
     default: choice = choose_any(c, statistics, &code); break;
     }
-    if (code != cudaSuccess) return CUDA(fail)(c, code, "looking for blocks that run side by side", error);
+    if (code != cudaSuccess) return CUDA(fail)(c, code, "searching for blocks that run side by side", error);
     if (choice.why) return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "the cuda tier asked for: %s", choice.why);
     *partition = choice.partition;
     partition->islands = c->fast || c->plan.momentum || c->view.joints.count > 0 || c->view.kinematic.count > 0;

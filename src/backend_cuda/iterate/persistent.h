@@ -46,21 +46,21 @@ template <int MODE, int SIZE, class Part>
 static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args,
                                                     real relaxation, row_lane *rows, unsigned *target)
 {
-    int32_t count = args.count, batch = args.goes_on ? count + 1 : count, settled = args.settled;
+    int32_t count = args.count, batch = args.goes_on ? count + 1 : count, step1_done = args.step1_done;
     /* Were it the launch's constant, and not a choice, it would be fetched in every iteration. */
     real all = part.bodies > 0 ? relaxation : (real)1;
-    keep<SIZE>(&count), keep<SIZE>(&batch), keep<SIZE>(&settled), keep<SIZE>(&all);
+    keep<SIZE>(&count), keep<SIZE>(&batch), keep<SIZE>(&step1_done), keep<SIZE>(&all);
     for (int32_t i = 0; i < count; ++i) {
         const int32_t odd = i & 1;
         const bool plain = !relax_constraints(i, batch) || all == 1;
         real relaxation_factor = plain ? (real)1 : all,
-             velocity_factor = relax_velocity(i, batch, settled) ? all : (real)1;
+             velocity_factor = relax_velocity(i, batch, step1_done) ? all : (real)1;
         keep<SIZE>(&relaxation_factor), keep<SIZE>(&velocity_factor);
         if (HAS_ROWS<SIZE> && part.row_sides) part.update_rows(*rows, odd, relaxation_factor);
         else part.update_sides(odd, relaxation_factor, plain);
         block_barrier<SIZE>();
         part.move_bodies_fast(!odd, velocity_factor, relaxation_factor);
-        settled = 1;
+        step1_done = 1;
         arrive<MODE, SIZE>(v.iteration.barrier);
         if (part.has_moves()) part.own_body.b = residual_after(part.own_body, part.sum, part.step, relaxation_factor);
         wait<MODE, SIZE>(v.iteration.barrier, *target += gridDim.x);
@@ -105,30 +105,30 @@ static __device__ __forceinline__ void iterate(Part &part, const cuda_view &v, c
     }
     /* After the iterations: what has come takes a place beside them. A cooperative launch ends 10 us later for it, and
      * after clusters it gains nothing. */
-    if (MODE == BLOCK) let_next_begin();
+    if (MODE == BLOCK) pdl_trigger();
     part.store_bodies(args.count & 1);
     if (!part.has_side() || part.side_stopped()) return;
     if (HAS_ROWS<SIZE> && part.row_sides) rows.store(part.lane);
     else part.store_pair();
 }
 
-/* A batch's iterations, and the limit of energies after them. */
+/* A batch's iterations, and the energy limit after them. */
 template <int MODE, int SIZE, bool FAST, bool PROLOGUE, class Part>
 static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
                                                  const block_part &block)
 {
     iterate<MODE, SIZE, FAST>(part, v, args, relaxation);
-    if (!FAST || args.limit == LIMIT_NONE) return;
-    const bool suspected = part.suspect(args.count & 1);
-    if (!PROLOGUE || args.limit == LIMIT_SUSPECTS) {
-        if (suspected) *v.islands.suspects = 1;
+    if (!FAST || args.energy_limit == LIMIT_NONE) return;
+    const bool candidates = part.has_candidate(args.count & 1);
+    if (!PROLOGUE || args.energy_limit == LIMIT_CANDIDATES) {
+        if (candidates) *v.islands.candidates = 1;
         return;
     }
     if constexpr (PROLOGUE) {
-        if (suspected) block.flags[FLAG_SUSPECTED] = 1;
+        if (candidates) block.flags[FLAG_CANDIDATES] = 1;
         block_barrier<SIZE>();
-        if (block.flags[FLAG_SUSPECTED] || block.flags[FLAG_FLOATING])
-            limit_in_block(v, args.bounces, block, [] { block_barrier<SIZE>(); });
+        if (block.flags[FLAG_CANDIDATES] || block.flags[FLAG_FLOATING])
+            limit_in_block(v, args.rebounds, block, [] { block_barrier<SIZE>(); });
     }
 }
 
@@ -139,7 +139,7 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     persistent_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
-    wait_for_stream();
+    pdl_wait();
     /* They take registers. */
     constexpr bool PROLOGUE = FAST && MODE == BLOCK && !HAS_ROWS<SIZE> && SIZE != ANY_SIZE;
     if (nothing_to_do<MODE, FAST>(v.model, v.graph, v.islands, args)) {
@@ -152,8 +152,8 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     const bool begins = PROLOGUE && args.begin;
     /* floating islands: this kernel finds them out as it begins, or an earlier one has */
     if (PROLOGUE && threadIdx.x == 0) {
-        block.flags[FLAG_SUSPECTED] = 0;
-        block.flags[FLAG_FLOATING] = begins || args.limit != LIMIT_WHOLE ? 0 : *v.islands.floating;
+        block.flags[FLAG_CANDIDATES] = 0;
+        block.flags[FLAG_FLOATING] = begins || args.energy_limit != LIMIT_WHOLE ? 0 : *v.islands.floating;
     }
     if constexpr (PROLOGUE)
         if (begins) store_first_terms(v, block, part.found);

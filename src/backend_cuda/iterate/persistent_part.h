@@ -129,7 +129,7 @@ template <int POINTS, int MODE, int SIZE, bool FAST> struct part_run {
     __device__ __forceinline__ void move_bodies_fast(int32_t odd, real relaxation, real multipliers);
     __device__ __forceinline__ void update_sides(int32_t odd, real relaxation_factor, bool plain);
     __device__ __forceinline__ void update_rows(const row_lane &rows, int32_t odd, real relaxation_factor) const;
-    __device__ __forceinline__ bool suspect(int32_t odd) const;
+    __device__ __forceinline__ bool has_candidate(int32_t odd) const;
     __device__ __forceinline__ void store_bodies(int32_t odd);
     __device__ __forceinline__ void store_pair(void);
 };

@@ -135,11 +135,11 @@ PART __device__ __forceinline__ void PART_RUN::update_rows(const row_lane &rows,
     if (rows.rows) *own_record = sum;
 }
 
-/* ---- the limit of energies, of the method `fast` ----------------------------------------------------------------- */
+/* ---- the energy limit, of the method `fast` ---------------------------------------------------------------------- */
 
 /* Is there a body, one of those that this thread speaks for, that has more energy than it may? Of a world: rigid
  * ones. */
-PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
+PART __device__ __forceinline__ bool PART_RUN::has_candidate(int32_t odd) const
 {
     bool any = false;
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
@@ -157,7 +157,7 @@ PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
             else if (live && r < 6) a[k] = (double)line_a(m.lines + at * LINE_GENERAL, true, r, r / 3 * 3 + k);
         }
         const double velocity = live && r < 6 ? (double)state(odd)[i * ROW + r] : 0;
-        any = suspect_body(args.bounces, speaks, free, velocity, b, a) || any;
+        any = is_candidate(args.rebounds, speaks, free, velocity, b, a) || any;
     }
     return any;
 }

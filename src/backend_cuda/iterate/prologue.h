@@ -1,7 +1,7 @@
 /* The method `fast` in tier BLOCK, where a thread block has whole islands: what a step does before its first iteration
- * and after its last one, by the kernel that iterates. In the other tiers, and for refreshes, these are kernels of
- * their own (weight/weights.cu, weight/penalty.cu, iterate/limit.cu); the functions are the same, and so are the
- * results, bit for bit. */
+ * and after its last one, by the kernel that iterates. In the other tiers, and for later weight updates, these are
+ * kernels of their own (weight/weights.cu, weight/penalty.cu, iterate/energy_limit.cu); the functions are the same, and
+ * so are the results, bit for bit. */
 #ifndef SADMM_CUDA_ITERATE_PROLOGUE_H
 #define SADMM_CUDA_ITERATE_PROLOGUE_H
 
@@ -11,7 +11,7 @@
 #include "backend_cuda/weight/weigh.h"
 
 /* Of a part, in any of its islands: one is floating; one is anchored; a body has too much energy. */
-enum part_flags { FLAG_FLOATING, FLAG_ANCHORED, FLAG_SUSPECTED, PART_FLAGS };
+enum part_flags { FLAG_FLOATING, FLAG_ANCHORED, FLAG_CANDIDATES, PART_FLAGS };
 
 /* Whole steps of worlds: no row blocks, at least a warp, and blocks whose threads have registers enough. */
 struct block_part {
@@ -105,23 +105,23 @@ static __device__ __forceinline__ void add_up_momentum(const cuda_view &v, const
 
 /* The motions of an island and what they restore, from its sums, momentum included. One thread of it. */
 static __device__ __noinline__ void find_motion(const island_view &islands, cuda_island *island, double *place,
-                                                const double *term, bool bounces, bool slows)
+                                                const double *term, bool rebounds, bool slows)
 {
     struct momentum_motions motions;
     momentum_find_motions((struct momentum_sums *)(place + MOTION_KNOWN), &motions);
-    restore_island(islands, island, motions, term, bounces, slows, place);
+    restore_island(islands, island, motions, term, rebounds, slows, place);
 }
 
-/* The limit of energies, where some body of the part was suspected, and the momentum of floating islands. */
+/* The energy limit, where some body of the part is a candidate, and the momentum of floating islands. */
 template <class Barrier>
-static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool bounces, const block_part &part,
+static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool rebounds, const block_part &part,
                                                    Barrier barrier)
 {
     const body_thread own = body_of_slot(v.graph, part.first_body + (int32_t)threadIdx.x / LANES,
                                          (int32_t)threadIdx.x / LANES < part.bodies);
-    const bool suspected = part.flags[FLAG_SUSPECTED] != 0;
+    const bool candidates = part.flags[FLAG_CANDIDATES] != 0;
     store_terms(v.graph, part, own, [&](const body_thread &t) {
-        const bool floating = is_floating(v, t), on = suspected || floating;
+        const bool floating = is_floating(v, t), on = candidates || floating;
         return __ballot_sync((unsigned)ALL_LANES, on) != 0 ? energies_of_body<true>(v, t, on) : 0;
     });
     if (part.flags[FLAG_FLOATING]) add_up_momentum(v, part, own, barrier);
@@ -130,8 +130,8 @@ static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool boun
         if (!t.live || t.lane > 0 || i != part.range[i].first) return;
         cuda_island *island = &v.islands.info[v.graph.label[t.body]];
         const double *energies = part.terms + i * TERMS;
-        if (!island->anchored) find_motion(v.islands, island, motion_place(v, t.slot), energies, bounces, true);
-        else if (suspected) limit_island(v.islands, island, energies, bounces, true);
+        if (!island->anchored) find_motion(v.islands, island, motion_place(v, t.slot), energies, rebounds, true);
+        else if (candidates) limit_island(v.islands, island, energies, rebounds, true);
     });
 }
 

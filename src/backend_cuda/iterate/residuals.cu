@@ -25,7 +25,7 @@ template <bool KEEP>
 static __global__ void __launch_bounds__(BODY_THREADS)
     momentum_residual_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     if (KEEP && all_stopped(v.islands, args.checks)) return;
     const body_thread t = body_of_thread(v.model, v.graph);
     const double r = v.bodies.rigid ? momentum_residual_of<true>(v.bodies, v.graph, v.contacts, v.rows, t)

@@ -1,22 +1,23 @@
-/* The method `fast`: islands that have more energy than they may (math/limit.h, iterate/limit.cu). */
+/* The method `fast`: islands that have more energy than they may (math/energy_limit.h, iterate/energy_limit.cu). */
 #ifndef SADMM_CUDA_ITERATE_SLOW_H
 #define SADMM_CUDA_ITERATE_SLOW_H
 
 #include "backend_cuda/device/lanes.h"
 #include "backend_cuda/device/wide.h"
 
-#include "core/math/limit.h"
+#include "core/math/energy_limit.h"
 
-/* Has a body more energy than its free motion, `free`, or, where `bounces` count, does it bounce? `velocity`, `b` and `a`:
- * the lane's components and row of A (three numbers of it for rigid bodies). `speaks`: one lane of each body, the others
- * say no. Every lane of the warp comes here. */
+/* Has a body more energy than its free motion, `free`, or, where `rebounds` is set, does it rebound? `velocity`, `b`
+ * and `a`: the lane's components and row of A (three numbers of it for rigid bodies). `speaks`: one lane of each body,
+ * the others say no. Every lane of the warp comes here. */
 template <int SIZE>
-static __device__ __forceinline__ bool suspect_body(bool bounces, bool speaks, double free, double velocity,
+static __device__ __forceinline__ bool is_candidate(bool rebounds, bool speaks, double free, double velocity,
                                                     double b, const double (&a)[SIZE])
 {
     const double now = dot_lanes(velocity, product(velocity, a)) / 2,
-                 along = bounces ? dot_lanes(velocity, b) / 2 : 0;
-    return speaks && (limit_suspects(now, free) || (bounces && limit_bounces(now, free, along, SOLVER_EPSILON)));
+                 along = rebounds ? dot_lanes(velocity, b) / 2 : 0;
+    return speaks &&
+           (energy_limit_exceeded(now, free) || (rebounds && energy_limit_rebounds(now, free, along, SOLVER_EPSILON)));
 }
 
 /* Where a body is from the one that names its island. */

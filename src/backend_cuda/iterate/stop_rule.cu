@@ -102,7 +102,7 @@ template <bool RIGID, bool BOUNCES>
 static __global__ void __launch_bounds__(BODY_THREADS)
     convergence_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     if (blockIdx.x == 0 && threadIdx.x == 0) v.islands.stop->unmet[(args.checks + 1) % CHECKS_KEPT] = 0;
     if (args.checks > 1 && all_stopped(v.islands, args.checks - 1)) return;
     const body_thread t = body_of_thread(v.model, v.graph);

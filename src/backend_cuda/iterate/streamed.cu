@@ -69,7 +69,7 @@ static __device__ __forceinline__ void join_halves(int32_t half, const real (&ow
 /* A row of eight by both, half of it each (`there`: else it is 0). Every lane of the warp comes here. */
 static __device__ __forceinline__ void fetch_halves(int32_t half, bool there, const solver_real *row, real (&to)[ROW])
 {
-    const real4 none = {}, own = there ? load_early((const real4 *)row + half) : none,
+    const real4 none = {}, own = there ? load_before_wait((const real4 *)row + half) : none,
                 other = {of_other_half(own.x), of_other_half(own.y), of_other_half(own.z), of_other_half(own.w)};
     const real four[2][4] = {{own.x, own.y, own.z, own.w}, {other.x, other.y, other.z, other.w}};
 #pragma unroll
@@ -127,8 +127,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
     const real4 *records = (const real4 *)v.iteration.records + half,
                 *changes = (const real4 *)v.iteration.change + half;
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     if (FAST && all_stopped(v.islands, args.checks)) return;
 #pragma unroll 4
     for (int32_t h = begin; h < end; ++h) {
@@ -197,8 +197,8 @@ static __global__ void __launch_bounds__(THREADS)
     swept_pair<COUNT> pair;
     double primal = 0;
     if (t.there) pair = fetch_pair<LANES_A_PAIR, COUNT, FAST>(v.contacts, t.p, t.lane);
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     if (FAST && all_stopped(v.islands, args.checks)) return;
     if (t.there) {
         const bool on = t.live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, pair.joined));
@@ -213,7 +213,7 @@ template <bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_if(all_early(v.model.bodies));
+    pdl_wait_only_if(all_pdl(v.model.bodies));
     const int32_t k = thread_index(args);
     double primal = 0;
     if (FAST && all_stopped(v.islands, args.checks)) return;
@@ -228,14 +228,14 @@ static __global__ void __launch_bounds__(THREADS)
 template <int LANES_A_PAIR>
 static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_if(all_early(v.model.bodies));
+    pdl_wait_only_if(all_pdl(v.model.bodies));
     const pair_thread t = pair_of<LANES_A_PAIR>(v.model, thread_index(args));
     if (t.there) start_pair<LANES_A_PAIR>(v.contacts, v.iteration, t.p, t.lane, t.live);
 }
 
 static __global__ void start_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_if(all_early(v.model.bodies));
+    pdl_wait_only_if(all_pdl(v.model.bodies));
     const int32_t k = thread_index(args);
     if (k < live_rows(v.model, v.rows)) start_rows(v.rows, v.iteration, k);
 }
@@ -243,7 +243,7 @@ static __global__ void start_rows_kernel(const __grid_constant__ cuda_view v, co
 /* Where records go. */
 static __global__ void place_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_if(all_early(v.model.bodies));
+    pdl_wait_only_if(all_pdl(v.model.bodies));
     const int32_t at = thread_index(args), bodies = live_bodies(v.model);
     if (bodies == 0 || at >= v.graph.offsets[bodies]) return;
     const int32_t side = v.graph.incident[at], on_b = side & 1, k = side / 2 - v.contacts.pair_capacity;
@@ -254,14 +254,14 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
 /* A sweep. It fetches what no sweep writes, or the one before the last, and only then waits for the last one: while that
- * one's last blocks run, the next one's are loading. So the first of a batch, which other kernels precede, begins late;
- * `follows`: it is not the first. */
+ * one's last blocks run, the next one's are loading. So the first of a batch, which other kernels precede, is launched
+ * without PDL; `follows`: it is not the first. */
 static sadmm_status launch_sweep(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
                                  int threads, bool follows, const cuda_args *args, struct sadmm_error *error)
 {
     const bool alternate = c->view.contacts.pair_capacity > 0; /* else Step 1 would follow on itself */
-    return follows && alternate ? CUDA(launch_early)(c, kernel, name, blocks, threads, args, error)
-                                : CUDA(launch_late)(c, kernel, name, blocks, threads, args, error);
+    return follows && alternate ? CUDA(launch_pdl)(c, kernel, name, blocks, threads, args, error)
+                                : CUDA(launch_without_pdl)(c, kernel, name, blocks, threads, args, error);
 }
 
 /* relax: of enum cuda_relax. */
@@ -372,9 +372,9 @@ static sadmm_status fast_iteration(struct sadmm_context *c, int i, int count, bo
 {
     const int multipliers = relax_constraints(i, count) ? RELAX_MULTIPLIERS : 0;
     TRY(launch_constraints(c, measure, multipliers, follows, error));
-    TRY(launch_bodies(c, false, multipliers | (relax_velocity(i, count, c->settled) ? RELAX_VELOCITY : 0), true,
+    TRY(launch_bodies(c, false, multipliers | (relax_velocity(i, count, c->step1_done) ? RELAX_VELOCITY : 0), true,
                       error));
-    c->settled = true;
+    c->step1_done = true;
     return SADMM_OK;
 }
 
@@ -435,7 +435,7 @@ sadmm_status CUDA(stream_iterations)(struct sadmm_context *c, int count, bool me
         follows = true;
         --count;
     }
-    if (c->fast && !c->settled && (count > 1 || goes_on)) {
+    if (c->fast && !c->step1_done && (count > 1 || goes_on)) {
         TRY(fast_iteration(c, 0, 2, false, false, error));
         follows = true;
         --count;

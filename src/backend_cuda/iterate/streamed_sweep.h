@@ -65,7 +65,7 @@ template <int COUNT> struct swept_pair {
     vec3 old[COUNT];
 };
 
-/* load_lambda, before the wait: load_early. */
+/* load_lambda, before the wait: load_before_wait. */
 static __device__ __forceinline__ vec3 fetch_lambda(const contact_view &contacts, size_t slot)
 {
     const solver_real *lambda = contacts.lambda + slot;

@@ -39,9 +39,9 @@ template <class T> CUDA_INLINE T load_once(const T *from)
     return load_parts(from, [](const int4 *part) { return __ldcs(part); });
 }
 
-/* What is fetched before the wait of an early launch, and kernels before the last one have written: past the first-level
+/* What is fetched before the wait of a PDL launch, and kernels before the last one have written: past the first-level
  * cache, which is not promised to know. */
-template <class T> CUDA_INLINE T load_early(const T *from)
+template <class T> CUDA_INLINE T load_before_wait(const T *from)
 {
     return load_parts(from, [](const int4 *part) { return __ldcg(part); });
 }

@@ -9,7 +9,7 @@
 #include "core/model/joint_close.h"
 #include "world.h"
 
-/* What a part's threads tell each other. */
+/* What a part's threads share. */
 struct articulation_shared {
     double speed;
     int32_t touched, flag;
@@ -245,9 +245,9 @@ static __device__ __forceinline__ void load_again(const cuda_view &v, const arti
 
 /* ---- all of it --------------------------------------------------------------------------------------------------- */
 
-/* Of a small part. again: it has looked before the iterations. */
-static __device__ __forceinline__ void look_for_sides(const cuda_view &v, bool again,
-                                                      struct articulation_shared *shared)
+/* Of a small part. again: it has searched before the iterations. */
+static __device__ __forceinline__ void find_sides(const cuda_view &v, bool again,
+                                                  struct articulation_shared *shared)
 {
     const int32_t part = (int32_t)blockIdx.x;
     if (again) load_sides(v, v.joints.ranges[part], &shared->sides);
@@ -274,18 +274,18 @@ static __global__ void __launch_bounds__(ARTICULATION_THREADS)
     }
     __syncthreads();
     if (shared->aborted) {
-        wait_for_stream();
+        pdl_wait();
         return;
     }
     const articulation_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
-    if (v.joints.apart) wait_for_stream();
+    if (v.joints.apart) pdl_wait();
     load_rows(v, p);
     load_inertia(v, p);
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     if (after && blockIdx.x == 0 && threadIdx.x == 0) stamp_solved(v.step);
     __syncthreads();
-    if (SMALL) look_for_sides(v, again, shared);
+    if (SMALL) find_sides(v, again, shared);
     const bool kept = again && v.joints.kept[blockIdx.x]; /* it was solved before the iterations; it is so still: */
     if (kept && !is_touched<SMALL>(v, p, &shared->sides, &shared->touched)) return;
 #pragma unroll 1
@@ -301,7 +301,7 @@ static __global__ void __launch_bounds__(ARTICULATION_THREADS)
 /* Which part the bodies of a pair are of: a thread a side. Small parts find their contacts by it. */
 static __global__ void pair_parts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t code = thread_index();
     if (code >= 2 * live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];

@@ -36,8 +36,8 @@ struct finish_shared {
 
 /* What its contacts say of a body; of its island where that is floating, so that what holds as a rule may not
  * (move.h). */
-static __device__ __forceinline__ void tell_touch(const island_view &islands, int32_t body, int32_t label,
-                                                  bool anchored, int touch)
+static __device__ __forceinline__ void report_touch(const island_view &islands, int32_t body, int32_t label,
+                                                    bool anchored, int touch)
 {
     add_touch(islands, body, label, anchored ? touch & TOUCH_OF_BODY : touch);
     if (!anchored) islands.again[AGAIN] = 1;
@@ -71,8 +71,8 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     touching_begun begun = begin_touching(v, t.begin + t.lane, t.end);
     trapezoid_speeds own = {};
     bool anchored = true;
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
     if (touched) {
         anchored = v.islands.info[label].anchored;
@@ -83,7 +83,7 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     if (t.begin < t.end && v.model.wrenches) add_owed(v, body, t.lane, sums.wrench);
     if (t.begin < t.end && v.model.wrenches)
         add_wrench(sums.wrench, t.lane, v.step.substep, v.step.substeps, v.step.wrench + 6 * t.body);
-    if (touched && t.lane == 0) tell_touch(v.islands, body, label, anchored, sums.touch);
+    if (touched && t.lane == 0) report_touch(v.islands, body, label, anchored, sums.touch);
 }
 
 /* A body on its way: both places that there are as a rule. */
@@ -94,7 +94,7 @@ struct finish_move {
     double stays[PLACE], own[PLACE];
 };
 
-/* What the thread does that moves a body, while the others look at contacts; */
+/* What the thread does that moves a body, while the others inspect contacts; */
 static __device__ __forceinline__ finish_move begin_move(const cuda_view &v, double dt)
 {
     const int32_t in_block = (int32_t)threadIdx.x - FINISH_SIDES,
@@ -103,8 +103,8 @@ static __device__ __forceinline__ finish_move begin_move(const cuda_view &v, dou
     m.live = in_block < FINISH_BODIES && slot < v.model.bodies && v.graph.offsets[slot] < v.graph.offsets[slot + 1];
     m.body = m.live ? v.graph.body_of[slot] : 0;
     if (m.live) m.before = fetch_body(v.step, m.body);
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     if (!m.live) return m;
     double velocity[6];
     load_end_velocity(v, m.body, velocity);
@@ -135,8 +135,8 @@ static __device__ __noinline__ void finish_free(const cuda_view &v, double dt, i
     body_before before = {};
     double velocity[6], place[PLACE];
     if (live) before = fetch_body(v.step, body);
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     if (!live) return;
     load_end_velocity(v, body, velocity);
     move_body(&before.body, halfway_of(v, body), velocity, dt, v.model.settings->gravity, TRAPEZOID_OWN, place);
@@ -212,8 +212,8 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
     double depth = 0;
     pair_before pair = {};
     if (live) pair = fetch_pair(v.raw, v.step, p, lane);
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     const unsigned long long deepest = control->depth; /* of those that have come here */
     /* bodies are named first: all of them are below any contact's */
     const int32_t body = pair.ends.body[1] >= 0 ? pair.ends.body[1] : pair.ends.body[0];
@@ -230,7 +230,7 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
         double deepest_of_pair = depth;
         for (int o = 1; o < v.contacts.lanes; o *= 2)
             deepest_of_pair = max_of(deepest_of_pair, __shfl_xor_sync((unsigned)ALL_LANES, deepest_of_pair, o));
-        tell_push(v, live && lane == 0 ? p : -1, -deepest_of_pair);
+        report_push(v, live && lane == 0 ? p : -1, -deepest_of_pair);
     }
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
@@ -258,7 +258,7 @@ static __global__ void __launch_bounds__(FINISH_THREADS, 2)
     /* A thread that moves nothing. It waits in any case: kernels after this one wait for this one alone. */
     static_assert(FINISH_THREADS - FINISH_SIDES > FINISH_BODIES, "there is one");
     if (block == 0 && t == FINISH_THREADS - 1) {
-        wait_for_stream();
+        pdl_wait();
         if (args.begin) stamp_solved(v.step);
     }
     if (!on) return;

@@ -51,7 +51,7 @@ static __device__ __forceinline__ void store_row(const cuda_view &v, const struc
 static __global__ void __launch_bounds__(GEAR_THREADS)
     gear_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t g = (int32_t)(blockIdx.x * (unsigned)GEAR_THREADS + threadIdx.x);
     if (g >= v.joints.gears || v.model.live->abort_code) return;
     const struct sadmm_resident_gear *gear = &v.joints.gear[g];
@@ -64,7 +64,7 @@ static __global__ void __launch_bounds__(GEAR_THREADS)
     const struct sadmm_row_constraint out = {acts ? gear->body[0] : -1, acts ? gear->body[1] : -1, (int32_t)slot, acts,
                                              false, 0};
     const_cast<struct sadmm_row_constraint *>(v.raw.constraints)[constraint] = out;
-    v.joints.gear_after[g] = 0; /* the solution tells */
+    v.joints.gear_after[g] = 0; /* the solution says */
     if (!acts) { /* as a joint without rows */
         v.step.control->joints.together = 1;
         return;
@@ -80,7 +80,7 @@ static __global__ void __launch_bounds__(GEAR_THREADS)
 static __global__ void __launch_bounds__(GEAR_THREADS)
     gear_solution_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t g = (int32_t)(blockIdx.x * (unsigned)GEAR_THREADS + threadIdx.x);
     if (g >= v.joints.gears || v.model.live->abort_code) return;
     const int32_t constraint = v.joints.first_gear + g;

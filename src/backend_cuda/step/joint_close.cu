@@ -10,7 +10,7 @@
 #include "joint_place.h"
 #include "world.h"
 
-/* What a part's threads tell each other. */
+/* What a part's threads share. */
 struct close_shared {
     unsigned long long most;
     int32_t flag;
@@ -138,8 +138,8 @@ static __global__ void __launch_bounds__(ARTICULATION_THREADS)
 {
     CUDA_DYNAMIC_SHARED(memory);
     struct close_shared *shared = (struct close_shared *)memory;
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     if (v.model.live->abort_code) return;
     const struct cuda_articulation_part part = v.joints.parts[blockIdx.x];
     const bool folds = v.joints.folds[blockIdx.x];
@@ -149,9 +149,9 @@ static __global__ void __launch_bounds__(ARTICULATION_THREADS)
         if (joint_island_may_open(bits_of(v, v.joints.members[part.first_body + k]))) shared->flag = 1;
     });
     __syncthreads();
-    const bool looks = shared->flag;
+    const bool inspects = shared->flag;
     __syncthreads();
-    if (!looks) return;
+    if (!inspects) return;
     const articulation_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
     if (!close_part(v, p, folds, shared) && !folds) return;
     each(p.s.bodies, [&](int32_t e) { add_energy(v, p.s.body[e], true); });

@@ -211,7 +211,7 @@ static __device__ __forceinline__ void find_drift(const cuda_view &v, int32_t j)
 static __global__ void __launch_bounds__(ISLAND_THREADS)
     joint_momentum_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     if (v.model.live->abort_code) return;
     const int32_t count = v.joints.apart ? args.count : v.model.bodies, blocks = args.most_bodies;
     if ((int32_t)blockIdx.x >= blocks)

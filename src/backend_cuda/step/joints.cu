@@ -72,7 +72,7 @@ static __device__ __forceinline__ void store_row(const cuda_view &v, const struc
     v.joints.sources[slot] = source;
 }
 
-/* What the joint will keep: as before, but for what the solution tells. */
+/* What the joint will keep: as before, but for what the solution says. */
 static __device__ __forceinline__ void begin_memory(const joint_view &joints, int32_t j, int lane, bool winds,
                                                     double angle, bool acts, vec3 point)
 {
@@ -132,7 +132,7 @@ template <bool TABLES>
 static __global__ void __launch_bounds__(ROWS_THREADS)
     joint_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x), j = t / LANES;
     const int lane = t % LANES;
     if (v.model.live->abort_code) return;
@@ -229,7 +229,7 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
         const int32_t count = v.raw.constraints[first + c].count;
         const size_t slots = (size_t)(first + c) * SADMM_MAX_ROWS;
         const bool articulated = v.joints.is_articulated[v.model.bodies + first + c];
-        /* All rows are fetched before the first is looked at: one wait for memory, not one a row. */
+        /* All rows are fetched before the first is inspected: one wait for memory, not one a row. */
         struct sadmm_joint_source source[SADMM_MAX_ROWS];
         double lambda[SADMM_MAX_ROWS];
 #pragma unroll
@@ -264,16 +264,16 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
 
 /* Pair p, where its island has joints: v.contacts.lanes threads, each every so many-th point. Every lane of the warp
  * comes here. */
-static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t p, int32_t lane)
+static __device__ __forceinline__ void inspect_pair(const cuda_view &v, int32_t p, int32_t lane)
 {
     const bool live = v.step.limits && p < live_pairs(v.model);
     const struct sadmm_contact_pair *pair = &v.raw.pairs[live ? p : 0];
     const int32_t a = live ? pair->body_a : -1, b = live ? pair->body_b : -1, body = a >= 0 ? a : b;
-    const bool looks = body >= 0 && v.islands.info[v.graph.label[body]].rows;
+    const bool inspects = body >= 0 && v.islands.info[v.graph.label[body]].rows;
     const struct sadmm_settings settings = *v.model.settings;
     struct joint_trapezoid bodies[2] = {};
     struct trapezoid_touch touch = {0, {0, 0}};
-    if (looks) {
+    if (inspects) {
         bodies[0] = trapezoid_of(v, a), bodies[1] = trapezoid_of(v, b);
         for (int32_t k = lane; k < pair->count; k += v.contacts.lanes)
             joint_contact_touches(pair->normal, &v.raw.points[pair->first + k],
@@ -284,8 +284,8 @@ static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t 
         touch.island |= __shfl_xor_sync((unsigned)ALL_LANES, touch.island, o);
         for (int s = 0; s < 2; ++s) touch.body[s] |= __shfl_xor_sync((unsigned)ALL_LANES, touch.body[s], o);
     }
-    const bool kinematic = looks && v.kinematic.count > 0 && sadmm_pair_is_kinematic(&v.raw.system, pair);
-    if (looks && lane == 0)
+    const bool kinematic = inspects && v.kinematic.count > 0 && sadmm_pair_is_kinematic(&v.raw.system, pair);
+    if (inspects && lane == 0)
         atomicOr(island_of(v, a, b),
                  ISLAND_TOUCHED | (kinematic || joint_contacts_hold(&touch, bodies) ? ISLAND_TRAPEZOID_OFF : 0));
 }
@@ -295,17 +295,17 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     joint_solution_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x), of_pair = t - args.count;
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     if (v.model.live->abort_code) return;
     if (t < v.joints.count) keep_joint(v, t);
-    if (of_pair >= 0) look_at_pair(v, of_pair / v.contacts.lanes, of_pair % v.contacts.lanes);
+    if (of_pair >= 0) inspect_pair(v, of_pair / v.contacts.lanes, of_pair % v.contacts.lanes);
 }
 
 /* Where joints are apart (device/step.h): their bodies move. A thread a body; one a joint. */
 static __global__ void __launch_bounds__(ROWS_THREADS)
     joint_move_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x);
     if (v.model.live->abort_code) return;
     if (i < v.model.bodies && moves_apart(v, i)) move_articulated(v, i);

@@ -1,4 +1,4 @@
-/* The step's own kernels (device/step.h): edits, start, admit, turn, commit. */
+/* The step's own kernels (device/step.h): updates, start, admit, turn, commit. */
 #include <stddef.h>
 
 #include <algorithm>
@@ -16,13 +16,13 @@
 #include "world.h"
 
 enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocessors */
-enum { EDIT_THREADS = 64, MOST_EDIT_BLOCKS = 64 }; /* enough on their way to keep the bus to the host busy */
+enum { UPDATE_THREADS = 64, MOST_UPDATE_BLOCKS = 64 }; /* enough on their way to keep the bus to the host busy */
 enum { TURN_THREADS = 256 }; /* more: bodies that are moved again have a thread each, side by side */
 
-/* ---- edits ----------------------------------------------------------------------------------------------------- */
+/* ---- updates --------------------------------------------------------------------------------------------------- */
 
-/* SADMM_EDIT_JOINT. A joint that is enabled again is whole again. */
-static __device__ __forceinline__ void edit_joint(const joint_view &joints, int32_t target, const double *values)
+/* SADMM_UPDATE_JOINT. A joint that is enabled again is whole again. */
+static __device__ __forceinline__ void update_joint(const joint_view &joints, int32_t target, const double *values)
 {
     const int32_t j = target / SADMM_JOINT_TARGETS, k = target % SADMM_JOINT_TARGETS;
     sadmm_joint_def *def = &joints.joints[j].def;
@@ -42,29 +42,29 @@ static __device__ __forceinline__ void edit_joint(const joint_view &joints, int3
     const_cast<struct sadmm_joint_memory *>(joints.begin)[j].broken &= !def->enabled;
 }
 
-static __device__ __forceinline__ void edit_state(struct sadmm_rigid *body, struct sadmm_steady *steady,
-                                                  const double *values)
+static __device__ __forceinline__ void update_state(struct sadmm_rigid *body, struct sadmm_extrapolation *extrapolation,
+                                                    const double *values)
 {
-    steady_set(steady, body, values, values + 3, values + 7);
+    extrapolation_set(extrapolation, body, values, values + 3, values + 7);
 }
 
-static __device__ __forceinline__ void edit_kinematic(const kinematic_view &kinematic,
-                                                      const struct sadmm_resident_edit &edit)
+static __device__ __forceinline__ void update_kinematic(const kinematic_view &kinematic,
+                                                        const struct sadmm_resident_update &update)
 {
     struct sadmm_kinematic_body *body =
-        &const_cast<struct sadmm_kinematic_body *>(kinematic.before)[sadmm_kinematic(edit.target)];
-    const double *values = edit.values;
-    if (edit.kind == SADMM_EDIT_STATE) return edit_state(&body->rigid, &body->steady, values);
+        &const_cast<struct sadmm_kinematic_body *>(kinematic.before)[sadmm_kinematic(update.target)];
+    const double *values = update.values;
+    if (update.kind == SADMM_UPDATE_STATE) return update_state(&body->rigid, &body->extrapolation, values);
     body->target = values[0] != 0;
     for (int k = 0; k < 3; ++k) body->position[k] = values[1 + k];
     for (int k = 0; k < 4; ++k) body->orientation[k] = values[4 + k];
     body->dt = values[8];
 }
 
-static __device__ __forceinline__ void make_edit(const cuda_view &v, const struct sadmm_resident_edit &edit)
+static __device__ __forceinline__ void apply_update(const cuda_view &v, const struct sadmm_resident_update &update)
 {
-    const double *values = edit.values;
-    if (edit.kind == SADMM_EDIT_SETTINGS) {
+    const double *values = update.values;
+    if (update.kind == SADMM_UPDATE_SETTINGS) {
         struct cuda_settings *kept = (struct cuda_settings *)v.model.settings; /* its first member */
         struct sadmm_settings *settings = &kept->settings;
         int k = 0;
@@ -74,37 +74,40 @@ static __device__ __forceinline__ void make_edit(const cuda_view &v, const struc
         kept->gravity = gravity_size(settings->gravity);
         return;
     }
-    if (edit.kind == SADMM_EDIT_JOINT) return edit_joint(v.joints, edit.target, values);
-    if (edit.kind == SADMM_EDIT_GEAR) {
-        v.joints.gear[edit.target].enabled = values[0] != 0;
+    if (update.kind == SADMM_UPDATE_JOINT) return update_joint(v.joints, update.target, values);
+    if (update.kind == SADMM_UPDATE_GEAR) {
+        v.joints.gear[update.target].enabled = values[0] != 0;
         return;
     }
-    if (sadmm_body_is_kinematic(edit.target)) return edit_kinematic(v.kinematic, edit);
-    struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit.target]);
-    if (edit.kind == SADMM_EDIT_STATE) {
-        edit_state(body, const_cast<struct sadmm_steady *>(&v.step.steady_before[edit.target]), values);
+    if (sadmm_body_is_kinematic(update.target)) return update_kinematic(v.kinematic, update);
+    struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[update.target]);
+    if (update.kind == SADMM_UPDATE_STATE) {
+        update_state(body, const_cast<struct sadmm_extrapolation *>(&v.step.extrapolation_before[update.target]),
+                     values);
     } else {
         for (int k = 0; k < 6; ++k) body->wrench[k] = values[k];
         body->gravity_scale = values[6];
         for (int k = 0; k < 2; ++k) body->damping[k] = values[7 + k];
     }
 }
-static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13 &&
-                  (int)SADMM_EDIT_VALUES >= (int)JOINT_COORDINATE_NUMBERS,
+static_assert((int)SADMM_UPDATE_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_UPDATE_VALUES >= 13 &&
+                  (int)SADMM_UPDATE_VALUES >= (int)JOINT_COORDINATE_NUMBERS,
               "every kind fits");
 
-/* No two edits have the same kind and target. An edit is fetched, all of it, from the host's memory before it is known
- * to be one: the number of edits is as far away. */
-static __global__ void __launch_bounds__(EDIT_THREADS)
-    edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* No two updates have the same kind and target. An update is fetched, all of it, from the host's memory before it is
+ * known to be one: the number of updates is as far away. */
+static __global__ void __launch_bounds__(UPDATE_THREADS)
+    update_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
-    const struct cuda_edits *edits = edits_of_step(v.step.edits, v.step.edit_capacity, v.step.control->sequence);
-    const int32_t stride = (int32_t)gridDim.x * EDIT_THREADS, abort_code = v.model.live->abort_code;
-    for (int32_t i = (int32_t)(blockIdx.x * (unsigned)EDIT_THREADS + threadIdx.x); i < v.step.edit_capacity; i += stride) {
-        const struct sadmm_resident_edit edit = first_edit(edits)[i];
-        if (i >= edits->count || abort_code) return;
-        make_edit(v, edit);
+    pdl_wait_if(all_pdl(v.model.bodies));
+    const struct cuda_updates *updates = updates_of_step(v.step.updates, v.step.update_capacity,
+                                                         v.step.control->sequence);
+    const int32_t stride = (int32_t)gridDim.x * UPDATE_THREADS, abort_code = v.model.live->abort_code;
+    for (int32_t i = (int32_t)(blockIdx.x * (unsigned)UPDATE_THREADS + threadIdx.x); i < v.step.update_capacity;
+         i += stride) {
+        const struct sadmm_resident_update update = first_update(updates)[i];
+        if (i >= updates->count || abort_code) return;
+        apply_update(v, update);
     }
 }
 
@@ -119,23 +122,24 @@ static_assert(offsetof(struct sadmm_rigid, velocity) == COPIED_VELOCITY * sizeof
 
 /* Of body i, number `lane` of what it brings along. */
 static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i, int32_t lane,
-                                                  const struct sadmm_rigid *body, const struct sadmm_steady *steady)
+                                                  const struct sadmm_rigid *body,
+                                                  const struct sadmm_extrapolation *extrapolation)
 {
-    /* Every lane fetches all that any of them needs, before it is told apart: one wait for memory, not one a kind of
+    /* Every lane fetches all that any of them needs, before it is known which: one wait for memory, not one a kind of
      * lane. */
     const int32_t slot = v.step.slot_of_body[i],
                   k = lane >= COPIED_VELOCITY && lane < COPIED ? lane - COPIED_VELOCITY : 0;
     const double number = ((const double *)body)[lane < COPIED ? lane : 0], dt = v.model.settings->dt,
-                 last_dt = steady->dt, change = steady->change[k];
-    const int32_t streak = steady->streak[k / 3];
-    const uint32_t placed = steady->placed;
+                 last_dt = extrapolation->dt, change = extrapolation->change[k];
+    const int32_t streak = extrapolation->streak[k / 3];
+    const uint32_t placed = extrapolation->placed;
     const int32_t mean = body->mean;
     const vec3 force = v3_load(body->wrench), torque = v3_load(body->wrench + 3);
     const double scale = body->gravity_scale, damping[2] = {body->damping[0], body->damping[1]};
     struct sadmm_collision_body *out = &v.step.bodies[slot];
     if (lane < COPIED) ((double *)out)[lane] = number;
     if (lane >= COPIED_VELOCITY && lane < COPIED)
-        v.step.start_velocity[6 * i + k] = steady_velocity(number, streak, change, step_ratio(dt, last_dt));
+        v.step.start_velocity[6 * i + k] = extrapolate_velocity(number, streak, change, step_ratio(dt, last_dt));
     if (lane == LANE_FORCE)
         out->acceleration[0] = v3_max_abs(force) == 0 && scale == 1 && damping[0] == 0
                                    ? 0
@@ -152,7 +156,7 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
 /* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
 static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
     const int32_t lane = (int32_t)(t % START_LANES);
     if (v.model.live->abort_code) return;
@@ -163,7 +167,7 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
         v.step.control->joints = {};
     }
     if (i >= v.model.bodies) return;
-    start_body(v, i, lane, &v.step.before[i], &v.step.steady_before[i]);
+    start_body(v, i, lane, &v.step.before[i], &v.step.extrapolation_before[i]);
 }
 
 /* ---- gates ----------------------------------------------------------------------------------------------------- */
@@ -171,7 +175,7 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
 /* One thread. What was found is this step's when it fits. */
 static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     if (threadIdx.x > 0 || v.model.live->abort_code) return;
     const struct sadmm_cuda_contact_counts counts = *v.step.counts;
     v.step.control->stamps[STAMP_FOUND] = nanoseconds();
@@ -288,9 +292,9 @@ static __device__ __forceinline__ bool moves_again(const cuda_view &v)
     return again || (closed && unpressed);
 }
 
-/* What is pushed is moved again before it is. A thread a body. */
+/* What is pushed is moved again before it is pushed. A thread a body. */
 static __global__ void __launch_bounds__(TURN_THREADS)
-    settle_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+    move_again_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)TURN_THREADS + threadIdx.x);
     if (i >= v.model.bodies || v.model.live->abort_code || !as_planned(v.model, v.step)) return;
@@ -301,14 +305,14 @@ static __global__ void __launch_bounds__(TURN_THREADS)
 /* Has the step no need of a second problem, or one that fits (step/push.h)? Once all contacts have spoken. */
 static __device__ __forceinline__ bool pushes_as_planned(const push_view &push)
 {
-    return !push.bits || push.due[push.planned ? PUSH_MISFIT : PUSH_DUE] == 0;
+    return !push.bits || push.due[push.planned ? PUSH_MISPREDICTED : PUSH_DUE] == 0;
 }
 
 /* Sub-steps with pushes, this one included. */
 static __device__ __forceinline__ int32_t count_pushed(const push_view &push, int32_t before)
 {
     if (!push.bits || before < 0) return before;
-    return push.due[PUSH_MISFIT] ? -1 : before + (push.due[PUSH_DUE] != 0);
+    return push.due[PUSH_MISPREDICTED] ? -1 : before + (push.due[PUSH_DUE] != 0);
 }
 
 /* ---- turn ------------------------------------------------------------------------------------------------------ */
@@ -350,15 +354,15 @@ static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cu
 static __global__ void __launch_bounds__(TURN_THREADS, 4)
     turn_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int64_t t = (int64_t)blockIdx.x * TURN_THREADS + threadIdx.x, i = t / START_LANES,
                   own = (int64_t)blockIdx.x * (TURN_THREADS / START_LANES) + threadIdx.x;
     const int32_t lane = (int32_t)(t % START_LANES);
     struct cuda_step_control *control = v.step.control;
     if (v.model.live->abort_code) return;
     const bool articulated = v.joints.count > 0 && !v.joints.apart, again = moves_again(v),
-               settles = (again || articulated) && !v.push.planned, any = settles || rolls_again(v);
-    if (settles && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
+               moves = (again || articulated) && !v.push.planned, any = moves || rolls_again(v);
+    if (moves && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
         move_once_more(v, (int32_t)own, again, articulated);
     if (articulated) end_joints(v, (int32_t)t);
     if (any) __syncthreads(); /* threads of a block start bodies that others of it have moved */
@@ -376,7 +380,7 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
         else control->joints = {};
     }
     if (i >= v.model.bodies) return;
-    start_body(v, i, lane, &v.step.after[i], &v.step.steady_after[i]);
+    start_body(v, i, lane, &v.step.after[i], &v.step.extrapolation_after[i]);
 }
 
 /* ---- commit ---------------------------------------------------------------------------------------------------- */
@@ -385,7 +389,7 @@ static __device__ double double_of(unsigned long long bits) { return __longlong_
 
 /* Threads a body: in small worlds as many as keep what it rolls by; in others, where that would be a burden when nothing
  * rolls, one. */
-static __host__ __device__ inline int32_t commit_lanes(int32_t bodies) { return all_early(bodies) ? LANES : 1; }
+static __host__ __device__ inline int32_t commit_lanes(int32_t bodies) { return all_pdl(bodies) ? LANES : 1; }
 
 static __device__ __forceinline__ void commit_bodies(const cuda_view &v, int32_t thread, bool articulated)
 {
@@ -407,7 +411,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     const int32_t aborted = v.model.live->abort_code;
     struct cuda_step_control *control = v.step.control;
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x), body_blocks = args.most_bodies;
-    wait_for_stream();
+    pdl_wait();
     if (!reports) {
         /* Blocks that begin late may see what the report says of the step: only where what they move is of no use. */
         const bool on = !aborted && planned, articulated = on && v.joints.count > 0 && !v.joints.apart;
@@ -443,12 +447,12 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
 /* ---- launches -------------------------------------------------------------------------------------------------- */
 
 /* Of the step whose turn it is on the device. */
-sadmm_status CUDA(launch_edits)(struct sadmm_context *c, struct sadmm_error *error)
+sadmm_status CUDA(launch_updates)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = {};
-    const int64_t blocks = ((int64_t)c->step->edit_capacity + EDIT_THREADS - 1) / EDIT_THREADS;
-    return CUDA(launch_of)(c, edit_kernel, "edit", std::min<int64_t>(blocks, MOST_EDIT_BLOCKS), EDIT_THREADS, &args,
-                           error);
+    const int64_t blocks = ((int64_t)c->step->update_capacity + UPDATE_THREADS - 1) / UPDATE_THREADS;
+    return CUDA(launch_of)(c, update_kernel, "update", std::min<int64_t>(blocks, MOST_UPDATE_BLOCKS), UPDATE_THREADS,
+                           &args, error);
 }
 
 sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *error)
@@ -475,11 +479,11 @@ sadmm_status CUDA(launch_turn)(struct sadmm_context *c, struct sadmm_error *erro
     return CUDA(launch_of)(c, turn_kernel, "turn", blocks, TURN_THREADS, &args, error);
 }
 
-sadmm_status CUDA(launch_settle)(struct sadmm_context *c, struct sadmm_error *error)
+sadmm_status CUDA(launch_move_again)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = {};
     const int64_t blocks = ((int64_t)c->view.model.bodies + TURN_THREADS - 1) / TURN_THREADS;
-    return CUDA(launch_late)(c, settle_kernel, "settle", blocks, TURN_THREADS, &args, error);
+    return CUDA(launch_without_pdl)(c, move_again_kernel, "move again", blocks, TURN_THREADS, &args, error);
 }
 
 sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *error)
@@ -496,5 +500,5 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *er
     const int64_t joints = moved_last(c), bodies = c->view.step.limits || joints ? c->view.model.bodies : 0;
     args.most_bodies = (int32_t)((bodies * commit_lanes((int32_t)bodies) + STEP_THREADS - 1) / STEP_THREADS);
     const int64_t blocks = args.most_bodies + (joints + STEP_THREADS - 1) / STEP_THREADS + 1;
-    return CUDA(launch_early)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
+    return CUDA(launch_pdl)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
 }

@@ -9,8 +9,8 @@
 #include "backend_cuda/device/double.h"
 
 #include "backend_cuda/device/plan_check.h"
+#include "core/model/extrapolation.h"
 #include "core/model/kinematic.h"
-#include "core/model/steady.h"
 #include "world.h"
 
 /* ---- start ------------------------------------------------------------------------------------------------------- */
@@ -25,7 +25,7 @@ static __device__ __forceinline__ void place(const cuda_view &v, int32_t slot, c
 
 static __global__ void kinematic_start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t k = thread_index();
     if (k >= v.kinematic.count || v.model.live->abort_code) return;
     const struct sadmm_kinematic_body body = v.kinematic.before[k];
@@ -35,14 +35,14 @@ static __global__ void kinematic_start_kernel(const __grid_constant__ cuda_view 
     double *velocity = const_cast<double *>(v.raw.system.kinematic) + 6 * (size_t)k;
     for (int j = 0; j < 6; ++j) velocity[j] = moving.velocity[j];
     place(v, body.slot, &moving);
-    v.step.bodies[body.slot].placed = body.steady.placed;
+    v.step.bodies[body.slot].placed = body.extrapolation.placed;
 }
 
 /* ---- what they support ------------------------------------------------------------------------------------------- */
 
 static __global__ void support_clear_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t i = thread_index();
     if (i == 0) *v.kinematic.moves = *v.kinematic.supports = 0;
     if (i >= v.model.bodies) return;
@@ -64,7 +64,7 @@ static __device__ __forceinline__ int32_t label_of(const graph_view &graph, int3
 /* A thread a pair; then one a constraint of joints. */
 static __global__ void support_find_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t p = thread_index(), r = p - v.contacts.pair_capacity;
     if (r >= 0) {
         if (r >= live_rows(v.model, v.rows) || v.raw.constraints[r].count == 0) return;
@@ -80,7 +80,7 @@ static __global__ void support_find_kernel(const __grid_constant__ cuda_view v, 
 
 static __global__ void support_compare_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t p = thread_index();
     if (p >= live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
@@ -93,7 +93,7 @@ static __global__ void support_compare_kernel(const __grid_constant__ cuda_view 
 
 static __global__ void support_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     const int32_t label = v.graph.label[i], pair = v.kinematic.support[label];
@@ -112,7 +112,7 @@ static __global__ void support_kernel(const __grid_constant__ cuda_view v, const
 
 /* ---- finish ------------------------------------------------------------------------------------------------------ */
 
-/* Pairs that a block looks at in one go, and of which it adds up the points' impulses. */
+/* Pairs that a block inspects in one go, and of which it adds up the points' impulses. */
 enum { KINEMATIC_THREADS = 256, KINEMATIC_PAIRS = 64, KINEMATIC_LANES = KINEMATIC_THREADS / KINEMATIC_PAIRS,
        KINEMATIC_WARPS = KINEMATIC_THREADS / WARP };
 
@@ -190,8 +190,8 @@ static __device__ __forceinline__ double add_pairs(const struct kinematic_shared
 static __global__ void __launch_bounds__(KINEMATIC_THREADS)
     kinematic_finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin();
+    pdl_wait();
+    pdl_trigger();
     CUDA_DYNAMIC_SHARED(memory);
     struct kinematic_shared *shared = (struct kinematic_shared *)memory;
     const int32_t k = (int32_t)blockIdx.x, t = (int32_t)threadIdx.x, pairs = live_pairs(v.model);

@@ -8,8 +8,8 @@
 #include "backend_cuda/device/wide.h"
 #include "backend_cuda/iterate/slow.h"
 #include "backend_cuda/iterate/solution.h"
+#include "core/model/extrapolation.h"
 #include "core/model/joint_trapezoid.h"
-#include "core/model/steady.h"
 
 /* Bits of an island where nobody has said anything else. */
 enum { TOUCH_AS_A_RULE = TOUCH_INNER | TOUCH_FRICTION };
@@ -24,12 +24,12 @@ static __device__ __forceinline__ bool finite_numbers(const double *x, int count
 /* A body as the step began. */
 struct body_before {
     struct sadmm_rigid body;
-    struct sadmm_steady steady;
+    struct sadmm_extrapolation extrapolation;
 };
 
 static __device__ __forceinline__ body_before fetch_body(const cuda_step_view &step, int32_t i)
 {
-    const body_before before = {*wide_at(step.before, (size_t)i), step.steady_before[i]};
+    const body_before before = {*wide_at(step.before, (size_t)i), step.extrapolation_before[i]};
     return before;
 }
 
@@ -62,16 +62,16 @@ static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int
 static __device__ __forceinline__ void store_moved(const cuda_view &v, int32_t i, const body_before &before,
                                                    const double place[PLACE], bool mean, double dt)
 {
-    struct sadmm_steady steady = before.steady;
+    struct sadmm_extrapolation extrapolation = before.extrapolation;
     struct sadmm_rigid next = before.body;
     for (int k = 0; k < 3; ++k) next.position[k] = place[k];
     for (int k = 0; k < 4; ++k) next.orientation[k] = place[3 + k];
     for (int k = 0; k < 6; ++k) next.velocity[k] = place[7 + k];
     rolling_forget(&next);
     next.mean = mean;
-    steady_keep(&steady, &before.body, &next, dt);
+    extrapolation_keep(&extrapolation, &before.body, &next, dt);
     store_first<offsetof(struct sadmm_rigid, owed)>(next, &v.step.after[i]); /* nothing is owed yet */
-    v.step.steady_after[i] = steady;
+    v.step.extrapolation_after[i] = extrapolation;
 }
 
 #endif

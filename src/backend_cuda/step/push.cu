@@ -23,14 +23,14 @@ static __global__ void push_rows_kernel(const __grid_constant__ cuda_view v, con
 }
 
 /* A thread a pair. */
-static __global__ void push_tell_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+static __global__ void push_report_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t p = thread_index();
     const bool live = p < live_pairs(v.model);
     double gap = 0;
     for (int32_t k = 0; live && k < v.raw.pairs[p].count; ++k)
         gap = min_of(gap, v.raw.points[v.raw.pairs[p].first + k].gap);
-    tell_push(v, live ? p : -1, gap);
+    report_push(v, live ? p : -1, gap);
 }
 
 /* e of the step's problem: what overlaps is not to come nearer, and no more. A thread a pair, capacity included. */
@@ -100,7 +100,7 @@ static __global__ void push_kind_kernel(const __grid_constant__ cuda_view v, con
     if (args.begin) {
         *kind = kind_of(v, (int32_t)(all >> 32));
     } else if (*kind && v.push.live->abort_code == ABORT_PARTITION) { /* of the layout */
-        v.push.due[PUSH_MISFIT] = 1;
+        v.push.due[PUSH_MISPREDICTED] = 1;
         *kind = 0;
     }
     const struct cuda_live live = {*kind & args.count ? ABORT_NONE : ABORT_PLAN, v.model.bodies, (int32_t)(all >> 32),
@@ -125,10 +125,10 @@ static __global__ void push_way_kernel(const __grid_constant__ cuda_view v, cons
 static __device__ __forceinline__ void keep_pushed(const cuda_view &v, int32_t i, double dt)
 {
     const body_before before = fetch_body(v.step, i);
-    struct sadmm_steady steady = before.steady;
+    struct sadmm_extrapolation extrapolation = before.extrapolation;
     const struct sadmm_rigid *next = &v.step.after[i];
-    steady_keep(&steady, &before.body, next, dt);
-    v.step.steady_after[i] = steady;
+    extrapolation_keep(&extrapolation, &before.body, next, dt);
+    v.step.extrapolation_after[i] = extrapolation;
     if (!finite_numbers(next->position, 3) || !finite_numbers(next->orientation, 4) ||
         !finite_numbers(next->velocity, 6))
         atomicMin(&v.step.control->offending_body, i);
@@ -174,7 +174,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
                            struct sadmm_error *error)
 {
     const cuda_args args = {};
-    return CUDA(launch_late)(c, kernel, name, blocks_for(threads), THREADS, &args, error);
+    return CUDA(launch_without_pdl)(c, kernel, name, blocks_for(threads), THREADS, &args, error);
 }
 
 sadmm_status CUDA(launch_push_choice)(struct sadmm_context *c, struct sadmm_error *error)
@@ -183,7 +183,7 @@ sadmm_status CUDA(launch_push_choice)(struct sadmm_context *c, struct sadmm_erro
     cuda_buffer *sort = &c->buffers[BUFFER_PUSH_SORT];
     size_t bytes = sort->capacity;
     TRY(launch(c, push_rows_kernel, "islands with rows", v->rows.count, error));
-    TRY(launch(c, push_tell_kernel, "pushes of islands", v->contacts.pair_capacity, error));
+    TRY(launch(c, push_report_kernel, "pushes of islands", v->contacts.pair_capacity, error));
     TRY(launch(c, push_hold_kernel, "pushed contacts", v->contacts.pair_capacity, error));
     CUDA_CALL(c,
               COLLISION(sum)(sort->data, &bytes, v->push.points, v->push.places, v->contacts.pair_capacity, c->stream),
@@ -203,7 +203,7 @@ sadmm_status CUDA(launch_push_kind)(struct sadmm_context *c, bool first, int kin
     cuda_args args = {};
     args.begin = first;
     args.count = kinds;
-    return CUDA(launch_late)(c, push_kind_kernel, "kind of the second problem", 1, WARP, &args, error);
+    return CUDA(launch_without_pdl)(c, push_kind_kernel, "kind of the second problem", 1, WARP, &args, error);
 }
 
 sadmm_status CUDA(launch_push_move)(struct sadmm_context *c, struct sadmm_error *error)
@@ -228,7 +228,7 @@ static sadmm_status reserve_second(struct sadmm_context *c, struct sadmm_error *
     p->statistics = c->statistics;
     p->wanted = s->push_streams ? SADMM_CUDA_TIER_STREAM : SADMM_CUDA_TIER_AUTO;
     v->model.bodies = s->bodies;
-    v->model.settings = c->view.model.settings; /* the same numbers, whatever edits make of them */
+    v->model.settings = c->view.model.settings; /* the same numbers, whatever updates make of them */
     v->model.points = 0;
     v->contacts.pair_capacity = c->view.contacts.pair_capacity;
     v->raw.system = c->view.raw.system;
@@ -261,7 +261,7 @@ void CUDA(plan_second)(struct sadmm_context *c, bool warm)
     p->plan = c->plan;
     if (p->plan.points == 0) p->plan.points = 1; /* they come in a later sub-step */
     p->plan.row_constraints = 0;
-    sadmm_plan_settle(&p->plan, &settings, warm);
+    sadmm_plan_complete(&p->plan, &settings, warm);
     CUDA(plan_settings)(p, &settings);
     p->view.model.warm_start = p->plan.warm_start;
     p->view.model.contact_rows = c->view.model.contact_rows;

@@ -33,7 +33,7 @@ static __device__ __forceinline__ int add_units_of(unsigned long long *to, int64
 
 /* A pair, whose deepest point has this gap, to its island; -1: none. Lanes that speak of one island do it together.
  * Every lane of the warp comes here; by itself: the others should not pay in registers. */
-static __device__ __noinline__ void tell_push(const cuda_view &v, int32_t p, double gap)
+static __device__ __noinline__ void report_push(const cuda_view &v, int32_t p, double gap)
 {
     const unsigned all = (unsigned)ALL_LANES;
     struct push_share share = {};

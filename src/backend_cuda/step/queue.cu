@@ -12,39 +12,39 @@
 
 static struct queued_step *slot_of(struct cuda_step *s, int64_t sequence) { return &s->queue[sequence % STEPS_AHEAD]; }
 
-/* Plan and record, if need be, once nothing is running. What a step is like is seen with its edits made. */
-static sadmm_status prepare(struct sadmm_context *c, bool edited, struct sadmm_error *error)
+/* Plan and record, if need be, once nothing is running. What a step is like is seen with its updates made. */
+static sadmm_status prepare(struct sadmm_context *c, bool with_updates, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    struct step_graphs *graphs = &s->graphs[edited];
+    struct step_graphs *graphs = &s->graphs[with_updates];
     if (s->planned && graphs->recorded) return SADMM_OK;
     TRY(CUDA(wait)(c, error)); /* reports are seen before the last blocks of a step have ended */
-    if (!s->planned) TRY(CUDA(guess_step)(c, error));
+    if (!s->planned) TRY(CUDA(speculate)(c, error));
     if (graphs->recorded) return SADMM_OK;
-    for (int into = 0; into < 2; ++into) TRY(CUDA(record_step)(c, edited, into, error));
+    for (int into = 0; into < 2; ++into) TRY(CUDA(record_step)(c, with_updates, into, error));
     graphs->recorded = true;
     return SADMM_OK;
 }
 
-/* Edits are launched before the step, by themselves; once they are seen to come again and again they are in graphs of
+/* Updates are launched before the step, by themselves; once they are seen to come again and again they are in graphs of
  * their own, which takes less, but is recorded once more. */
-enum { FEW_EDITED = 16 };
+enum { FEW_UPDATED = 16 };
 
 static sadmm_status launch_step(struct sadmm_context *c, int64_t sequence, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    const bool edits = slot_of(s, sequence)->edit_count > 0;
-    s->edited += edits;
-    const bool edited = edits && s->planned && s->edited > FEW_EDITED;
-    if (edits && !edited) {
+    const bool updates = slot_of(s, sequence)->update_count > 0;
+    s->updated_steps += updates;
+    const bool with_updates = updates && s->planned && s->updated_steps > FEW_UPDATED;
+    if (updates && !with_updates) {
         CUDA(view_into)(c, s->into, 0);
-        TRY(CUDA(launch_edits)(c, error));
+        TRY(CUDA(launch_updates)(c, error));
     }
-    TRY(prepare(c, edited, error));
+    TRY(prepare(c, with_updates, error));
     slot_of(s, sequence)->hits = takes_hits(c);
     c->kernel = "a step's graph";
     ((volatile struct cuda_step_report *)&step_reports(c)[sequence % STEPS_AHEAD])->ready = 0;
-    CUDA_CALL(c, cudaGraphLaunch(s->graphs[edited].into[s->into], c->stream), "cudaGraphLaunch");
+    CUDA_CALL(c, cudaGraphLaunch(s->graphs[with_updates].into[s->into], c->stream), "cudaGraphLaunch");
     CUDA_CALL(c, cudaEventRecord(slot_of(s, sequence)->done, c->stream), "cudaEventRecord");
     s->into = 1 - s->into;
     return SADMM_OK;
@@ -52,10 +52,10 @@ static sadmm_status launch_step(struct sadmm_context *c, int64_t sequence, struc
 
 /* ---- seeing and repeating -------------------------------------------------------------------------------------- */
 
-/* Forget the steps from `first` to `end`, which have not been done, and their edits: the caller gives these again. */
+/* Forget the steps from `first` to `end`, which have not been done, and their updates: the caller gives these again. */
 static void drop_steps(struct sadmm_context *c, int64_t first, int64_t end)
 {
-    for (int64_t sequence = first; sequence < end; ++sequence) slot_of(c->step, sequence)->edit_count = 0;
+    for (int64_t sequence = first; sequence < end; ++sequence) slot_of(c->step, sequence)->update_count = 0;
     memset(c->numbers, 0, sizeof c->numbers);
 }
 
@@ -74,8 +74,8 @@ static sadmm_status repeat_steps(struct sadmm_context *c, int64_t first, int64_t
     return SADMM_OK;
 }
 
-/* Steps that look for candidates in every sub-step, once shapes have left their reach. */
-enum { CAREFUL_STEPS = 64 };
+/* Steps that search for candidates in every sub-step, once shapes have left their reach. */
+enum { CONSERVATIVE_STEPS = 64 };
 
 /* A later sub-step of the step `first` was not as planned: the next plan is made for it, too. Those behind it are taken
  * to be like it. */
@@ -110,7 +110,7 @@ static void see_articulations(struct sadmm_context *c, const struct cuda_step_re
     struct cuda_step *s = c->step;
     if (s->apart) return;
     s->untouched = CUDA(may_be_apart)(c) && !report->joints.together ? s->untouched + 1 : 0;
-    if (s->untouched >= s->patience) s->planned = false;
+    if (s->untouched >= s->backoff) s->planned = false;
 }
 
 /* A step was done that was planned to have pushes. */
@@ -161,8 +161,8 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     const bool together = s->apart && report->abort_code == ABORT_PLAN && report->joints.together;
     if (together) {
         s->untouched = 0;
-        s->misfit = -1; /* another partition */
-        s->patience = std::min(2 * s->patience, (int32_t)MOST_PATIENCE);
+        s->mispredicted = -1; /* another partition */
+        s->backoff = std::min(2 * s->backoff, (int32_t)MOST_BACKOFF);
     }
     if (report->abort_code == ABORT_CAPACITY)
         s->candidate_capacity = std::max(s->candidate_capacity, generous(report->counts.candidates));
@@ -170,8 +170,8 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the
          * same. Sub-steps that no plan was made for yet do not count. */
         const bool known = report->substep == 0 || (s->learned.step == first && report->substep <= s->learned.substep);
-        if (s->misfit == first && known) c->refused |= 1u << c->partition.tier;
-        s->misfit = first;
+        if (s->mispredicted == first && known) c->refused |= 1u << c->partition.tier;
+        s->mispredicted = first;
     }
     if (report->abort_code == ABORT_PLAN && report->totals.pushed != 0) {
         s->pushes = true;
@@ -179,7 +179,7 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         s->quiet = 0;
     }
     if (report->abort_code == ABORT_HITS) CUDA(plan_hits)(c);
-    else if (report->abort_code == ABORT_REACH) s->careful = CAREFUL_STEPS;
+    else if (report->abort_code == ABORT_REACH) s->conservative = CONSERVATIVE_STEPS;
     else if (together) s->learned.step = -1; /* nothing is known of it with its rows */
     else if (report->substep > 0) learn(c, first, report);
     return repeat_steps(c, first, end, error);
@@ -189,10 +189,10 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
  * and then: a step that has failed makes no report. */
 static cudaError_t wait_for_report(const struct sadmm_context *c, int64_t sequence)
 {
-    enum { LOOKS = 1 << 14 }; /* some 10 us between questions, each of which takes longer than many looks */
+    enum { POLLS = 1 << 14 }; /* some 10 us between queries, each of which takes longer than many polls */
     const volatile int64_t *ready = &step_reports(c)[sequence % STEPS_AHEAD].ready;
-    for (int look = 0; look % LOOKS == 0 || *ready != sequence + 1; ++look) {
-        if (look % LOOKS > 0) continue;
+    for (int poll = 0; poll % POLLS == 0 || *ready != sequence + 1; ++poll) {
+        if (poll % POLLS > 0) continue;
         const cudaError_t code = cudaEventQuery(slot_of(c->step, sequence)->done);
         if (code != cudaErrorNotReady) return code;
     }
@@ -211,13 +211,13 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     if (report.abort_code != ABORT_NONE) return recover(c, s->seen, &report, error);
     s->last = report;
     struct queued_step *q = slot_of(s, s->seen);
-    q->edit_count = 0;
+    q->update_count = 0;
     s->last_settings = q->settings;
     s->last_hits = q->hits;
     s->time += q->settings.dt;
     ++s->seen;
     ++s->done;
-    if (s->careful > 0 && --s->careful == 0) s->planned = false;
+    if (s->conservative > 0 && --s->conservative == 0) s->planned = false;
     see_articulations(c, &report);
     see_pushes(c, &report);
     see_hits(c, &report);
@@ -243,53 +243,54 @@ static sadmm_status next_place(struct sadmm_context *c, struct sadmm_error *erro
     return SADMM_OK;
 }
 
-/* Room for so many edits a step. Nothing is enqueued. */
-static sadmm_status reserve_edits(struct sadmm_context *c, size_t count, struct sadmm_error *error)
+/* Room for so many updates a step. Nothing is enqueued. */
+static sadmm_status reserve_updates(struct sadmm_context *c, size_t count, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    const size_t capacity = sadmm_grown_capacity((size_t)s->edit_capacity, count, 64);
+    const size_t capacity = sadmm_grown_capacity((size_t)s->update_capacity, count, 64);
     if (capacity > INT32_MAX)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu changes in a step: too many, at most %d", count, INT32_MAX);
-    s->edit_capacity = 0; /* if there is no memory */
-    TRY(CUDA(reserve)(c, PINNED_EDITS,
-                      STEPS_AHEAD * (sizeof(struct cuda_edits) + capacity * sizeof(struct sadmm_resident_edit)), error));
-    s->edit_capacity = (int32_t)capacity;
-    s->graphs[true].recorded = false; /* they know where edits are */
+    s->update_capacity = 0; /* if there is no memory */
+    TRY(CUDA(reserve)(c, PINNED_UPDATES,
+                      STEPS_AHEAD * (sizeof(struct cuda_updates) + capacity * sizeof(struct sadmm_resident_update)),
+                      error));
+    s->update_capacity = (int32_t)capacity;
+    s->graphs[true].recorded = false; /* they know where updates are */
     return SADMM_OK;
 }
 
-/* The edits of a step, and the settings' numbers where the device has others, into its place in the queue, which has
+/* The updates of a step, and the settings' numbers where the device has others, into its place in the queue, which has
  * room for them. */
-static void take_edits(struct sadmm_context *c, int64_t sequence, const struct sadmm_settings *settings,
-                       const struct sadmm_resident_edit *edits, size_t count)
+static void take_updates(struct sadmm_context *c, int64_t sequence, const struct sadmm_settings *settings,
+                         const struct sadmm_resident_update *updates, size_t count)
 {
     struct queued_step *q = slot_of(c->step, sequence);
-    struct sadmm_resident_edit numbers = {SADMM_EDIT_SETTINGS, 0, {}};
+    struct sadmm_resident_update numbers = {SADMM_UPDATE_SETTINGS, 0, {}};
     const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     sadmm_settings_numbers(&share, numbers.values);
     const bool other = memcmp(numbers.values, c->numbers, sizeof c->numbers) != 0;
-    struct cuda_edits *to = const_cast<struct cuda_edits *>(
-        edits_of_step(buffer<struct cuda_edits>(c, PINNED_EDITS), c->step->edit_capacity, sequence));
-    struct sadmm_resident_edit *at = const_cast<struct sadmm_resident_edit *>(first_edit(to));
-    if (count > 0) memcpy(at, edits, count * sizeof *edits);
+    struct cuda_updates *to = const_cast<struct cuda_updates *>(
+        updates_of_step(buffer<struct cuda_updates>(c, PINNED_UPDATES), c->step->update_capacity, sequence));
+    struct sadmm_resident_update *at = const_cast<struct sadmm_resident_update *>(first_update(to));
+    if (count > 0) memcpy(at, updates, count * sizeof *updates);
     if (other) at[count] = numbers;
-    q->edit_count = count + other;
-    to->count = (int64_t)q->edit_count;
+    q->update_count = count + other;
+    to->count = (int64_t)q->update_count;
     memcpy(c->numbers, numbers.values, sizeof c->numbers);
     q->settings = *settings;
 }
 
 extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct sadmm_settings *settings,
-                                         const struct sadmm_resident_edit *edits, size_t count,
+                                         const struct sadmm_resident_update *updates, size_t count,
                                          struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
     const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     CUDA_ENTER(c);
     TRY(next_place(c, error));
-    if (count >= (size_t)s->edit_capacity) { /* settings may be one more */
+    if (count >= (size_t)s->update_capacity) { /* settings may be one more */
         TRY(see_all(c, error));
-        TRY(reserve_edits(c, count + 1, error));
+        TRY(reserve_updates(c, count + 1, error));
     }
     if (!sadmm_settings_same_but_numbers(&c->settings, &share)) {
         TRY(see_all(c, error));
@@ -297,7 +298,7 @@ extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct s
     }
     if (!s->planned) TRY(see_all(c, error));
     CUDA(plan_settings)(c, &share); /* kernels know sub-steps alone */
-    take_edits(c, s->enqueued, settings, edits, count);
+    take_updates(c, s->enqueued, settings, updates, count);
     const sadmm_status status = launch_step(c, s->enqueued, error);
     if (status != SADMM_OK) {
         drop_steps(c, s->enqueued, s->enqueued + 1);
@@ -320,7 +321,7 @@ extern "C" sadmm_status CUDA(wait_world)(struct sadmm_context *c, struct sadmm_r
         *error = later;
         status = SADMM_ERROR_DEVICE;
     }
-    COLLISION(settle)(s->collision, 1 - s->into, s->last.counts);
+    COLLISION(set_current)(s->collision, 1 - s->into, s->last.counts);
     CUDA(report_step)(c, out);
     return status;
 }

@@ -56,14 +56,15 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
 /* ---- entries --------------------------------------------------------------------------------------------------- */
 
 extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_rigid *rigid,
-                                          struct sadmm_steady *steady, double *wrench, struct sadmm_error *error)
+                                          struct sadmm_extrapolation *extrapolation, double *wrench,
+                                          struct sadmm_error *error)
 {
     const struct cuda_step *s = c->step;
     const size_t n = (size_t)s->bodies;
     CUDA_ENTER(c);
     CUDA(view_into)(c, s->into, 0);
     TRY(CUDA(get)(c, rigid, c->view.step.before, n * sizeof *rigid, error));
-    TRY(CUDA(get)(c, steady, c->view.step.steady_before, n * sizeof *steady, error));
+    TRY(CUDA(get)(c, extrapolation, c->view.step.extrapolation_before, n * sizeof *extrapolation, error));
     return CUDA(get)(c, wrench, buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * n,
                      6 * n * sizeof *wrench, error);
 }

@@ -13,12 +13,12 @@ static struct sadmm_cuda_find find_of(const struct sadmm_context *c, int substep
 {
     const struct cuda_step *s = c->step;
     const int substeps = c->settings.substeps;
-    const bool hits = takes_hits(c), alone = s->careful > 0 || hits; /* each with candidates of its own */
+    const bool hits = takes_hits(c), alone = s->conservative > 0 || hits; /* each with candidates of its own */
     const struct sadmm_cuda_find find = {step_state(s->into, substep - 1, substeps),
                                          step_state(s->into, substep, substeps),
                                          alone ? 0 : substep,
                                          alone ? 1 : substeps,
-                                         all_begin_early(c),
+                                         all_use_pdl(c),
                                          hits ? &s->hits : nullptr,
                                          c->view.step.leaves_hits ? &c->view.model.settings->restitution_threshold
                                                                   : nullptr};
@@ -78,10 +78,10 @@ struct side_branch {
 
 /* What the iterating kernels do about energies. With convergence checks an island may have more iterations after them.
  */
-static enum cuda_limit limit_by_iterations(const struct sadmm_context *c)
+static enum cuda_energy_limit energy_limit_by_iterations(const struct sadmm_context *c)
 {
-    if (!c->plan.limit || c->partition.tier == SADMM_CUDA_TIER_STREAM || c->plan.residuals) return LIMIT_NONE;
-    return c->prologue && !stop_rule_checked(c) ? LIMIT_WHOLE : LIMIT_SUSPECTS;
+    if (!c->plan.energy_limit || c->partition.tier == SADMM_CUDA_TIER_STREAM || c->plan.residuals) return LIMIT_NONE;
+    return c->prologue && !stop_rule_checked(c) ? LIMIT_WHOLE : LIMIT_CANDIDATES;
 }
 
 /* What is planned and seen from here on is sub-step `substep`. */
@@ -90,9 +90,9 @@ static void view_substep(struct sadmm_context *c, int substep)
     struct cuda_step *s = c->step;
     const struct substep_plan *plan = &s->plans[substep];
     c->plan = plan->plan;
-    s->guess.contact_rows = plan->contact_rows;
-    s->guess.warm = plan->warm;
-    s->guess.rows = plan->rows;
+    s->speculation.contact_rows = plan->contact_rows;
+    s->speculation.warm = plan->warm;
+    s->speculation.rows = plan->rows;
     c->view.model.contact_rows = plan->contact_rows == 1 ? 1 : 3;
     CUDA(view_into)(c, s->into, substep);
     c->prologue = c->fast && !c->plan.residuals && c->view.rows.count == 0 && c->view.model.contact_rows == 3 &&
@@ -222,12 +222,12 @@ static sadmm_status record_motions(struct sadmm_context *c, struct sadmm_error *
     return SADMM_OK;
 }
 
-static sadmm_status record_limit(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
+static sadmm_status record_energy_limit(struct sadmm_context *c, bool candidates, struct sadmm_error *error)
 {
     TRY(CUDA(enqueue_pushed)(c, error));
     if (motions_beside(c)) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     else TRY(CUDA(enqueue_motions)(c, error));
-    return CUDA(enqueue_limit)(c, suspected, error);
+    return CUDA(enqueue_energy_limit)(c, candidates, error);
 }
 
 /* What joints keep, once their bodies have been solved after the iterations; beside that the end of the step, which
@@ -268,7 +268,7 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
 
 /* Stages that both problems have alike. */
 static sadmm_status record_solving(struct sadmm_context *c, const struct sadmm_stage *stage, bool *residuals,
-                                   enum cuda_limit limit, struct sadmm_error *error)
+                                   enum cuda_energy_limit limit, struct sadmm_error *error)
 {
     switch (stage->kind) {
     case SADMM_STAGE_ITERATE:
@@ -278,7 +278,7 @@ static sadmm_status record_solving(struct sadmm_context *c, const struct sadmm_s
         *residuals = stage->last;
         return stage->last || stop_rule_checked(c) ? SADMM_OK : CUDA(enqueue_residuals)(c, error);
     case SADMM_STAGE_CHECK: return CUDA(enqueue_convergence_check)(c, stage->done, error);
-    case SADMM_STAGE_REWEIGH: return CUDA(enqueue_weights)(c, true, error);
+    case SADMM_STAGE_WEIGHTS: return CUDA(enqueue_weights)(c, true, error);
     case SADMM_STAGE_BALANCE: /* the ratio of (15) is found on the device */
         TRY(CUDA(enqueue_balance)(c, error));
         return CUDA(factorize)(c, error);
@@ -296,10 +296,10 @@ static sadmm_status record_second_stage(struct sadmm_context *p, const struct sa
     case SADMM_STAGE_PENALTY: /* nothing is compared with a plan */
         TRY(CUDA(init_penalty)(p, error));
         return CUDA(factorize)(p, error);
-    case SADMM_STAGE_LIMIT:
+    case SADMM_STAGE_ENERGY_LIMIT:
         TRY(CUDA(enqueue_pushed)(p, error));
         TRY(CUDA(enqueue_motions)(p, error));
-        return CUDA(enqueue_limit)(p, false, error);
+        return CUDA(enqueue_energy_limit)(p, false, error);
     default: return record_solving(p, stage, &residuals, LIMIT_NONE, error);
     }
 }
@@ -333,7 +333,7 @@ static sadmm_status record_push(struct sadmm_context *c, struct sadmm_error *err
 {
     struct sadmm_context *p = c->step->push;
     const cudaStream_t own = p->stream;
-    TRY(CUDA(launch_settle)(c, error));
+    TRY(CUDA(launch_move_again)(c, error));
     TRY(CUDA(launch_push_gather)(c, error));
     p->stream = c->stream;
     p->recording = true;
@@ -347,7 +347,7 @@ static sadmm_status record_push(struct sadmm_context *c, struct sadmm_error *err
 static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_stage *stage, bool *residuals,
                                  struct sadmm_error *error)
 {
-    const enum cuda_limit limit = limit_by_iterations(c);
+    const enum cuda_energy_limit limit = energy_limit_by_iterations(c);
     switch (stage->kind) {
     case SADMM_STAGE_GATHER: return CUDA(launch_start)(c, error);
     case SADMM_STAGE_HITS: return CUDA(enqueue_hits)(c, c->view.step.substep, error);
@@ -361,10 +361,10 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_ITERATE:
     case SADMM_STAGE_RESIDUALS:
     case SADMM_STAGE_CHECK:
-    case SADMM_STAGE_REWEIGH:
+    case SADMM_STAGE_WEIGHTS:
     case SADMM_STAGE_BALANCE: return record_solving(c, stage, residuals, limit, error);
-    case SADMM_STAGE_LIMIT:
-        return limit == LIMIT_WHOLE ? SADMM_OK : record_limit(c, limit == LIMIT_SUSPECTS, error);
+    case SADMM_STAGE_ENERGY_LIMIT:
+        return limit == LIMIT_WHOLE ? SADMM_OK : record_energy_limit(c, limit == LIMIT_CANDIDATES, error);
     case SADMM_STAGE_INTEGRATE:
         TRY(record_finish(c, *residuals, error));
         return c->view.push.planned ? record_push(c, error) : SADMM_OK;
@@ -395,7 +395,7 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     /* launch_turn and launch_commit */
     case SADMM_STAGE_KEEP: return SADMM_OK;
     /* by the host: loads before a world is loaded, certificates of what it reads; no world with dense solves resides */
-    case SADMM_STAGE_PREDICT:
+    case SADMM_STAGE_INITIALISE:
     case SADMM_STAGE_CERTIFY:
     case SADMM_STAGE_NCP_SOLVE:
     case SADMM_STAGE_COUNT: return SADMM_OK;
@@ -403,29 +403,29 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     return SADMM_OK;
 }
 
-static sadmm_status enqueue_step(struct sadmm_context *c, bool edited, struct sadmm_error *error)
+static sadmm_status enqueue_step(struct sadmm_context *c, bool with_updates, struct sadmm_error *error)
 {
     struct sadmm_stages stages = sadmm_stages_of(&c->plan, &c->settings, true);
     struct sadmm_stage stage;
     bool residuals = false;
     view_substep(c, 0);
-    if (edited) TRY(CUDA(launch_edits)(c, error));
+    if (with_updates) TRY(CUDA(launch_updates)(c, error));
     while (sadmm_stages_next(&stages, &stage)) TRY(record_stage(c, &stage, &residuals, error));
     return SADMM_OK;
 }
 
 /* ---- graphs ---------------------------------------------------------------------------------------------------- */
 
-sadmm_status CUDA(record_step)(struct sadmm_context *c, bool edited, int into, struct sadmm_error *error)
+sadmm_status CUDA(record_step)(struct sadmm_context *c, bool with_updates, int into, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    cudaGraphExec_t *ready = &s->graphs[edited].into[into];
+    cudaGraphExec_t *ready = &s->graphs[with_updates].into[into];
     cudaGraph_t graph = nullptr;
     const int next = s->into;
     CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
     s->into = into;
     c->recording = true;
-    sadmm_status status = enqueue_step(c, edited, error);
+    sadmm_status status = enqueue_step(c, with_updates, error);
     c->recording = false;
     s->into = next;
     cudaError_t code = cudaStreamEndCapture(c->stream, &graph);

@@ -8,7 +8,7 @@
 /* out: velocities (bodies x 6), impulses (points x 3), multipliers (blocks x 6). One thread a body, pair or block. */
 static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     int32_t i = thread_index();
     double *impulses = v.raw.out + 6 * (size_t)v.model.bodies, *multipliers = impulses + 3 * (size_t)v.model.points;
     if (i < v.model.bodies) {
@@ -57,7 +57,7 @@ extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadm
 
 static __global__ void read_penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     int32_t i = thread_index();
     if (i < live_bodies(v.model)) v.raw.out[i] = v.bodies.beta[i];
 }
@@ -78,7 +78,7 @@ extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta
 /* Eight lanes a body, then v.contacts.lanes a pair; bits are 0 before. */
 static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES,
                   sides = (v.model.bodies * LANES + THREADS - 1) / THREADS * THREADS;
     if (thread_index() >= sides) {
@@ -105,7 +105,7 @@ enum { MOVED = PLACE + 1 }; /* and sadmm_rigid.mean */
 
 static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     double *out = v.raw.out + MOVED * (size_t)i, velocity[6];
@@ -154,7 +154,7 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
 
 static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    follow_if(all_early(v.model.bodies));
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
     const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
     const trapezoid_speeds none = {};

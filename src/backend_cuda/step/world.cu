@@ -18,11 +18,11 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     const size_t n = (size_t)s->bodies;
     struct cuda_step_view *step = &c->view.step;
     struct sadmm_rigid *rigid = buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES);
-    struct sadmm_steady *steady = buffer<struct sadmm_steady>(c, BUFFER_WORLD_STEADY);
+    struct sadmm_extrapolation *extrapolation = buffer<struct sadmm_extrapolation>(c, BUFFER_WORLD_EXTRAPOLATION);
     step->before = rigid + from * n;
     step->after = rigid + to * n;
-    step->steady_before = steady + from * n;
-    step->steady_after = steady + to * n;
+    step->extrapolation_before = extrapolation + from * n;
+    step->extrapolation_after = extrapolation + to * n;
     step->wrench = buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)into * 6 * n;
     step->start_velocity = buffer<double>(c, BUFFER_WORLD_VELOCITY);
     step->start_impulse = buffer<double>(c, BUFFER_WORLD_IMPULSE);
@@ -32,11 +32,11 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     step->counts = set.device_counts;
     step->candidate_capacity = s->candidate_capacity;
     step->point_capacity = s->point_capacity;
-    step->guess = s->guess;
+    step->speculation = s->speculation;
     step->control = buffer<struct cuda_step_control>(c, BUFFER_WORLD_CONTROL);
     step->reports = step_reports(c);
-    step->edits = buffer<struct cuda_edits>(c, PINNED_EDITS);
-    step->edit_capacity = s->edit_capacity;
+    step->updates = buffer<struct cuda_updates>(c, PINNED_UPDATES);
+    step->update_capacity = s->update_capacity;
     step->measured = c->plan.residuals && !stop_rule_checked(c);
     step->limits = c->plan.momentum;
     step->leaves_hits = may_take_hits(c) && !s->hits_planned;
@@ -66,7 +66,7 @@ void CUDA(view_counts)(struct sadmm_context *c, int64_t pairs)
     v->model.bodies = s->bodies;
     v->contacts.pair_capacity = (int32_t)((pairs + WARP - 1) / WARP * WARP);
     v->rows.count = s->apart ? 0 : s->joint_constraints;
-    v->model.contact_rows = s->guess.contact_rows == 1 ? 1 : 3;
+    v->model.contact_rows = s->speculation.contact_rows == 1 ? 1 : 3;
     v->model.warm_start = c->settings.warm_start;
 }
 
@@ -132,20 +132,20 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->enqueued = s->seen = s->done = s->repeats = 0;
     s->offending_body = -1;
     s->learned.step = -1;
-    s->careful = 0;
-    s->edited = 0;
+    s->conservative = 0;
+    s->updated_steps = 0;
     s->apart = false;
     s->quiet = 0;
     s->push_streams = false;
     s->hits_planned = s->last_hits = false;
     s->calm = 0;
     s->untouched = 0;
-    s->patience = LEAST_PATIENCE;
-    for (struct queued_step &q : s->queue) q.edit_count = 0;
+    s->backoff = LEAST_BACKOFF;
+    for (struct queued_step &q : s->queue) q.update_count = 0;
     memset(&s->last, 0, sizeof s->last);
     TRY(CUDA(use_settings)(c, &share, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_BODIES, 3 * n * sizeof *world->rigid, error));
-    TRY(CUDA(reserve)(c, BUFFER_WORLD_STEADY, 3 * n * sizeof *world->steady, error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_EXTRAPOLATION, 3 * n * sizeof *world->extrapolation, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_WRENCH, 12 * n * sizeof(double), error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_VELOCITY, 6 * n * sizeof(double), error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_SLOTS, n * sizeof *world->slot_of, error));
@@ -175,8 +175,8 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(CUDA(upload)(c, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + before * n, PINNED_BODIES, 0,
                      world->rigid, n * sizeof *world->rigid, error));
     TRY(CUDA(wait)(c, error));
-    TRY(CUDA(upload)(c, buffer<struct sadmm_steady>(c, BUFFER_WORLD_STEADY) + before * n, PINNED_BODIES, 0,
-                     world->steady, n * sizeof *world->steady, error));
+    TRY(CUDA(upload)(c, buffer<struct sadmm_extrapolation>(c, BUFFER_WORLD_EXTRAPOLATION) + before * n, PINNED_BODIES,
+                     0, world->extrapolation, n * sizeof *world->extrapolation, error));
     TRY(CUDA(wait)(c, error));
     TRY(CUDA(load_kinematic)(c, world, error));
     TRY(CUDA(load_joints)(c, world, error));
@@ -186,7 +186,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(CUDA(clear_abort)(c, error));
     s->candidate_capacity = s->point_capacity = c->first_capacity;
     c->refused = 0;
-    s->misfit = -1;
+    s->mispredicted = -1;
     const struct cuda_settings *kept = buffer<struct cuda_settings>(c, BUFFER_SETTINGS);
     TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                           buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),

@@ -1,11 +1,11 @@
 /* The world on the device, the host's side: what the sources of whole steps (device/step.h) share.
  *
- *   world.cu   take over a world and let it go; where its arrays are
- *   guess.cu   plan a step from the statistics of an earlier one
- *   record.cu  a step as a graph
- *   queue.cu   run steps and see what became of them; repeat those whose plan did not hold
- *   read.cu    bring the world and the report back
- *   push.cu    islands that are pushed apart by a second problem
+ *   world.cu        take over a world and let it go; where its arrays are
+ *   speculation.cu  plan a step from the statistics of an earlier one
+ *   record.cu       a step as a graph
+ *   queue.cu        run steps and see what became of them; repeat those whose plan did not hold
+ *   read.cu         bring the world and the report back
+ *   push.cu         islands that are pushed apart by a second problem
  *   kinematic.cu, joints.cu, gears.cu, articulation.cu   kinematic bodies, joints, gears, and articulations
  */
 #ifndef SADMM_CUDA_STEP_WORLD_H
@@ -20,8 +20,8 @@
 struct queued_step {
     cudaEvent_t done;
     struct sadmm_settings settings;
-    size_t edit_count;
-    bool hits; /* are looked for (takes_hits) */
+    size_t update_count;
+    bool hits; /* are searched for (takes_hits) */
 };
 
 /* A step's graphs, by the set that is written. */
@@ -33,7 +33,7 @@ struct step_graphs {
 /* What a sub-step is planned to be. */
 struct substep_plan {
     struct sadmm_plan plan;
-    int32_t contact_rows, warm, rows; /* as in cuda_step_guess */
+    int32_t contact_rows, warm, rows; /* as in cuda_step_speculation */
 };
 
 /* From the reports of a step that failed in a later sub-step. */
@@ -45,7 +45,7 @@ struct learned {
 };
 
 /* Steps that articulations are left alone until it is planned that they are; twice as many each time they were not. */
-enum { LEAST_PATIENCE = 16, MOST_PATIENCE = 1 << 16 };
+enum { LEAST_BACKOFF = 16, MOST_BACKOFF = 1 << 16 };
 /* Steps without a push until they are planned to have none: to plan takes what a second problem's empty kernels do in as
  * many. */
 enum { QUIET_STEPS = 32 };
@@ -62,32 +62,33 @@ struct cuda_step {
     size_t articulation_bytes;  /* the most that one has of both, where blocks have that in their own memory; else 0 */
 
     bool all_articulated;       /* all constraints are of articulations */
-    bool apart;                 /* they are planned to be solved beside the rest (cuda_step_guess) */
+    bool apart;                 /* they are planned to be solved beside the rest (cuda_step_speculation) */
     int32_t untouched,
-        patience; /* steps that could have been so since one could not; that it takes for it to be tried */
+        backoff; /* steps that could have been so since one could not; that it takes for it to be tried */
 
     bool pushes;                /* planned: islands are pushed apart, in a second problem (push.cu), */
     bool push_streams;          /* which has not fitted its partition once: tier STREAM */
     int32_t quiet;              /* but none has been for so many steps */
     struct sadmm_context *push; /* of that; made with the first one */
 
-    bool hits_planned;          /* hits are looked for, where the world has any (takes_hits), */
+    bool hits_planned;          /* hits are searched for, where the world has any (takes_hits), */
     int32_t calm;               /* but no pair has been fast for so many steps */
 
-    bool planned;               /* capacities, partition and guess are for the world as it is */
-    struct step_graphs graphs[2]; /* of steps without edits, and with (queue.cu) */
-    struct cuda_step_guess guess;
+    bool planned;               /* capacities, partition and speculation are for the world as it is */
+    struct step_graphs graphs[2]; /* of steps without updates, and with (queue.cu) */
+    struct cuda_step_speculation speculation;
     int64_t candidate_capacity, point_capacity;
 
     struct substep_plan plans[SADMM_MOST_SUBSTEPS];
     struct learned learned;
     struct sadmm_cuda_hits hits; /* of the (sub-)step that is being enqueued (takes_hits) */
-    int64_t careful;            /* so many steps more look for candidates in every sub-step: shapes left their reach */
+    int64_t conservative;       /* so many steps more search for candidates in every sub-step: shapes left their
+                                   reach */
 
     /* The queue: steps [seen, enqueued), at most STEPS_AHEAD. */
     struct queued_step queue[STEPS_AHEAD];
-    int32_t edit_capacity;      /* of each step, in PINNED_EDITS */
-    int64_t edited;             /* steps with edits so far */
+    int32_t update_capacity;    /* of each step, in PINNED_UPDATES */
+    int64_t updated_steps;      /* steps with updates so far */
     int64_t enqueued, seen;
     int into;                   /* set and state the next step writes */
 
@@ -96,7 +97,7 @@ struct cuda_step {
     bool last_hits;               /* queued_step */
     double time;                  /* simulated until after it, s */
     int64_t done, repeats;
-    int64_t misfit;             /* the last step that its partition did not fit; -1: none */
+    int64_t mispredicted;       /* the last step that its partition did not fit; -1: none */
     int32_t offending_body;
 };
 
@@ -135,29 +136,30 @@ void CUDA(view_into)(struct sadmm_context *, int into, int substep);
 void CUDA(view_counts)(struct sadmm_context *, int64_t pairs);
 /* world.cu */
 sadmm_status CUDA(clear_abort)(struct sadmm_context *, struct sadmm_error *error);
-/* guess.cu: what the next step and those like it need. Nothing is running. */
-sadmm_status CUDA(guess_step)(struct sadmm_context *, struct sadmm_error *error);
-/* guess.cu: some pair is fast. */
+/* speculation.cu: what the next step and those like it need. Nothing is running. */
+sadmm_status CUDA(speculate)(struct sadmm_context *, struct sadmm_error *error);
+/* speculation.cu: some pair is fast. */
 void CUDA(plan_hits)(struct sadmm_context *);
-/* guess.cu: the plan of a step, of this many pairs and points with these statistics, or a sub-step. */
+/* speculation.cu: the plan of a step, of this many pairs and points with these statistics, or a sub-step. */
 struct substep_plan CUDA(plan_of)(const struct sadmm_context *, int32_t pairs, int32_t points,
                                   const struct cuda_graph_statistics *statistics,
                                   const struct cuda_joint_counts *joints);
-/* guess.cu: may bodies that joints join be solved beside the rest, if nothing touches them? By settings and plan. */
+/* speculation.cu: may bodies that joints join be solved beside the rest, if nothing touches them? By settings and
+ * plan. */
 bool CUDA(may_be_apart)(const struct sadmm_context *);
-/* guess.cu: *a becomes what a partition for both needs. */
+/* speculation.cu: *a becomes what a partition for both needs. */
 void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_graph_statistics *b);
 /* record.cu: where there are hits, what a (sub-)step begins with after them is what it begins with from here on; */
 sadmm_status CUDA(enqueue_hits)(struct sadmm_context *, int substep, struct sadmm_error *error);
 /* record.cu: contacts, up to the gate. */
 sadmm_status CUDA(enqueue_find)(struct sadmm_context *, int substep, struct sadmm_error *error);
-/* record.cu: the graph of a step that writes state and set `into`; edited: its edits come first. */
-sadmm_status CUDA(record_step)(struct sadmm_context *, bool edited, int into, struct sadmm_error *error);
+/* record.cu: the graph of a step that writes state and set `into`; with_updates: its updates come first. */
+sadmm_status CUDA(record_step)(struct sadmm_context *, bool with_updates, int into, struct sadmm_error *error);
 /* read.cu: the report of the last step that was done. */
 void CUDA(report_step)(const struct sadmm_context *, struct sadmm_resident_report *out);
 
 /* kernels.cu, finish.cu: launches of the step's own kernels. */
-sadmm_status CUDA(launch_edits)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_updates)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_turn)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
@@ -177,7 +179,7 @@ sadmm_status CUDA(launch_kinematic_finish)(struct sadmm_context *, struct sadmm_
 
 /* push_view.due: not 0: some island is pushed; not 0: the second problem does not fit its partition; its pairs that carry
  * an impulse; bits of enum push_kind, 0: there is none. */
-enum push_number { PUSH_DUE, PUSH_MISFIT, PUSH_WARM_PAIRS, PUSH_KIND, PUSH_NUMBERS };
+enum push_number { PUSH_DUE, PUSH_MISPREDICTED, PUSH_WARM_PAIRS, PUSH_KIND, PUSH_NUMBERS };
 /* The second problem is a cold one or a warm one, which its contacts say: it is recorded as both. */
 enum push_kind { PUSH_COLD = 1, PUSH_WARM = 2, PUSH_ANY = PUSH_COLD | PUSH_WARM };
 
@@ -188,12 +190,12 @@ void CUDA(plan_second)(struct sadmm_context *, bool warm);
 /* of what kind it is (first: gathered just now); its kernels from here on work if it is one of these; */
 sadmm_status CUDA(launch_push_kind)(struct sadmm_context *, bool first, int kinds, struct sadmm_error *error);
 /* which islands are pushed, once A and b and the layout are made, before contacts are; the second problem, after finish
- * and settle; and what bodies move by when it is solved. */
+ * and the launch of move_again; and what bodies move by when it is solved. */
 sadmm_status CUDA(launch_push_choice)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_push_gather)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_push_move)(struct sadmm_context *, struct sadmm_error *error);
 /* kernels.cu: bodies that have to be moved again, before commit or turn would. */
-sadmm_status CUDA(launch_settle)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_move_again)(struct sadmm_context *, struct sadmm_error *error);
 
 /* gears.cu: the same for gears, of which joints.cu sees to all of this: */
 sadmm_status CUDA(load_gears)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);

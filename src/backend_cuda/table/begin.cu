@@ -121,7 +121,7 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     c->system = system;
     c->plan = *plan;
     c->starting = true;
-    c->placed = c->measured = c->rescaled = c->settled = c->prologue = false;
+    c->placed = c->measured = c->rescaled = c->step1_done = c->prologue = false;
     c->refused = 0;
     c->graph_valid = false;
     TRY(CUDA(use_settings)(c, settings, error));

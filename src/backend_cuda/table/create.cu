@@ -61,7 +61,7 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
     CUDA_CALL(c, cudaDeviceGetAttribute(&clusters, cudaDevAttrClusterLaunch, c->device), "cudaDeviceGetAttribute");
     c->cooperative = cooperative != 0;
     CUDA_CALL(c, CUDA(persistent_allow)(c->shared_limit, clusters != 0, &c->clusters), "loading the kernels");
-    c->early = c->clusters && EARLY_ARCH <= CLUSTER_ARCH; /* the same devices, the same code */
+    c->pdl = c->clusters && PDL_ARCH <= CLUSTER_ARCH; /* the same devices, the same code */
     CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, CUDA(articulation_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, CUDA(joint_close_allow)(c->shared_limit), "loading the kernels");

@@ -21,7 +21,7 @@
         .iterate = sadmm_cuda_iterate##suffix,                 \
         .measure_residuals = sadmm_cuda_measure_residuals##suffix, \
         .update_penalty = sadmm_cuda_update_penalty##suffix,   \
-        .limit_velocity = sadmm_cuda_limit_velocity##suffix,   \
+        .limit_energy = sadmm_cuda_limit_energy##suffix,       \
         .read_solution = sadmm_cuda_read_solution##suffix,     \
         .read_penalty = sadmm_cuda_read_penalty##suffix,       \
         .integrate = sadmm_cuda_integrate##suffix,             \

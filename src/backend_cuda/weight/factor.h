@@ -52,7 +52,8 @@ static __device__ __forceinline__ double weigh_side(const model_view &model, con
     const int32_t p = sides.code / 2;
     const double load = (double)sides.load, response = (double)sides.response;
     const bool a = is_dynamic(model, sides.bodies.body_a), both = a && is_dynamic(model, sides.bodies.body_b);
-    const double most = sides.alone ? most_of(bodies, contacts, sides.alone, p) : HUGE_VAL, scale = island.rescale,
+    const double most = sides.alone ? most_of(bodies, contacts, sides.alone, p) : HUGE_VAL,
+                 scale = island.scale_weights,
                  taken = scale > 0 ? weights.weight[p]
                                    : weight_of_pair(&island.weights, load, most, response),
                  B = scale > 0 ? taken * scale : taken;

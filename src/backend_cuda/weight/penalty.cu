@@ -112,7 +112,7 @@ template <bool PENALTY, bool FACTOR, int FORM>
 static __global__ void __launch_bounds__(BODY_THREADS)
     penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
+    pdl_wait();
     const body_thread t = body_of_thread(v.model, v.graph);
     const cuda_island none = {};
     double C[PACKED], beta = 1;
@@ -142,8 +142,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 
 static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    pdl_wait();
+    pdl_trigger(v.model.bodies);
     int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     double ratio = args.factor;
@@ -166,7 +166,7 @@ static sadmm_status launch_bodies(struct sadmm_context *c, cuda_kernel kernel, c
                                   struct sadmm_error *error)
 {
     const int64_t blocks = body_blocks(c->view.model.bodies);
-    return CUDA(launch_early)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
+    return CUDA(launch_pdl)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
 }
 
 /* fast: B, C and, for `factor`, H. first: of the solve; planned: compare with the plan. */

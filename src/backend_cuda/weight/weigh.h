@@ -43,9 +43,9 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
     if (args.start) *island = fresh;
     weight_update_speed(&island->weights, &sums, args.warm, args.factor);
     if (!SCALES || island->rows) return;
-    /* those that stall keep the weights they have, times what the weight scale has risen by since those were taken */
-    const double rise = weight_rescale(&island->weights, &sums);
-    island->rescale = (island->rescale > 0 ? island->rescale : 1) * rise;
+    /* those that stagnate keep their weights, times what the weight scale has risen by since they were taken */
+    const double rise = weight_update_scale(&island->weights, &sums);
+    island->scale_weights = (island->scale_weights > 0 ? island->scale_weights : 1) * rise;
 }
 
 /* Component `lane`, below 6, of J^T lambda on side `code` of a row block; of its place for rows that it does not have,

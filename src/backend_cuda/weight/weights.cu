@@ -23,8 +23,8 @@
 static __global__ void __launch_bounds__(BODY_THREADS)
     pairs_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    pdl_wait();
+    pdl_trigger(v.model.bodies);
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), p = t / v.contacts.lanes,
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);
@@ -49,8 +49,8 @@ template <bool SCALES, bool ROWS>
 static __global__ void __launch_bounds__(BODY_THREADS)
     terms_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    pdl_wait();
+    pdl_trigger(v.model.bodies);
     const body_thread t = body_of_thread(v.model, v.graph);
     double total[TERMS];
     const double term =
@@ -67,8 +67,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 /* J A^-1 J^T; and what its multiplier counts for in the load of its constraint. A thread a row. */
 static __global__ void respond_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    pdl_wait();
+    pdl_trigger(v.model.bodies);
     const int32_t slot = thread_index(), k = slot / SADMM_MAX_ROWS, r = slot % SADMM_MAX_ROWS;
     if (k >= live_rows(v.model, v.rows) || r >= v.rows.constraints[k].rows) return;
     const int32_t joined[2] = {v.rows.constraints[k].body_a, v.rows.constraints[k].body_b};
@@ -99,8 +99,8 @@ static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, co
         weight_add_row(&sums, (double)rows[r].lambda, responses[r].scale, responses[r].response, about.rows);
     const int32_t label =
         about.rows > 0 ? v.graph.label[is_dynamic(v.model, about.body_a) ? about.body_a : about.body_b] : 0;
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    pdl_wait();
+    pdl_trigger(v.model.bodies);
     if (about.rows == 0) return; /* a joint may have fewer than there is room for */
     cuda_island *island = &v.islands.info[label];
     if (args.start) island->rows = island->anchored = 1; /* left alone */
@@ -120,14 +120,14 @@ static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, co
 
 void CUDA(begin_weights)(struct sadmm_context *c)
 {
-    c->refreshes = c->exact_since = 0;
-    c->starting = c->settled = false;
+    c->weight_updates = c->exact_since = 0;
+    c->starting = c->step1_done = false;
 }
 
 cuda_args CUDA(weight_args)(const struct sadmm_context *c)
 {
     cuda_args args = {};
-    args.start = c->refreshes == 0;
+    args.start = c->weight_updates == 0;
     args.warm = c->plan.warm;
     args.factor = weight_under_iterated(c->plan.rigid, c->settings.iterations);
     args.row_floor = weight_row_floor(c->plan.rigid, c->settings.iterations);
@@ -144,13 +144,13 @@ sadmm_status CUDA(enqueue_row_responses)(struct sadmm_context *c, struct sadmm_e
 sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = CUDA(weight_args)(c);
-    const bool scales = c->refreshes >= WEIGHT_FIRST_SCALE, rows = c->view.rows.count > 0;
+    const bool scales = c->weight_updates >= WEIGHT_FIRST_SCALE, rows = c->view.rows.count > 0;
     const cuda_kernel kernel = scales ? (rows ? terms_kernel<true, true> : terms_kernel<true, false>)
                                       : (rows ? terms_kernel<false, true> : terms_kernel<false, false>);
-    TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
-                           error));
-    return CUDA(launch_early)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), THREADS, &args,
-                              error);
+    TRY(CUDA(launch_pdl)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
+                         error));
+    return CUDA(launch_pdl)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), THREADS, &args,
+                            error);
 }
 
 sadmm_status CUDA(enqueue_loads)(struct sadmm_context *c, struct sadmm_error *error)
@@ -158,7 +158,7 @@ sadmm_status CUDA(enqueue_loads)(struct sadmm_context *c, struct sadmm_error *er
     const cuda_args args = {};
     const int64_t blocks =
         ((int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes + BODY_THREADS - 1) / BODY_THREADS;
-    ++c->refreshes;
+    ++c->weight_updates;
     c->exact_since = 0;
     TRY(CUDA(launch_of)(c, pairs_kernel, "loads of pairs", blocks, BODY_THREADS, &args, error));
     return CUDA(enqueue_islands)(c, error);

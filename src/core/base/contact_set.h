@@ -22,8 +22,8 @@ SADMM_INLINE bool sadmm_body_is_kinematic(int32_t body) { return body < -1; }
 /* Of the kinematic body, its number, and back. */
 SADMM_INLINE int32_t sadmm_kinematic(int32_t body) { return -2 - body; }
 
-/* A manifold of a pair of shapes: one normal, up to SADMM_MAX_POINTS points. Two shapes may have several, told apart by
- * `child` (collision/geometry.h). */
+/* A manifold of a pair of shapes: one normal, up to SADMM_MAX_POINTS points. Two shapes may have several, distinguished
+ * by `child` (collision/geometry.h). */
 struct sadmm_contact_pair {
     int32_t body_a, body_b;   /* system body, -1: static, below: kinematic */
     int32_t shape_a, shape_b; /* world shape slot (world level), else -1 */

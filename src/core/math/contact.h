@@ -9,7 +9,7 @@
 SADMM_INLINE double contact_error(double gap, double dt, double baumgarte, double slop, double correction_speed)
 {
     const double depth = -gap - slop;
-    const double speed = (gap >= 0 ? gap : baumgarte * depth) / dt; /* one division: which one, nothing foretells */
+    const double speed = (gap >= 0 ? gap : baumgarte * depth) / dt; /* one division: which one is not known before */
     const double pushed = depth > 0 ? -min_of(speed, correction_speed) : 0.0;
     return gap >= 0 ? speed : pushed;
 }

@@ -14,7 +14,7 @@
 enum { RELAX_RESIDUAL_PERIOD = 128 };
 
 SADMM_INLINE int relax_constraints(int i, int count) { return i + 1 < count; }
-/* `settled`: Step 1 ran before in this solve. */
-SADMM_INLINE int relax_velocity(int i, int count, int settled) { return settled && i + 1 < count; }
+/* `step1_done`: Step 1 ran before in this solve. */
+SADMM_INLINE int relax_velocity(int i, int count, int step1_done) { return step1_done && i + 1 < count; }
 
 #endif

@@ -13,9 +13,9 @@
 
 /* Iterations after which a step that started cold recomputes its weights, from the loads it has found by then: 5, 10,
  * 20, 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
-enum { WEIGHT_FIRST_REFRESH = 5, WEIGHT_DOUBLE_BELOW = 40 };
+enum { WEIGHT_FIRST_UPDATE = 5, WEIGHT_DOUBLE_BELOW = 40 };
 
-SADMM_INLINE int weight_next_refresh(int at) { return at < WEIGHT_DOUBLE_BELOW ? 2 * at : at + at / 2; }
+SADMM_INLINE int weight_next_update(int at) { return at < WEIGHT_DOUBLE_BELOW ? 2 * at : at + at / 2; }
 
 /* phi. Contacts: loads that have not been found yet are the ones to come. Joints and springs hold in all directions,
  * loaded or not; but a mechanism moves along what none of its joints holds, which no body knows by itself, and an
@@ -67,17 +67,18 @@ SADMM_INLINE double weight_mass(double load, double speed, double mass)
     return min_of(load / speed, mass);
 }
 
-/* The weight scale of an island under contacts, a factor of its weights, from the sixth refresh on:
+/* The weight scale of an island under contacts, a factor of its weights, from the sixth weight update on:
  *
  *     q^2 = sum w |lambda - Pi_C(lambda - (x + e n)/w)|^2 / sum r . A^-1 r,      r = A v - b - J^T lambda
  *
- * the residual of the contacts over that of the momentum, both energies in J. Near 0.1 is usual. Where the momentum
- * lags behind (masses that differ by decades, in no order) the weights are too large. Where nothing but the contacts is
- * left, impulses move at constant speed along directions that no body feels; then the island stalls, and keeps the
- * weights it has, times what the weight scale rises by: new ones would be felt. */
+ * the residual of the contacts over that of the momentum, both energies in J. This is the primal-dual imbalance; near
+ * 0.1 is usual. Where it is small, momentum converges slower than contacts do (masses that differ by decades, in no
+ * order): the weights are too large. Where nothing but the contacts is left, impulses move at constant speed along
+ * directions that no body feels; then the island stagnates, and keeps its weights, times what the weight scale rises
+ * by: new ones would disturb the bodies. */
 enum { WEIGHT_FIRST_SCALE = 6 };
-#define WEIGHT_LAGS (1 / 3.0)
-#define WEIGHT_STALLS 30.0
+#define WEIGHT_IMBALANCE_LEAST (1 / 3.0)
+#define WEIGHT_STAGNATION 30.0
 #define WEIGHT_SCALE_POWER 0.3
 #define WEIGHT_SCALE_STEP 4.0
 #define WEIGHT_SCALE_LEAST 0.1
@@ -86,29 +87,30 @@ enum { WEIGHT_FIRST_SCALE = 6 };
 /* Less than this is rounding, m/s. */
 #define WEIGHT_SCALE_ROUNDING 1e-12
 
-/* q of an island. */
-SADMM_INLINE double weight_balance(double violation, double momentum_residual, double mass)
+/* The imbalance, q, of an island. */
+SADMM_INLINE double weight_imbalance(double violation, double momentum_residual, double mass)
 {
     double least = WEIGHT_SCALE_ROUNDING * WEIGHT_SCALE_ROUNDING * mass;
     return sqrt((violation + least) / (momentum_residual + least));
 }
 
-SADMM_INLINE int weight_stalls(double balance) { return balance > WEIGHT_STALLS; }
+SADMM_INLINE int weight_stagnates(double imbalance) { return imbalance > WEIGHT_STAGNATION; }
 
-SADMM_INLINE double weight_next_scale(double scale, double balance)
+SADMM_INLINE double weight_next_scale(double scale, double imbalance)
 {
-    double off = weight_stalls(balance) ? balance / WEIGHT_STALLS : min_of(balance / WEIGHT_LAGS, 1.0);
+    double off = weight_stagnates(imbalance) ? imbalance / WEIGHT_STAGNATION
+                                             : min_of(imbalance / WEIGHT_IMBALANCE_LEAST, 1.0);
     double factor = min_of(max_of(pow(off, WEIGHT_SCALE_POWER), 1 / WEIGHT_SCALE_STEP), WEIGHT_SCALE_STEP);
     return min_of(max_of(scale * factor, WEIGHT_SCALE_LEAST), WEIGHT_SCALE_MOST);
 }
 
-/* The next weight scale. Returns what the weights of an island that stalls rise by, 0: it does not stall, and takes new
- * ones. */
-SADMM_INLINE double weight_rescale(struct weight_island *island, const struct weight_sums *sums)
+/* The next weight scale. Returns the factor of the weights of an island that stagnates, 0: it does not stagnate, and
+ * takes new ones. */
+SADMM_INLINE double weight_update_scale(struct weight_island *island, const struct weight_sums *sums)
 {
-    const double balance = weight_balance(sums->violation, sums->momentum_residual, sums->mass);
-    const double next = weight_next_scale(island->scale, balance);
-    const double rise = weight_stalls(balance) ? next / island->scale : 0;
+    const double imbalance = weight_imbalance(sums->violation, sums->momentum_residual, sums->mass);
+    const double next = weight_next_scale(island->scale, imbalance);
+    const double rise = weight_stagnates(imbalance) ? next / island->scale : 0;
     island->scale = next;
     return rise;
 }

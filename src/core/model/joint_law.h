@@ -34,7 +34,7 @@ struct sadmm_joint_memory {
     double angle[JOINT_COORDINATES];                   /* of those that wind, at the step's start */
     double wrench[6], point[3];                        /* as in sadmm_joint_state, on b */
     double local[6];                                   /* the wrench along the axes of a's frame */
-    double left[JOINT_COORDINATES];                    /* of locks: articulation_left of their rows; 0: not told */
+    double left[JOINT_COORDINATES];                    /* of locks: articulation_left of their rows; 0: not reported */
     bool trapezoid_off;                                /* its bodies were moved by the velocities of the step's end */
     bool broken;                                       /* it gave more than it bears */
 };

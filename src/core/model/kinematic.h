@@ -11,7 +11,7 @@
 /* As a backend that keeps the world has it. */
 struct sadmm_kinematic_body {
     struct sadmm_rigid rigid;
-    struct sadmm_steady steady; /* how often it was placed alone */
+    struct sadmm_extrapolation extrapolation; /* how often it was placed alone */
     double position[3], orientation[4]; /* it is to be there after the next step, */
     double dt;                  /* so long a step, s; */
     int32_t target;             /* where not 0 */

@@ -39,8 +39,8 @@ struct sadmm_rigid {
                                in a step what joints give (stiffening.h) */
 };
 
-/* What is remembered of a body's last steps (steady.h). */
-struct sadmm_steady {
+/* The changes of velocity of a body's last steps (extrapolation.h). */
+struct sadmm_extrapolation {
     double change[6];  /* of the velocity in the last step */
     double dt;         /* of that step, s; 0: there was none */
     int32_t streak[2]; /* steps in a row with nearly the same acceleration: linear, angular */

@@ -11,7 +11,7 @@
  *
  * The method FAST is iterated by `iterate` alone (update_velocity and update_constraints refuse it): an iteration is
  * Steps 2-4, then Step 1, and what is relaxed depends on how far a batch still goes (math/relax.h). update_weights and
- * factorize may follow a batch in the place of update_penalty, and limit_velocity ends the step's iterations,
+ * factorize may follow a batch in the place of update_penalty, and limit_energy ends the step's iterations,
  * of either method.
  *
  * `measure` asks the iteration (for `iterate`: its last one) to keep what the residuals and a penalty update need; only
@@ -60,8 +60,8 @@ struct sadmm_kernels {
                                    struct sadmm_error *); /* P: beta *= ratio (15) */
 
     /* Rigid bodies: restore the momentum of islands that no contact may change (math/momentum.h). FAST: slow down
-     * islands under contacts alone with more energy than they may have (math/limit.h). */
-    sadmm_status (*limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
+     * islands under contacts alone with more energy than they may have (math/energy_limit.h). */
+    sadmm_status (*limit_energy)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 
     /* v and lambda to system->velocity, ->contacts points' impulse, ->rows' lambda. */
     sadmm_status (*read_solution)(struct sadmm_context *, struct sadmm_error *);

@@ -105,7 +105,7 @@ bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings)
     return settings->warm_start && when_cold;
 }
 
-void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm)
+void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm)
 {
     bool constrained = sadmm_plan_is_constrained(plan);
     plan->warm_start = settings->warm_start;
@@ -113,9 +113,9 @@ void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *set
     plan->penalty_updates =
         constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
     bool fast = constrained && settings->method == SADMM_METHOD_FAST;
-    plan->weight_refresh = fast && !plan->warm;
+    plan->weight_updates = fast && !plan->warm;
     plan->momentum = plan->rigid && plan->points > 0;
-    plan->limit = fast && plan->momentum;
+    plan->energy_limit = fast && plan->momentum;
     plan->certificate = settings->certify || settings->certificate_tolerance > 0;
     plan->residuals = constrained && (plan->penalty_updates || settings->measure_residuals ||
                                       settings->residual_tolerance > 0);
@@ -134,9 +134,9 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     plan.threads =
         sadmm_plan_threads(system->team, settings->threads, (size_t)plan.points + 4 * (size_t)plan.row_constraints);
     plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
-    sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system, plan.threads));
-    plan.predict = settings->method == SADMM_METHOD_FAST && plan.points > 0 && system->first &&
-                   !(settings->warm_start && any_is_warm(system));
-    if (plan.predict) plan.warm_start = true; /* predicted loads are the system's start values then */
+    sadmm_plan_complete(&plan, settings, settings->warm_start && starts_warm(system, plan.threads));
+    plan.initialise = settings->method == SADMM_METHOD_FAST && plan.points > 0 && system->first &&
+                      !(settings->warm_start && any_is_warm(system));
+    if (plan.initialise) plan.warm_start = true; /* initialised impulses are the system's start values then */
     return plan;
 }

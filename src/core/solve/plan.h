@@ -23,9 +23,10 @@ struct sadmm_plan {
     bool warm_start;        /* take the system's start values */
     bool warm;              /* ... and most constraints have one */
     bool penalty_updates;   /* eq. (15) will run at least once */
-    bool predict;           /* FAST: starts from predicted loads (loads.h); never in steps that a backend makes alone */
-    bool weight_refresh;    /* FAST: weights are recomputed during the step */
-    bool limit;             /* FAST: energies of islands under contacts alone are limited after the last iteration */
+    bool initialise;        /* FAST: impulses are initialised (impulse_initialisation.h); never in steps that a backend
+                               makes alone */
+    bool weight_updates;    /* FAST: weights are recomputed during the step */
+    bool energy_limit;      /* FAST: energies of islands under contacts alone are limited after the last iteration */
     bool momentum;          /* islands of rigid bodies under contacts keep what momentum no static contact may change */
     bool residuals;         /* some iteration is measured */
     bool wrenches;          /* eq. (12) a body */
@@ -57,7 +58,7 @@ int sadmm_pass_threads(int threads, size_t count);
 
 /* What follows from the settings once the counts and `contact_rows` are in; `mostly_warm`: at least half of the
  * constraints (contacts counted by pairs) carry an impulse. `threads` is left alone. */
-void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm);
+void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm);
 
 /* Does the number of warm constraints decide anything in a plan with contacts? */
 bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings);

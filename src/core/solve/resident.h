@@ -2,12 +2,12 @@
  * step, and the host only says "go on". Optional (kernels.h, `resident`); core/world/resident.c is the caller.
  *
  * Steps are enqueued: `step` may return before the step has run. Steps run in order. A step that fails leaves the world
- * as it was before it, and those enqueued after it do not run; `wait` tells. What a step could not know when it was
- * enqueued (how many contacts there will be) is no failure: the backend repeats the step with larger capacities.
+ * as it was before it, and those enqueued after it do not run; `wait` reports it. What a step could not know when it
+ * was enqueued (how many contacts there will be) is no failure: the backend repeats the step with larger capacities.
  *
- * What may change from step to step without loading the world again are edits: a kind, a target and numbers, in the
+ * What may change from step to step without loading the world again are updates: a kind, a target and numbers, in the
  * backend's memory before the step that they come with. So are the settings' numbers. A step that was not done has
- * taken none of its edits: the caller gives them again.
+ * taken none of its updates: the caller gives them again.
  */
 #ifndef SADMM_CORE_SOLVE_RESIDENT_H
 #define SADMM_CORE_SOLVE_RESIDENT_H
@@ -26,13 +26,13 @@ struct sadmm_resident_gear;   /* core/model/gear_law.h */
 
 /* A world, from the host. */
 struct sadmm_resident_world {
-    const struct sadmm_collision_input *input; /* shapes, bodies by slot, overrides */
-    int32_t body_count;                        /* dynamic bodies */
-    const struct sadmm_rigid *rigid;           /* (body_count) */
-    const struct sadmm_steady *steady;         /* (body_count) */
-    const int32_t *slot_of;                    /* (body_count) body slot */
+    const struct sadmm_collision_input *input;       /* shapes, bodies by slot, overrides */
+    int32_t body_count;                              /* dynamic bodies */
+    const struct sadmm_rigid *rigid;                 /* (body_count) */
+    const struct sadmm_extrapolation *extrapolation; /* (body_count) */
+    const int32_t *slot_of;                          /* (body_count) body slot */
     int32_t kinematic_count;
-    const struct sadmm_kinematic_body *kinematic; /* (kinematic_count) none with a target: these come as edits */
+    const struct sadmm_kinematic_body *kinematic; /* (kinematic_count) none with a target: these come as updates */
     const struct sadmm_contact_set *contacts;     /* of the last step, with impulses */
     int32_t joint_count;
     const struct sadmm_resident_joint *joints;      /* (joint_count) */
@@ -49,26 +49,26 @@ struct sadmm_resident_world {
     double time;                               /* simulated until now, s */
 };
 
-enum sadmm_edit_kind {
-    SADMM_EDIT_STATE,    /* target: a dynamic body, or a kinematic one; position (3), orientation (4), velocity (6) */
-    SADMM_EDIT_FORCES,   /* target: a dynamic body; force, torque (6), scale of gravity, damping (2) */
-    SADMM_EDIT_TARGET,   /* target: a kinematic body; 1: it is to be there after the step, 0: it goes by its velocity;
-                            position (3), orientation (4), the length of the step (s) */
-    SADMM_EDIT_SETTINGS, /* sadmm_settings_numbers(): a backend's own, from what `step` is given */
-    SADMM_EDIT_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate
-                            (joint_coordinate_numbers); k = 6: enabled (1 or 0); k = 7: a coupling's target: position
-                            (3), orientation (4), velocity (6) */
-    SADMM_EDIT_GEAR,     /* target: a gear; enabled (1 or 0) */
-    SADMM_EDIT_KINDS
+enum sadmm_update_kind {
+    SADMM_UPDATE_STATE,    /* target: a dynamic body, or a kinematic one; position (3), orientation (4), velocity (6) */
+    SADMM_UPDATE_FORCES,   /* target: a dynamic body; force, torque (6), scale of gravity, damping (2) */
+    SADMM_UPDATE_TARGET,   /* target: a kinematic body; 1: it is to be there after the step, 0: it goes by its velocity;
+                              position (3), orientation (4), the length of the step (s) */
+    SADMM_UPDATE_SETTINGS, /* sadmm_settings_numbers(): a backend's own, from what `step` is given */
+    SADMM_UPDATE_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate
+                              (joint_coordinate_numbers); k = 6: enabled (1 or 0); k = 7: a coupling's target: position
+                              (3), orientation (4), velocity (6) */
+    SADMM_UPDATE_GEAR,     /* target: a gear; enabled (1 or 0) */
+    SADMM_UPDATE_KINDS
 };
 enum { SADMM_JOINT_TARGETS = 8 }; /* a joint */
-enum { SADMM_EDIT_VALUES = 14, SADMM_BODY_EDITS = 3 /* the kinds of a body, the first ones */ };
+enum { SADMM_UPDATE_VALUES = 14, SADMM_BODY_UPDATES = 3 /* the kinds of a body, the first ones */ };
 
 /* A change between two steps. There is at most one of a kind and target, so that their order does not matter. */
-struct sadmm_resident_edit {
-    int32_t kind; /* enum sadmm_edit_kind */
+struct sadmm_resident_update {
+    int32_t kind; /* enum sadmm_update_kind */
     int32_t target;
-    double values[SADMM_EDIT_VALUES];
+    double values[SADMM_UPDATE_VALUES];
 };
 
 /* The last step that was done. */
@@ -104,17 +104,18 @@ struct sadmm_resident_kernels {
     /* Take over a world. Everything the backend kept before is forgotten. */
     sadmm_status (*load)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
                          struct sadmm_error *);
-    /* Enqueue a step, with edits before it (free again on return). An error is this step's, or an earlier one's: then
+    /* Enqueue a step, with updates before it (free again on return). An error is this step's, or an earlier one's: then
      * `wait` says how far the world has got. Numbers of the settings (settings.h) may change at every step; where the
      * rest of them does, the backend may wait for the steps before. */
-    sadmm_status (*step)(struct sadmm_context *, const struct sadmm_settings *, const struct sadmm_resident_edit *edits,
-                         size_t count, struct sadmm_error *);
+    sadmm_status (*step)(struct sadmm_context *, const struct sadmm_settings *,
+                         const struct sadmm_resident_update *updates, size_t count, struct sadmm_error *);
     /* Until all enqueued steps have run. The report is filled also when a step has failed; after any error but
      * SADMM_ERROR_DEVICE nothing is enqueued any more. */
     sadmm_status (*wait)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);
     /* The world after the last step done; any pointer may be NULL. Nothing may be enqueued. */
-    sadmm_status (*read_bodies)(struct sadmm_context *, struct sadmm_rigid *rigid, struct sadmm_steady *steady,
-                                double *wrench /* (bodies x 6) */, struct sadmm_error *);
+    sadmm_status (*read_bodies)(struct sadmm_context *, struct sadmm_rigid *rigid,
+                                struct sadmm_extrapolation *extrapolation, double *wrench /* (bodies x 6) */,
+                                struct sadmm_error *);
     /* Kinematic bodies after the last step done, what contacts gave them in it (kinematic_count x 6), and the
      * velocities that they had in it (kinematic_count x 6); any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_kinematic)(struct sadmm_context *, struct sadmm_kinematic_body *, double *wrench,

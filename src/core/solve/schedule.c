@@ -5,7 +5,7 @@
 #include "core/base/clock.h"
 #include "core/base/parallel.h"
 #include "core/math/penalty.h"
-#include "loads.h"
+#include "impulse_initialisation.h"
 
 static sadmm_status assemble_bodies(struct sadmm_solve *s)
 {
@@ -47,7 +47,7 @@ static sadmm_status check_convergence(struct sadmm_solve *s, bool *met)
     return SADMM_OK;
 }
 
-static sadmm_status reweigh(struct sadmm_solve *s)
+static sadmm_status update_weights(struct sadmm_solve *s)
 {
     TRY(s->kernels->update_weights(s->context, s->error));
     return s->kernels->factorize(s->context, s->error);
@@ -112,7 +112,7 @@ sadmm_status sadmm_solve_stage(struct sadmm_solve *s, struct sadmm_stages *stage
 {
     const struct sadmm_kernels *k = s->kernels;
     switch (stage->kind) {
-    case SADMM_STAGE_PREDICT: return sadmm_loads_predict(s->system, s->settings, s->error);
+    case SADMM_STAGE_INITIALISE: return sadmm_impulses_initialise(s->system, s->settings, s->error);
     case SADMM_STAGE_BODIES: return assemble_bodies(s);
     case SADMM_STAGE_CONTACTS: return k->assemble_contacts(s->context, s->error);
     case SADMM_STAGE_ROWS: return k->assemble_rows(s->context, s->error);
@@ -123,9 +123,9 @@ sadmm_status sadmm_solve_stage(struct sadmm_solve *s, struct sadmm_stages *stage
         TRY(check_convergence(s, &s->report->converged));
         stages->stopped = s->report->converged;
         return SADMM_OK;
-    case SADMM_STAGE_REWEIGH: return reweigh(s);
+    case SADMM_STAGE_WEIGHTS: return update_weights(s);
     case SADMM_STAGE_BALANCE: return balance_penalty(s);
-    case SADMM_STAGE_LIMIT: return k->limit_velocity(s->context, &s->report->limited, s->error);
+    case SADMM_STAGE_ENERGY_LIMIT: return k->limit_energy(s->context, &s->report->limited, s->error);
     case SADMM_STAGE_SOLUTION: return read_solution(s);
     default: return SADMM_OK; /* the world's */
     }

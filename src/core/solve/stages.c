@@ -27,11 +27,11 @@ static int until(int done, int period, int limit)
     return left < limit ? left : limit;
 }
 
-/* The first refresh of the weights after `done` iterations, INT_MAX: none. */
-static int next_refresh(int done)
+/* The first update of the weights after `done` iterations, INT_MAX: none. */
+static int next_weight_update(int done)
 {
-    int at = WEIGHT_FIRST_REFRESH;
-    while (at <= done && at <= INT_MAX / 2) at = weight_next_refresh(at);
+    int at = WEIGHT_FIRST_UPDATE;
+    while (at <= done && at <= INT_MAX / 2) at = weight_next_update(at);
     return at > done ? at : INT_MAX;
 }
 
@@ -43,16 +43,16 @@ static int begin_batch(struct sadmm_stages *s)
     const bool has_stop_rule = sadmm_plan_is_constrained(plan) &&
                                (settings->residual_tolerance > 0 || settings->certificate_tolerance > 0);
     const int budget = sadmm_stages_budget(plan, settings), done = s->batch.done;
-    const int refresh = plan->weight_refresh ? next_refresh(done) : INT_MAX;
+    const int update = plan->weight_updates ? next_weight_update(done) : INT_MAX;
     int count = budget - done;
     if (plan->penalty_updates) count = until(done, settings->penalty_period, count);
-    if (refresh - done < count) count = refresh - done;
+    if (update - done < count) count = update - done;
     if (has_stop_rule) count = until(done, settings->check_period, count);
     const int after = done + count;
     s->batch.done = after;
     s->batch.last = after == budget;
     s->batch.check = has_stop_rule && (s->batch.last || after % settings->check_period == 0);
-    s->batch.reweigh = !s->batch.last && after == refresh;
+    s->batch.weights = !s->batch.last && after == update;
     s->batch.balance = plan->penalty_updates && !s->batch.last && after % settings->penalty_period == 0;
     /* Asked for, they are those of the last iteration, and any check may end the iterations. */
     const bool may_end = s->batch.last || s->batch.check;
@@ -85,14 +85,14 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
     case SADMM_STAGE_TURN: return !sadmm_stages_in_last_substep(s);
     case SADMM_STAGE_WRENCHES: return s->world && plan->wrenches;
     case SADMM_STAGE_CERTIFY: return s->world && plan->certificate;
-    case SADMM_STAGE_PREDICT: return plan->predict;
+    case SADMM_STAGE_INITIALISE: return plan->initialise;
     case SADMM_STAGE_CONTACTS: return plan->points > 0;
     case SADMM_STAGE_ROWS: return plan->row_constraints > 0;
     case SADMM_STAGE_RESIDUALS: return s->batch.measure;
     case SADMM_STAGE_CHECK: return s->batch.check;
-    case SADMM_STAGE_REWEIGH: return s->batch.reweigh && !s->stopped;
+    case SADMM_STAGE_WEIGHTS: return s->batch.weights && !s->stopped;
     case SADMM_STAGE_BALANCE: return s->batch.balance && !s->stopped;
-    case SADMM_STAGE_LIMIT: return plan->momentum;
+    case SADMM_STAGE_ENERGY_LIMIT: return plan->momentum;
     default: return true;
     }
 }

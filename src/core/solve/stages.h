@@ -3,8 +3,8 @@
  *     step = GATHER  sub-step { TURN sub-step } *  CERTIFY COMMIT           (world level)
  *     sub-step = HITS FIND JOINT_ROWS PLAN PUSH_CHOICE BLOCK_SOLVE  solve  PUSH_SOLVE INTEGRATE BLOCK_SOLVE_AGAIN NCP_SOLVE
  *                REACTIONS KINEMATIC JOINT_MOTION PUSH_MOTION KEEP WRENCHES
- *     solve = PREDICT BODIES CONTACTS ROWS PENALTY  iterations  LIMIT SOLUTION
- *     iterations = { ITERATE RESIDUALS CHECK REWEIGH BALANCE } until the budget is spent or a check is met
+ *     solve = INITIALISE BODIES CONTACTS ROWS PENALTY  iterations  ENERGY_LIMIT SOLUTION
+ *     iterations = { ITERATE RESIDUALS CHECK WEIGHTS BALANCE } until the budget is spent or a check is met
  *
  * What the plan and the settings do not ask for is not in the list. Whoever executes it goes through it one stage after
  * the other: hosts run each stage (schedule.c, world/step.c), the CUDA backend records it into its graph. An executor
@@ -27,7 +27,7 @@ enum sadmm_stage_kind {
     SADMM_STAGE_PLAN,               /* -    what this sub-step needs, found from its contacts and rows */
     SADMM_STAGE_PUSH_CHOICE,        /* -    islands that are pushed apart without a velocity (push.h) */
     SADMM_STAGE_BLOCK_SOLVE,        /* -    bodies with joints, directly (articulation.h), and what stiffens them */
-    SADMM_STAGE_PREDICT,            /* -    FAST: loads to start from (loads.h) */
+    SADMM_STAGE_INITIALISE,         /* -    FAST: initial impulses (impulse_initialisation.h) */
     SADMM_STAGE_BODIES,             /* A    A_i, b_i */
     SADMM_STAGE_CONTACTS,           /* B    contacts in the solver's form */
     SADMM_STAGE_ROWS,               /* C, D constraints given by rows */
@@ -35,9 +35,10 @@ enum sadmm_stage_kind {
     SADMM_STAGE_ITERATE,            /* I-O  Steps 1-4, `count` times */
     SADMM_STAGE_RESIDUALS,          /* N    eqs. (16), (17) of the last iteration */
     SADMM_STAGE_CHECK,              /* -    convergence: where the stop rule is met, no iteration follows */
-    SADMM_STAGE_REWEIGH,            /* -    FAST: weights from the multipliers found so far; factors */
+    SADMM_STAGE_WEIGHTS,            /* -    FAST: weights from the multipliers found so far; factors */
     SADMM_STAGE_BALANCE,            /* P    eq. (15), and where it changes the penalty factors */
-    SADMM_STAGE_LIMIT,              /* -    momentum that no contact may change (math/momentum.h); FAST: energy (math/limit.h) */
+    SADMM_STAGE_ENERGY_LIMIT,       /* - momentum that no contact may change (math/momentum.h); FAST: energy
+                                       (math/energy_limit.h) */
     SADMM_STAGE_SOLUTION,           /* -    velocities and multipliers to where the caller reads them */
     SADMM_STAGE_PUSH_SOLVE,         /* -    the second problem: velocities that push apart */
     SADMM_STAGE_INTEGRATE,          /* Q states after dt, each body's position correction included (math/trapezoid.h) */
@@ -74,7 +75,7 @@ struct sadmm_stages {
     int next;                              /* enum sadmm_stage_kind */
     struct {                               /* the iterations up to the next stage that needs their result */
         int done;
-        bool last, measure, check, reweigh, balance;
+        bool last, measure, check, weights, balance;
     } batch;
 };
 

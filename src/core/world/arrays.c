@@ -272,8 +272,8 @@ static sadmm_status begin(sadmm_world *world, sadmm_array array, int32_t first, 
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "first = %d, count = %d: must be rows of the array, which has %d", first, count, rows);
     if (count > 0) TRY(sadmm_check_given(values, "values", error));
-    TRY(sadmm_world_pull_bodies(world));
-    return sadmm_world_pull_joints(world);
+    TRY(sadmm_world_download_bodies(world));
+    return sadmm_world_download_joints(world);
 }
 
 sadmm_status sadmm_world_get_array(sadmm_world *world, sadmm_array array, int32_t first, int32_t count, double *values)
@@ -337,12 +337,12 @@ sadmm_status sadmm_world_device_array(sadmm_world *world, sadmm_array array, sad
     if (array != SADMM_ARRAY_BODY_STATE && array != SADMM_ARRAY_BODY_CONTACT_WRENCH)
         return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
                           "array = %d: must be SADMM_ARRAY_BODY_STATE or SADMM_ARRAY_BODY_CONTACT_WRENCH", (int)array);
-    TRY(sadmm_world_settle(world));
+    TRY(sadmm_world_synchronise(world));
     if (world->kernels && !world->kernels->resident) return unavailable(world, "the backend has no memory of its own");
     if (!world->resident.loaded || world->resident.done == 0)
         return unavailable(world, "the world is not there until the backend has made steps, from the first or from the "
                                   "last change on that is no state or wrench");
-    if (world->resident.edited_count > 0)
+    if (world->resident.dirty_count > 0)
         return unavailable(world, "a state or a wrench was set that no step has taken along yet");
     if (array == SADMM_ARRAY_BODY_CONTACT_WRENCH && !world->plan.wrenches)
         return unavailable(world, "settings.recover_wrenches was false");

@@ -7,7 +7,7 @@
 #include "core/base/memory.h"
 #include "core/base/utf8.h"
 #include "core/math/rigid.h"
-#include "core/model/steady.h"
+#include "core/model/extrapolation.h"
 #include "world_internal.h"
 
 static const double POSITION_LIMIT = 1e9, VELOCITY_LIMIT = 1e6, WRENCH_LIMIT = 1e15;
@@ -36,7 +36,7 @@ static sadmm_status check_inertia_ratio(const char *name, const double inertia[3
     if (!(most <= inertia_ratio_limit(precision) * least))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "%s = (%g, %g, %g): the largest must be at most %g times the smallest in %s precision, "
-                          "which cannot tell more apart", name, inertia[0], inertia[1], inertia[2],
+                          "which cannot resolve more", name, inertia[0], inertia[1], inertia[2],
                           inertia_ratio_limit(precision), precision == SADMM_F32 ? "single" : "double");
     return SADMM_OK;
 }
@@ -134,7 +134,7 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     TRY(sadmm_check_given(def, "def", error));
     TRY(sadmm_check_given(id, "id", error));
     TRY(check_def(def, world->def.precision, orientation, error));
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     const size_t slot = sadmm_slots_free(&world->bodies_taken);
     if (slot >= (size_t)1 << 27)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: a world holds at most 2^27", world->body_count);
@@ -179,7 +179,7 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", &world->error);
     if (!body) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     while (body->first_shape) sadmm_world_kill_shape(world, body->first_shape - 1);
     sadmm_world_kill_joints_of(world, (int32_t)id.slot - 1);
     sadmm_pair_table_forget(&world->disabled_pairs, id.slot - 1);
@@ -230,7 +230,7 @@ sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id id, sadmm_
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(state, "state", error));
-    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_download_bodies(world));
     memcpy(state->position, body->rigid.position, sizeof state->position);
     memcpy(state->orientation, body->rigid.orientation, sizeof state->orientation);
     memcpy(state->linear_velocity, body->rigid.velocity, sizeof state->linear_velocity);
@@ -267,14 +267,14 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     TRY(sadmm_check_given(state, "state", error));
     TRY(sadmm_world_check_body_state(body, state, orientation, error));
     /* A static body is part of what the backend was given once. */
-    if (!sadmm_body_moves(body->system_body)) TRY(sadmm_world_take_back(world));
+    if (!sadmm_body_moves(body->system_body)) TRY(sadmm_world_detach(world));
     double velocity[6];
     memcpy(velocity, state->linear_velocity, sizeof state->linear_velocity);
     memcpy(velocity + 3, state->angular_velocity, sizeof state->angular_velocity);
-    steady_set(&body->steady, &body->rigid, state->position, orientation, velocity);
+    extrapolation_set(&body->extrapolation, &body->rigid, state->position, orientation, velocity);
     sadmm_world_moved(world);
-    sadmm_world_edit(world, body, SADMM_EDIT_STATE);
-    if (body->target.set) sadmm_world_edit(world, body, SADMM_EDIT_TARGET);
+    sadmm_world_update(world, body, SADMM_UPDATE_STATE);
+    if (body->target.set) sadmm_world_update(world, body, SADMM_UPDATE_TARGET);
     body->target.set = false;
     return SADMM_OK;
 }
@@ -298,7 +298,7 @@ sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id id, const d
     memcpy(body->target.position, position, sizeof body->target.position);
     memcpy(body->target.orientation, unit, sizeof unit);
     body->target.set = true;
-    sadmm_world_edit(world, body, SADMM_EDIT_TARGET);
+    sadmm_world_update(world, body, SADMM_UPDATE_TARGET);
     return SADMM_OK;
 }
 
@@ -312,7 +312,7 @@ sadmm_status sadmm_world_body_move(sadmm_world *world, sadmm_body_id id, bool *p
     TRY(sadmm_check_given(pending, "pending", error));
     TRY(sadmm_check_given(position, "position", error));
     TRY(sadmm_check_given(orientation, "orientation", error));
-    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_download_bodies(world));
     *pending = body->target.set;
     if (!body->target.set) return SADMM_OK;
     memcpy(position, body->target.position, sizeof body->target.position);
@@ -327,7 +327,7 @@ sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_bo
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", error));
-    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_download_bodies(world));
     memset(def, 0, sizeof *def);
     def->type = body->type;
     def->mass = body->rigid.mass;
@@ -370,10 +370,10 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     TRY(sadmm_check_given(torque, "torque", error));
     TRY(check_dynamic(body, id, "no wrench moves it", error));
     TRY(sadmm_world_check_wrench(force, torque, error));
-    if (body->system_body < 0) TRY(sadmm_world_take_back(world));
+    if (body->system_body < 0) TRY(sadmm_world_detach(world));
     memcpy(body->rigid.wrench, force, 3 * sizeof *force);
     memcpy(body->rigid.wrench + 3, torque, 3 * sizeof *torque);
-    sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
+    sadmm_world_update(world, body, SADMM_UPDATE_FORCES);
     return SADMM_OK;
 }
 
@@ -385,7 +385,7 @@ sadmm_status sadmm_world_body_wrench(sadmm_world *world, sadmm_body_id id, doubl
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(force, "force", error));
     TRY(sadmm_check_given(torque, "torque", error));
-    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_download_bodies(world));
     memcpy(force, body->rigid.wrench, 3 * sizeof *force);
     memcpy(torque, body->rigid.wrench + 3, 3 * sizeof *torque);
     return SADMM_OK;
@@ -399,9 +399,9 @@ sadmm_status sadmm_world_set_body_gravity_scale(sadmm_world *world, sadmm_body_i
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(check_dynamic(body, id, "gravity does not move it", error));
     TRY(sadmm_check_range("scale", scale, -GRAVITY_SCALE_MAX, GRAVITY_SCALE_MAX, error));
-    if (body->system_body < 0) TRY(sadmm_world_take_back(world));
+    if (body->system_body < 0) TRY(sadmm_world_detach(world));
     body->rigid.gravity_scale = scale;
-    sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
+    sadmm_world_update(world, body, SADMM_UPDATE_FORCES);
     return SADMM_OK;
 }
 
@@ -414,10 +414,10 @@ sadmm_status sadmm_world_set_body_damping(sadmm_world *world, sadmm_body_id id, 
     TRY(check_dynamic(body, id, "it has no motion to damp", error));
     TRY(sadmm_check_range("linear", linear, 0, DAMPING_MAX, error));
     TRY(sadmm_check_range("angular", angular, 0, DAMPING_MAX, error));
-    if (body->system_body < 0) TRY(sadmm_world_take_back(world));
+    if (body->system_body < 0) TRY(sadmm_world_detach(world));
     body->rigid.damping[0] = linear;
     body->rigid.damping[1] = angular;
-    sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
+    sadmm_world_update(world, body, SADMM_UPDATE_FORCES);
     return SADMM_OK;
 }
 
@@ -440,7 +440,7 @@ sadmm_status sadmm_world_add_body_force_at(sadmm_world *world, sadmm_body_id id,
     TRY(sadmm_check_given(point, "point", error));
     TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
     TRY(sadmm_check_vector("point", point, 3, POSITION_LIMIT, error));
-    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_download_bodies(world));
     moment_of(&body->rigid, force, point, sum + 3);
     for (int k = 0; k < 6; ++k) sum[k] = body->rigid.wrench[k] + (k < 3 ? force[k] : sum[k]);
     return sadmm_world_set_body_wrench(world, id, sum, sum + 3);
@@ -486,7 +486,7 @@ sadmm_status sadmm_world_set_body_mass(sadmm_world *world, sadmm_body_id id, dou
     TRY(sadmm_check_given(inertia, "inertia", error));
     TRY(check_dynamic(body, id, "it has no mass", error));
     TRY(sadmm_world_check_mass(world, mass, inertia, error));
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     body->rigid.mass = mass;
     memcpy(body->rigid.inertia, inertia, sizeof body->rigid.inertia);
     return SADMM_OK;
@@ -515,7 +515,7 @@ sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id i
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(wrench, "wrench", error));
-    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_download_bodies(world));
     if (!world->stepped || !world->step_settings.recover_wrenches)
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
                           "contact wrenches: there was no step yet, or settings.recover_wrenches was false");
@@ -532,7 +532,7 @@ sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id
     if (!sadmm_world_find_body(world, a, "a", error) || !sadmm_world_find_body(world, b, "b", error))
         return SADMM_ERROR_STALE_ID;
     if (a.slot == b.slot) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "a and b are the same body");
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
     if (!enabled) return sadmm_pair_table_set(&world->disabled_pairs, key, 0, error);
     sadmm_pair_table_remove(&world->disabled_pairs, key);

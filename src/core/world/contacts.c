@@ -17,7 +17,7 @@ static int32_t readable_contacts(const sadmm_world *world)
 int32_t sadmm_world_contact_count(sadmm_world *world)
 {
     if (!world) return 0;
-    sadmm_world_settle_quietly(world);
+    sadmm_world_synchronise_quietly(world);
     return readable_contacts(world);
 }
 
@@ -110,11 +110,11 @@ static sadmm_status check_range(sadmm_world *world, int32_t first, int32_t count
 sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts)
 {
     TRY(sadmm_check_given(world, "world", NULL));
-    TRY(sadmm_world_settle(world));
+    TRY(sadmm_world_synchronise(world));
     TRY(check_range(world, first, count));
     if (count == 0) return SADMM_OK;
     TRY(sadmm_check_given(contacts, "contacts", &world->error));
-    TRY(sadmm_world_pull_contacts(world));
+    TRY(sadmm_world_download_contacts(world));
     const double dt = sadmm_settings_of_substep(&world->step_settings).dt;
     const int32_t points = (int32_t)world->contacts.point_count;
     size_t p = pair_of(&world->contacts, first);
@@ -133,7 +133,7 @@ sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t cou
 sadmm_status sadmm_world_contact_errors(sadmm_world *world, int32_t first, int32_t count, double *errors)
 {
     TRY(sadmm_check_given(world, "world", NULL));
-    TRY(sadmm_world_settle(world));
+    TRY(sadmm_world_synchronise(world));
     TRY(check_range(world, first, count));
     if (count == 0) return SADMM_OK;
     TRY(sadmm_check_given(errors, "errors", &world->error));
@@ -206,7 +206,7 @@ sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem)
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     TRY(sadmm_check_given(problem, "problem", error));
-    TRY(sadmm_world_pull_contacts(world));
+    TRY(sadmm_world_download_contacts(world));
     if (!world->stepped || !world->contacts_readable)
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
                           "there is no step to freeze: none was made yet, or something was removed since");

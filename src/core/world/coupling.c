@@ -126,7 +126,7 @@ sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_d
     struct joint_frame frame = {.orientation = {1, 0, 0, 0}};
     TRY(sadmm_check_given(def, "def", error));
     TRY(check_def(world, def, &frame, &made.last.target, error));
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     made.def = *def;
     q_store(frame.orientation, made.def.orientation);
     const size_t slot = sadmm_slots_free(&world->couplings_taken);
@@ -151,7 +151,7 @@ sadmm_status sadmm_world_remove_coupling(sadmm_world *world, sadmm_coupling_id i
     TRY(sadmm_check_given(world, "world", NULL));
     const struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
     if (!coupling) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     sadmm_world_kill_joint(world, coupling->joint);
     return SADMM_OK;
 }
@@ -188,7 +188,7 @@ sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, 
     const struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
     if (!coupling) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", &world->error));
-    TRY(sadmm_world_pull_joints(world));
+    TRY(sadmm_world_download_joints(world));
     const struct sadmm_rigid *target = &coupling->last.target;
     *def = coupling->def;
     memcpy(def->target_position, target->position, sizeof def->target_position);
@@ -209,7 +209,7 @@ sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_
     TRY(sadmm_check_given(orientation, "orientation", error));
     TRY(sadmm_world_check_target(position, orientation, velocity, &target, error));
     coupling->last.target = target;
-    return sadmm_world_take_edit(world, &world->joints[coupling->joint], SADMM_JOINT_TARGET);
+    return sadmm_world_take_update(world, &world->joints[coupling->joint], SADMM_JOINT_TARGET);
 }
 
 /* Gains, limits and whether it acts: those of `def` from here on. */
@@ -219,7 +219,8 @@ static sadmm_status change(sadmm_world *world, struct sadmm_world_coupling *coup
     coupling->def = *def;
     struct sadmm_world_joint *joint = &world->joints[coupling->joint];
     set_drives(&joint->def, def);
-    for (int k = 0; k <= SADMM_JOINT_ENABLED; ++k) TRY(sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)k));
+    for (int k = 0; k <= SADMM_JOINT_ENABLED; ++k)
+        TRY(sadmm_world_take_update(world, joint, (enum sadmm_joint_update)k));
     return SADMM_OK;
 }
 
@@ -267,8 +268,8 @@ sadmm_status sadmm_world_coupling_state(sadmm_world *world, sadmm_coupling_id id
     const struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
     if (!coupling) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(state, "state", &world->error));
-    TRY(sadmm_world_pull_bodies(world));
-    TRY(sadmm_world_pull_joints(world));
+    TRY(sadmm_world_download_bodies(world));
+    TRY(sadmm_world_download_joints(world));
     const struct sadmm_coupling_memory *last = &coupling->last;
     const struct sadmm_world_joint *joint = &world->joints[coupling->joint];
     const struct joint_end end = joint_end_on(&joint->frame[1], &world->bodies[joint->body[1]].rigid);

@@ -272,7 +272,7 @@ static void push_changes(sadmm_world *world, struct sadmm_touches *before, struc
 static sadmm_status compare_with_last(sadmm_world *world)
 {
     TRY(list_touching(world));
-    if (any_begun(&world->events.touching, &world->events.touching_now)) TRY(sadmm_world_pull_contacts(world));
+    if (any_begun(&world->events.touching, &world->events.touching_now)) TRY(sadmm_world_download_contacts(world));
     TRY(list_inside(world));
     push_changes(world, &world->events.touching, &world->events.touching_now, SADMM_EVENT_CONTACT_BEGUN,
                  SADMM_EVENT_CONTACT_ENDED);

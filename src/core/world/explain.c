@@ -45,12 +45,12 @@ static void explain_options(struct text *t, const struct sadmm_plan *plan, const
     line(t, plan->gyroscopic
                 ? "gyroscopic   midpoint rule on either side of impulses, for bodies of unequal principal moments\n"
                 : "gyroscopic   left out: every body has equal principal moments\n");
-    line(t, plan->predict    ? "start        loads predicted where they can be, else cold: no step came before\n"
+    line(t, plan->initialise   ? "start        impulses initialised where possible, else cold: no step came before\n"
             : plan->warm_start ? "start        warm: impulses and velocities of the last step\n"
                                : "start        cold: impulses 0, velocities A^-1 b (asked for)\n");
     if (s->method == SADMM_METHOD_FAST)
         line(t, "weights      by load, relaxation %g; %s\n", s->relaxation,
-             plan->weight_refresh ? "recomputed during the step, which starts cold"
+             plan->weight_updates ? "recomputed during the step, which starts cold"
              : plan->warm         ? "kept during the step, which starts warm"
                                   : "kept: no constraints");
     else if (plan->penalty_updates)
@@ -78,7 +78,7 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
     const struct sadmm_plan *plan = &world->plan;
     const sadmm_settings settings = sadmm_settings_of_substep(&world->step_settings);
     line(&t, "backend      %s\n", world->why[0] ? world->why : "chosen at the first step");
-    sadmm_world_settle_quietly(world);
+    sadmm_world_synchronise_quietly(world);
     if (!world->stepped) return t.length;
     line(&t, "precision    %s, %d thread%s\n", world->report.precision == SADMM_F32 ? "f32" : "f64",
          world->report.threads, world->report.threads == 1 ? "" : "s");

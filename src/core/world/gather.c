@@ -4,8 +4,8 @@
 #include "collision/bounds.h"
 #include "core/base/barrier.h"
 #include "core/base/memory.h"
+#include "core/model/extrapolation.h"
 #include "core/model/forces.h"
-#include "core/model/steady.h"
 #include "world_internal.h"
 
 static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type == SADMM_BODY_DYNAMIC; }
@@ -34,11 +34,11 @@ static void place(struct sadmm_collision_body *out, const struct sadmm_rigid *ri
 
 /* Where the solve for a dynamic body starts. dt: of the sub-step. */
 static void start_body(sadmm_world *world, int32_t i, const struct sadmm_rigid *rigid,
-                       const struct sadmm_steady *steady, double dt)
+                       const struct sadmm_extrapolation *extrapolation, double dt)
 {
     double *velocity = world->velocity + 6 * (size_t)i;
     world->start.rigid[i] = *rigid;
-    steady_start(rigid, steady, dt, velocity);
+    extrapolation_start(rigid, extrapolation, dt, velocity);
     memcpy(world->start.velocity + 6 * (size_t)i, velocity, 6 * sizeof *velocity);
 }
 
@@ -49,14 +49,14 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
     for (size_t slot = begin; slot < end; ++slot) {
         struct sadmm_world_body *body = &world->bodies[slot];
         struct sadmm_collision_body *out = &world->collision_bodies[slot];
-        out->placed = body->steady.placed;
+        out->placed = body->extrapolation.placed;
         out->environment = body->environment;
         out->system_body = body->system_body = -1;
         place(out, &body->rigid, moves(body), &settings);
         if (!moves(body)) continue;
         out->system_body = body->system_body = dynamic;
-        start_body(world, dynamic, &body->rigid, &body->steady, settings.dt);
-        if (settings.substeps > 1) world->steady[dynamic] = body->steady;
+        start_body(world, dynamic, &body->rigid, &body->extrapolation, settings.dt);
+        if (settings.substeps > 1) world->extrapolation[dynamic] = body->extrapolation;
         world->slot_of[dynamic++] = (int32_t)slot;
     }
 }
@@ -97,7 +97,8 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
         !sadmm_grow_empty(&world->wrench, &world->wrench_capacity, 6 * n, sizeof *world->wrench) ||
         !sadmm_grow_empty(&world->start.velocity, &world->start.velocity_capacity, 6 * n,
                           sizeof *world->start.velocity) ||
-        !sadmm_grow_empty(&world->steady, &world->steady_capacity, several, sizeof *world->steady) ||
+        !sadmm_grow_empty(&world->extrapolation, &world->extrapolation_capacity, several,
+                          sizeof *world->extrapolation) ||
         !sadmm_grow_empty(&world->wrench_sum, &world->wrench_sum_capacity, 6 * several, sizeof *world->wrench_sum) ||
         !sadmm_grow_empty(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
         return sadmm_fail_memory(&world->error, "the step");
@@ -125,8 +126,8 @@ static void turn_share(void *argument, int thread, int threads)
     sadmm_share((size_t)world->dynamic_count, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) {
         const struct sadmm_rigid *next = &world->next[i];
-        steady_keep(&world->steady[i], &world->start.rigid[i], next, dt);
-        start_body(world, (int32_t)i, next, &world->steady[i], dt);
+        extrapolation_keep(&world->extrapolation[i], &world->start.rigid[i], next, dt);
+        start_body(world, (int32_t)i, next, &world->extrapolation[i], dt);
         place(&world->collision_bodies[world->slot_of[i]], next, true, &settings);
     }
     if (!world->plan.wrenches) return;

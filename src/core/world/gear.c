@@ -87,7 +87,7 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *def,
     struct sadmm_world_gear made = {.alive = true, .generation = 1};
     TRY(sadmm_check_given(def, "def", error));
     TRY(sadmm_world_check_gear(world, def, error));
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     made.def = *def;
     made.joint[0] = def->joint_1.slot - 1;
     made.joint[1] = def->joint_2.slot - 1;
@@ -118,7 +118,7 @@ sadmm_status sadmm_world_remove_gear(sadmm_world *world, sadmm_gear_id id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_gear(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     sadmm_world_kill_gear(world, id.slot - 1);
     return SADMM_OK;
 }
@@ -156,7 +156,7 @@ sadmm_status sadmm_world_set_gear_enabled(sadmm_world *world, sadmm_gear_id id, 
     struct sadmm_world_gear *gear = sadmm_world_find_gear(world, id, "id", &world->error);
     if (!gear) return SADMM_ERROR_STALE_ID;
     gear->def.enabled = enabled;
-    sadmm_world_edit_gear(world, gear);
+    sadmm_world_update_gear(world, gear);
     return SADMM_OK;
 }
 

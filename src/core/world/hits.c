@@ -4,8 +4,8 @@
  * for several. So before contacts are found, bodies that no contact supports are followed along their paths: pairs that
  * bounce and approach faster than the threshold of restitution, or pass (swept_bodies.h), are taken one after the
  * other, in the order of the time at which they first touch, each with the law of impact there (core/math/hit.h), and
- * what the two come near from then on is looked for again. A body is then given the start from which it would be where
- * it is, with the velocity that it has:
+ * what the two come near from then on is searched for again. A body is then given the start from which it would be
+ * where it is, with the velocity that it has:
  *
  *     x~ = x(t) - t v~ - t^2/2 a,      v~ = v(t)+ - t a
  *

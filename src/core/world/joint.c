@@ -292,7 +292,7 @@ sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *de
     TRY(check_def(def, &made.def.locks, error));
     TRY(find_sides(world, def, made.body, error));
     TRY(check_frames(def, made.frame, error));
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     q_store(made.frame[0].orientation, made.def.orientation_a);
     q_store(made.frame[1].orientation, made.def.orientation_b);
     if (def->length == -1 && joint_is_radial(def->kind)) {
@@ -359,7 +359,7 @@ sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_id id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_joint(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     sadmm_world_kill_joint(world, id.slot - 1);
     return SADMM_OK;
 }
@@ -406,14 +406,15 @@ sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_
     const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", &world->error));
-    TRY(sadmm_world_pull_joints(world));
+    TRY(sadmm_world_download_joints(world));
     *def = joint->def;
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
+sadmm_status sadmm_world_take_update(sadmm_world *world, struct sadmm_world_joint *joint,
+                                     enum sadmm_joint_update update)
 {
-    return sadmm_world_edit_joint(world, joint, edit) ? SADMM_OK : sadmm_world_take_back(world);
+    return sadmm_world_update_joint(world, joint, update) ? SADMM_OK : sadmm_world_detach(world);
 }
 
 sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled)
@@ -423,7 +424,7 @@ sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id
     if (!joint) return SADMM_ERROR_STALE_ID;
     joint->def.enabled = enabled;
     joint->last.broken = joint->last.broken && !enabled;
-    return sadmm_world_take_edit(world, joint, SADMM_JOINT_ENABLED);
+    return sadmm_world_take_update(world, joint, SADMM_JOINT_ENABLED);
 }
 
 static sadmm_status check_free(const struct sadmm_world_joint *joint, int32_t index, struct sadmm_error *error)
@@ -452,7 +453,7 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
     TRY(sadmm_check_given(coordinate, "coordinate", error));
     TRY(sadmm_world_check_coordinate(joint, index, coordinate, error));
     joint->def.coordinates[index] = *coordinate;
-    return sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)index);
+    return sadmm_world_take_update(world, joint, (enum sadmm_joint_update)index);
 }
 
 sadmm_status sadmm_world_check_table(const double *positions, const double *forces, int32_t count,
@@ -489,7 +490,7 @@ sadmm_status sadmm_world_set_joint_spring_table(sadmm_world *world, sadmm_joint_
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(check_free(joint, index, error));
     TRY(sadmm_world_check_table(positions, forces, count, error));
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     const size_t n = (size_t)count;
     double *table = n ? (double *)sadmm_alloc(2 * n, sizeof *table) : NULL;
     if (n && !table) return sadmm_fail_memory(error, "a spring's table");
@@ -530,7 +531,7 @@ sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, c
     TRY(find_sides(world, def, slots, error));
     TRY(sadmm_check_vector("position", position, 3, FRAME_LIMIT, error));
     TRY(sadmm_check_orientation("orientation", orientation, unit, error));
-    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_download_bodies(world));
     for (int s = 0; s < 2; ++s) {
         static const struct sadmm_rigid origin = {.orientation = {1, 0, 0, 0}};
         const struct sadmm_rigid *body = slots[s] >= 0 ? pose_of(world, slots[s]) : &origin;
@@ -564,8 +565,8 @@ sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadm
     const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(state, "state", &world->error));
-    TRY(sadmm_world_pull_bodies(world));
-    TRY(sadmm_world_pull_joints(world));
+    TRY(sadmm_world_download_bodies(world));
+    TRY(sadmm_world_download_joints(world));
     const struct sadmm_joint_memory *last = &joint->last;
     memset(state, 0, sizeof *state);
     read_motion(world, joint, state);

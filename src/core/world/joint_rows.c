@@ -113,7 +113,7 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
         if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
         if (!add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt) || !add_slots(world, joint, before))
             return sadmm_fail_memory(&world->error, "the joints' rows");
-        joint_forget_forces(&joint->next); /* the solution tells */
+        joint_forget_forces(&joint->next); /* the solution says */
     }
     bool any;
     TRY(sadmm_world_make_gear_rows(world, settings));

@@ -4,9 +4,9 @@
  * An island may have one of them as its only support. With c the rigid motion of that body, taken at the island's
  * bodies, v = c + v' is a change of variables: A v' = (b - A c) + J^T lambda, contacts between the bodies see no more
  * of v than of v', and those with the support see it all but at rest. So such an island is solved for v', and all that
- * the method `fast` makes of velocities and energies (loads of first steps, weights, the limit) is what it is on the
- * ground: a stack in a lift stands as well as one beside it. Others, a row that a wall pushes over the floor, are
- * solved for v. */
+ * the method `fast` makes of velocities and energies (initial impulses of first steps, weights, the energy limit) is
+ * what it is on the ground: a stack in a lift stands as well as one beside it. Others, a row that a wall pushes over
+ * the floor, are solved for v. */
 #include <string.h>
 
 #include "core/base/memory.h"

@@ -1,4 +1,4 @@
-/* What queries look at: the world's shapes where they are, in a tree. It is brought up to date by the first query that
+/* What queries search: the world's shapes where they are, in a tree. It is brought up to date by the first query that
  * finds it behind; bodies that move, and shapes that come and go, only leave a mark. */
 #include <math.h>
 #include <string.h>
@@ -90,7 +90,7 @@ static sadmm_status list(sadmm_world *world)
 
 sadmm_status sadmm_world_begin_query(sadmm_world *world)
 {
-    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_download_bodies(world));
     if (world->query.prelude) return SADMM_OK;
     world->query.prelude = (double *)sadmm_alloc(HULL_FIRST_OWN, sizeof *world->query.prelude);
     if (!world->query.prelude) return sadmm_fail_memory(&world->error, "a query");

@@ -1,20 +1,20 @@
 /* A world that a backend keeps (resident.h): steps are enqueued there, and the host's copy follows on demand.
  *
- *     loaded           the backend has the world. States and wrenches set meanwhile are edits, which go along with the
- *                      next step; any other change first takes the world back, and the next step loads it again.
+ *     loaded           the backend has the world. States and wrenches set meanwhile are updates, which go along with
+ *                      the next step; any other change first detaches the world, and the next step loads it again.
  *     running          steps were enqueued whose end nobody has waited for
  *     bodies_behind,   the host's bodies, or contacts with everything else about the last step, are older than the
- *     contacts_behind  backend's: getters pull them, once
+ *     contacts_behind  backend's: getters download them, once
  *
- * What was set is in the host's bodies at once, however far behind they are; `set_at` tells a pull that it is newer
- * than what the backend has. So the host's world is a whole one at any time, and what is left when a device is lost.
+ * What was set is in the host's bodies at once, however far behind they are; `set_at` says whether that is newer than
+ * what a download brings. So the host's world is a whole one at any time, and what is left when a device is lost.
  */
 #include <string.h>
 
 #include "core/base/clock.h"
 #include "core/base/memory.h"
+#include "core/model/extrapolation.h"
 #include "core/model/forces.h"
-#include "core/model/steady.h"
 #include "core/solve/certificate.h"
 #include "world_internal.h"
 
@@ -24,8 +24,8 @@ enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Of the stop rules a backend checks the certificate's in the method FAST alone; and the loads of a first step are
-     * predicted on the host. */
+    /* Of the stop rules a backend checks the certificate's in the method FAST alone; and the impulses of a first step
+     * are initialised on the host. */
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
@@ -35,17 +35,17 @@ bool sadmm_world_may_reside(const sadmm_world *world)
            (s->certificate_tolerance <= 0 || (fast && few_checks));
 }
 
-/* ---- edits ------------------------------------------------------------------------------------------------------- */
+/* ---- updates ----------------------------------------------------------------------------------------------------- */
 
 /* The body itself holds what was set last; of a kind the next step takes it along once, however often it was set. */
 static void mark(sadmm_world *world, struct sadmm_world_body *body, uint32_t kinds)
 {
-    if (kinds && !body->edits)
-        world->resident.edited[world->resident.edited_count++] = (uint32_t)(body - world->bodies);
-    body->edits |= kinds;
+    if (kinds && !body->dirty)
+        world->resident.dirty[world->resident.dirty_count++] = (uint32_t)(body - world->bodies);
+    body->dirty |= kinds;
 }
 
-void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sadmm_edit_kind kind)
+void sadmm_world_update(sadmm_world *world, struct sadmm_world_body *body, enum sadmm_update_kind kind)
 {
     if (!world->resident.loaded) return;
     mark(world, body, UINT32_C(1) << kind);
@@ -53,75 +53,75 @@ void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sa
 }
 
 /* What was set for steps that have not been done goes along with the next one. */
-static void edit_body_again(sadmm_world *world, struct sadmm_world_body *body)
+static void update_body_again(sadmm_world *world, struct sadmm_world_body *body)
 {
-    for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) {
+    for (int kind = 0; kind < SADMM_BODY_UPDATES; ++kind) {
         if (body->set_at[kind] < world->resident.done) continue;
         mark(world, body, UINT32_C(1) << kind);
         body->set_at[kind] = world->resident.done;
     }
 }
 
-static void edit_again(sadmm_world *world)
+static void update_again(sadmm_world *world)
 {
-    for (int32_t i = 0; i < world->dynamic_count; ++i) edit_body_again(world, &world->bodies[world->slot_of[i]]);
+    for (int32_t i = 0; i < world->dynamic_count; ++i) update_body_again(world, &world->bodies[world->slot_of[i]]);
     for (int32_t k = 0; k < world->kinematic_count; ++k)
-        edit_body_again(world, &world->bodies[world->kinematic_slots[k]]);
-    sadmm_world_edit_joints_again(world);
+        update_body_again(world, &world->bodies[world->kinematic_slots[k]]);
+    sadmm_world_update_joints_again(world);
 }
 
-static void forget_edits(sadmm_world *world)
+static void forget_updates(sadmm_world *world)
 {
-    for (size_t k = 0; k < world->resident.edited_count; ++k) world->bodies[world->resident.edited[k]].edits = 0;
-    world->resident.edited_count = 0;
-    sadmm_world_forget_joint_edits(world);
+    for (size_t k = 0; k < world->resident.dirty_count; ++k) world->bodies[world->resident.dirty[k]].dirty = 0;
+    world->resident.dirty_count = 0;
+    sadmm_world_forget_joint_updates(world);
 }
 
-static void put_edit(const sadmm_world *world, struct sadmm_resident_edit *edit, const struct sadmm_world_body *body,
-                     enum sadmm_edit_kind kind)
+static void put_update(const sadmm_world *world, struct sadmm_resident_update *update,
+                       const struct sadmm_world_body *body, enum sadmm_update_kind kind)
 {
     const struct sadmm_rigid *rigid = &body->rigid;
-    memset(edit, 0, sizeof *edit);
-    edit->kind = kind;
-    edit->target = body->system_body;
-    if (kind == SADMM_EDIT_STATE) {
-        memcpy(edit->values, rigid->position, sizeof rigid->position);
-        memcpy(edit->values + 3, rigid->orientation, sizeof rigid->orientation);
-        memcpy(edit->values + 7, rigid->velocity, sizeof rigid->velocity);
-    } else if (kind == SADMM_EDIT_TARGET) {
-        edit->values[0] = body->target.set;
-        memcpy(edit->values + 1, body->target.position, sizeof body->target.position);
-        memcpy(edit->values + 4, body->target.orientation, sizeof body->target.orientation);
-        edit->values[8] = world->def.settings.dt;
+    memset(update, 0, sizeof *update);
+    update->kind = kind;
+    update->target = body->system_body;
+    if (kind == SADMM_UPDATE_STATE) {
+        memcpy(update->values, rigid->position, sizeof rigid->position);
+        memcpy(update->values + 3, rigid->orientation, sizeof rigid->orientation);
+        memcpy(update->values + 7, rigid->velocity, sizeof rigid->velocity);
+    } else if (kind == SADMM_UPDATE_TARGET) {
+        update->values[0] = body->target.set;
+        memcpy(update->values + 1, body->target.position, sizeof body->target.position);
+        memcpy(update->values + 4, body->target.orientation, sizeof body->target.orientation);
+        update->values[8] = world->def.settings.dt;
     } else {
-        memcpy(edit->values, rigid->wrench, sizeof rigid->wrench);
-        edit->values[6] = rigid->gravity_scale;
-        memcpy(edit->values + 7, rigid->damping, sizeof rigid->damping);
+        memcpy(update->values, rigid->wrench, sizeof rigid->wrench);
+        update->values[6] = rigid->gravity_scale;
+        memcpy(update->values + 7, rigid->damping, sizeof rigid->damping);
     }
 }
 
-static sadmm_status list_edits(sadmm_world *world, size_t *count)
+static sadmm_status list_updates(sadmm_world *world, size_t *count)
 {
     *count = 0;
-    if (!sadmm_grow(&world->resident.edits, &world->resident.edit_capacity, 0,
-                    SADMM_BODY_EDITS * world->resident.edited_count, sizeof *world->resident.edits))
+    if (!sadmm_grow(&world->resident.updates, &world->resident.update_capacity, 0,
+                    SADMM_BODY_UPDATES * world->resident.dirty_count, sizeof *world->resident.updates))
         return sadmm_fail_memory(&world->error, "changes of bodies");
-    for (size_t k = 0; k < world->resident.edited_count; ++k) {
-        const struct sadmm_world_body *body = &world->bodies[world->resident.edited[k]];
-        for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind)
-            if (body->edits >> kind & 1)
-                put_edit(world, &world->resident.edits[(*count)++], body, (enum sadmm_edit_kind)kind);
+    for (size_t k = 0; k < world->resident.dirty_count; ++k) {
+        const struct sadmm_world_body *body = &world->bodies[world->resident.dirty[k]];
+        for (int kind = 0; kind < SADMM_BODY_UPDATES; ++kind)
+            if (body->dirty >> kind & 1)
+                put_update(world, &world->resident.updates[(*count)++], body, (enum sadmm_update_kind)kind);
     }
-    return sadmm_world_list_joint_edits(world, count);
+    return sadmm_world_list_joint_updates(world, count);
 }
 
 /* ---- to the backend ---------------------------------------------------------------------------------------------- */
 
 /* Nothing of it is on its way: what it is now goes along with the world. */
-static void begin_edits(struct sadmm_world_body *body)
+static void begin_updates(struct sadmm_world_body *body)
 {
-    body->edits = 0;
-    for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) body->set_at[kind] = -1;
+    body->dirty = 0;
+    for (int kind = 0; kind < SADMM_BODY_UPDATES; ++kind) body->set_at[kind] = -1;
 }
 
 /* Which bodies joints hold. */
@@ -143,17 +143,17 @@ static sadmm_status load(sadmm_world *world)
     sadmm_status status = sadmm_world_gather(world);
     sadmm_world_swap_starts(world);
     TRY(status);
-    if (!sadmm_grow(&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
-                    sizeof *world->resident.steady) ||
-        !sadmm_grow(&world->resident.edited, &world->resident.edited_capacity, 0, n + kinematic + 1,
-                    sizeof *world->resident.edited))
+    if (!sadmm_grow(&world->resident.extrapolation, &world->resident.extrapolation_capacity, 0, n + 1,
+                    sizeof *world->resident.extrapolation) ||
+        !sadmm_grow(&world->resident.dirty, &world->resident.dirty_capacity, 0, n + kinematic + 1,
+                    sizeof *world->resident.dirty))
         return sadmm_fail_memory(&world->error, "the step");
     for (size_t i = 0; i < n; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-        world->resident.steady[i] = body->steady;
-        begin_edits(body);
+        world->resident.extrapolation[i] = body->extrapolation;
+        begin_updates(body);
     }
-    for (size_t k = 0; k < kinematic; ++k) begin_edits(&world->bodies[world->kinematic_slots[k]]);
+    for (size_t k = 0; k < kinematic; ++k) begin_updates(&world->bodies[world->kinematic_slots[k]]);
     TRY(sadmm_world_list_kinematic(world));
     TRY(sadmm_world_list_joints(world));
     TRY(sadmm_world_list_gears(world));
@@ -163,7 +163,7 @@ static sadmm_status load(sadmm_world *world)
         .input = &input,
         .body_count = world->dynamic_count,
         .rigid = world->last_start.rigid,
-        .steady = world->resident.steady,
+        .extrapolation = world->resident.extrapolation,
         .slot_of = world->slot_of,
         .kinematic_count = world->kinematic_count,
         .kinematic = world->resident.kinematic,
@@ -184,10 +184,10 @@ static sadmm_status load(sadmm_world *world)
     TRY(world->kernels->resident->load(world->context, &whole, &world->def.settings, &world->error));
     world->resident.loaded = true;
     world->resident.enqueued = world->resident.done = world->resident.repeats = 0;
-    world->resident.edited_count = 0;
+    world->resident.dirty_count = 0;
     for (size_t k = 0; k < kinematic; ++k) {
         struct sadmm_world_body *body = &world->bodies[world->kinematic_slots[k]];
-        if (body->target.set) sadmm_world_edit(world, body, SADMM_EDIT_TARGET);
+        if (body->target.set) sadmm_world_update(world, body, SADMM_UPDATE_TARGET);
     }
     world->resident.kept_step = world->report.step;
     world->resident.kept_time = world->report.time;
@@ -196,8 +196,8 @@ static sadmm_status load(sadmm_world *world)
 
 static sadmm_status certify(sadmm_world *world)
 {
-    TRY(sadmm_world_pull_bodies(world));
-    TRY(sadmm_world_pull_contacts(world));
+    TRY(sadmm_world_download_bodies(world));
+    TRY(sadmm_world_download_contacts(world));
     struct sadmm_system system = sadmm_world_system(world);
     const sadmm_settings settings = sadmm_settings_of_substep(&world->step_settings);
     double begin = sadmm_clock_ms();
@@ -217,7 +217,7 @@ static sadmm_status take_failed(sadmm_world *world)
     return sadmm_fail(&world->error, failed.status, "%s", failed.message);
 }
 
-static sadmm_status settle(sadmm_world *world, sadmm_status status);
+static sadmm_status synchronise(sadmm_world *world, sadmm_status status);
 
 /* Load the world if need be, and enqueue a step. */
 static sadmm_status enqueue(sadmm_world *world)
@@ -225,14 +225,14 @@ static sadmm_status enqueue(sadmm_world *world)
     const struct sadmm_resident_kernels *backend = world->kernels->resident;
     size_t count;
     if (!world->resident.loaded) TRY(load(world));
-    TRY(list_edits(world, &count));
+    TRY(list_updates(world, &count));
     sadmm_status status =
-        backend->step(world->context, &world->def.settings, world->resident.edits, count, &world->error);
+        backend->step(world->context, &world->def.settings, world->resident.updates, count, &world->error);
     world->resident.running = true;
     if (status != SADMM_OK)
-        return settle(world, status); /* of this step or an earlier one: how far has the world got? */
+        return synchronise(world, status); /* of this step or an earlier one: how far has the world got? */
     ++world->resident.enqueued;
-    forget_edits(world);
+    forget_updates(world);
     return SADMM_OK;
 }
 
@@ -243,7 +243,7 @@ sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait)
     TRY(take_failed(world));
     TRY(sadmm_world_contain(world, enqueue(world)));
     if (!wait && !certified) return SADMM_OK;
-    TRY(sadmm_world_settle(world));
+    TRY(sadmm_world_synchronise(world));
     world->report.ms.total = sadmm_clock_ms() - begin; /* what the caller waited */
     return certified ? certify(world) : SADMM_OK;
 }
@@ -268,7 +268,7 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
 }
 
 /* Hits of the last step, for who reads contacts, or events. */
-static sadmm_status pull_hits(sadmm_world *world)
+static sadmm_status download_hits(sadmm_world *world)
 {
     const struct sadmm_resident_kernels *backend = world->kernels->resident;
     struct sadmm_step_start *start = &world->start;
@@ -287,7 +287,7 @@ static sadmm_status pull_hits(sadmm_world *world)
 }
 
 /* `status`: of the call before, or SADMM_OK. The error of a step that failed is returned once. */
-static sadmm_status settle(sadmm_world *world, sadmm_status status)
+static sadmm_status synchronise(sadmm_world *world, sadmm_status status)
 {
     struct sadmm_resident_report report = {.offending_body = -1};
     if (!world->resident.running) return status;
@@ -297,12 +297,12 @@ static sadmm_status settle(sadmm_world *world, sadmm_status status)
     if (waited == SADMM_OK) world->error = before;
     else status = waited;
     take_report(world, &report);
-    if (status == SADMM_OK) status = pull_hits(world);
+    if (status == SADMM_OK) status = download_hits(world);
     if (status != SADMM_OK) {
         /* The step that failed may have written over what the last one started from: only a copy on the host is
          * left. */
         if (world->resident.contacts_behind) world->contacts_readable = false;
-        edit_again(world);
+        update_again(world);
     }
     world->resident.enqueued = world->resident.done;
     if (status != SADMM_ERROR_NON_FINITE || report.offending_body == -1) return status;
@@ -311,18 +311,18 @@ static sadmm_status settle(sadmm_world *world, sadmm_status status)
 }
 
 /* The backend does not change forces, nor a state that was set after the last step. */
-static sadmm_status pull_bodies(sadmm_world *world)
+static sadmm_status download_bodies(sadmm_world *world)
 {
-    TRY(settle(world, SADMM_OK));
+    TRY(synchronise(world, SADMM_OK));
     if (!world->resident.bodies_behind) return SADMM_OK;
-    TRY(world->kernels->resident->read_bodies(world->context, world->next, world->resident.steady,
+    TRY(world->kernels->resident->read_bodies(world->context, world->next, world->resident.extrapolation,
                                               world->plan.wrenches ? world->wrench : NULL, &world->error));
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
         forces_copy(&world->next[i], &body->rigid);
-        body->steady = world->resident.steady[i];
-        if (body->set_at[SADMM_EDIT_STATE] < world->resident.done) body->rigid = world->next[i];
-        else steady_place(&body->steady, &world->next[i], body->rigid.position, body->rigid.orientation);
+        body->extrapolation = world->resident.extrapolation[i];
+        if (body->set_at[SADMM_UPDATE_STATE] < world->resident.done) body->rigid = world->next[i];
+        else extrapolation_place(&body->extrapolation, &world->next[i], body->rigid.position, body->rigid.orientation);
         if (world->plan.wrenches)
             memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
     }
@@ -335,10 +335,10 @@ static sadmm_status pull_bodies(sadmm_world *world)
 }
 
 /* Contacts last: they are the old ones until all is there. */
-static sadmm_status pull_contacts(sadmm_world *world)
+static sadmm_status download_contacts(sadmm_world *world)
 {
     const struct sadmm_resident_kernels *backend = world->kernels ? world->kernels->resident : NULL;
-    TRY(settle(world, SADMM_OK));
+    TRY(synchronise(world, SADMM_OK));
     if (!world->resident.contacts_behind) return SADMM_OK;
     size_t count = (size_t)world->report.contacts, n = (size_t)world->dynamic_count;
     struct sadmm_step_start *start = &world->start;
@@ -357,34 +357,34 @@ static sadmm_status pull_contacts(sadmm_world *world)
     return SADMM_OK;
 }
 
-static sadmm_status pull_joints(sadmm_world *world)
+static sadmm_status download_joints(sadmm_world *world)
 {
-    TRY(settle(world, SADMM_OK));
+    TRY(synchronise(world, SADMM_OK));
     if (!world->resident.joints_behind) return SADMM_OK;
     TRY(sadmm_world_read_joints(world));
     world->resident.joints_behind = false;
     return SADMM_OK;
 }
 
-static sadmm_status take_back(sadmm_world *world)
+static sadmm_status detach(sadmm_world *world)
 {
     if (!world->resident.loaded) return SADMM_OK;
-    TRY(pull_bodies(world));
-    TRY(pull_contacts(world));
-    TRY(pull_joints(world));
+    TRY(download_bodies(world));
+    TRY(download_contacts(world));
+    TRY(download_joints(world));
     world->resident.loaded = false;
-    forget_edits(world);
+    forget_updates(world);
     return SADMM_OK;
 }
 
 /* ---- a device that fails ----------------------------------------------------------------------------------------- */
 
-/* A call may fail and the next one succeed: then nothing is lost. Steps whose end the backend cannot tell have not been
- * done. */
+/* A call may fail and the next one succeed: then nothing is lost. Steps whose end the backend cannot report have not
+ * been done. */
 static bool save(sadmm_world *world)
 {
     world->resident.running = true;
-    return settle(world, SADMM_OK) != SADMM_ERROR_DEVICE && take_back(world) == SADMM_OK;
+    return synchronise(world, SADMM_OK) != SADMM_ERROR_DEVICE && detach(world) == SADMM_OK;
 }
 
 /* The steps after the bodies were read last are lost; what was set since then is in the bodies. */
@@ -397,7 +397,7 @@ static void fall_back(sadmm_world *world)
     world->stepped = world->report.step > 0;
     world->resident.loaded = world->resident.running = false;
     world->resident.bodies_behind = world->resident.contacts_behind = world->resident.joints_behind = false;
-    forget_edits(world);
+    forget_updates(world);
 }
 
 sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status)
@@ -413,28 +413,28 @@ sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status)
                       (long long)world->report.step);
 }
 
-sadmm_status sadmm_world_settle(sadmm_world *world)
+sadmm_status sadmm_world_synchronise(sadmm_world *world)
 {
     TRY(take_failed(world));
-    return sadmm_world_contain(world, settle(world, SADMM_OK));
+    return sadmm_world_contain(world, synchronise(world, SADMM_OK));
 }
 
-void sadmm_world_settle_quietly(sadmm_world *world)
+void sadmm_world_synchronise_quietly(sadmm_world *world)
 {
     if (world->resident.failed.status != SADMM_OK) return;
-    if (sadmm_world_contain(world, settle(world, SADMM_OK)) != SADMM_OK) world->resident.failed = world->error;
+    if (sadmm_world_contain(world, synchronise(world, SADMM_OK)) != SADMM_OK) world->resident.failed = world->error;
 }
 
-sadmm_status sadmm_world_pull_bodies(sadmm_world *world)
+sadmm_status sadmm_world_download_bodies(sadmm_world *world)
 {
     TRY(take_failed(world));
-    return sadmm_world_contain(world, pull_bodies(world));
+    return sadmm_world_contain(world, download_bodies(world));
 }
 
-sadmm_status sadmm_world_pull_contacts(sadmm_world *world)
+sadmm_status sadmm_world_download_contacts(sadmm_world *world)
 {
     TRY(take_failed(world));
-    return sadmm_world_contain(world, pull_contacts(world));
+    return sadmm_world_contain(world, download_contacts(world));
 }
 
 sadmm_status sadmm_world_read_touching(sadmm_world *world, struct sadmm_touching_shapes *touching)
@@ -443,14 +443,14 @@ sadmm_status sadmm_world_read_touching(sadmm_world *world, struct sadmm_touching
                                world->kernels->resident->read_touching(world->context, touching, &world->error));
 }
 
-sadmm_status sadmm_world_pull_joints(sadmm_world *world)
+sadmm_status sadmm_world_download_joints(sadmm_world *world)
 {
     TRY(take_failed(world));
-    return sadmm_world_contain(world, pull_joints(world));
+    return sadmm_world_contain(world, download_joints(world));
 }
 
-sadmm_status sadmm_world_take_back(sadmm_world *world)
+sadmm_status sadmm_world_detach(sadmm_world *world)
 {
     TRY(take_failed(world));
-    return sadmm_world_contain(world, take_back(world));
+    return sadmm_world_contain(world, detach(world));
 }

@@ -44,7 +44,7 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
     const size_t count = (size_t)world->joint_count;
     size_t i = 0;
     world->resident.joint_count = world->resident.joint_constraints = world->resident.coupling_count = 0;
-    world->resident.edited_joint_count = 0;
+    world->resident.dirty_joint_count = 0;
     world->resident.table_numbers = 0;
     if (world->table_count > INT32_MAX / (2 * SADMM_MOST_SPRING_POINTS))
         return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d tables of springs: a backend holds at most %d",
@@ -57,8 +57,8 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
                           (size_t)world->coupling_count, sizeof *world->resident.coupling_memory) ||
         !sadmm_grow_empty(&world->resident.joint_slots, &world->resident.joint_slot_capacity, count,
                           sizeof *world->resident.joint_slots) ||
-        !sadmm_grow_empty(&world->resident.edited_joints, &world->resident.edited_joint_capacity, count,
-                          sizeof *world->resident.edited_joints))
+        !sadmm_grow_empty(&world->resident.dirty_joints, &world->resident.dirty_joint_capacity, count,
+                          sizeof *world->resident.dirty_joints))
         return sadmm_fail_memory(&world->error, "joints for the backend");
     for (size_t slot = 0; i < count && slot < world->joint_slots; ++slot) {
         struct sadmm_world_joint *joint = &world->joints[slot];
@@ -76,8 +76,8 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
         joint->resident = (int32_t)i;
         joint->resident_constraints = world->resident.joints[i++].constraints;
         world->resident.joint_constraints += joint->resident_constraints;
-        joint->edits = 0;
-        for (int edit = 0; edit < SADMM_JOINT_EDITS; ++edit) joint->set_at[edit] = -1;
+        joint->dirty = 0;
+        for (int update = 0; update < SADMM_JOINT_UPDATES; ++update) joint->set_at[update] = -1;
     }
     world->resident.joint_count = (int32_t)i;
     return SADMM_OK;
@@ -116,120 +116,121 @@ sadmm_status sadmm_world_list_gears(sadmm_world *world)
         if (!gear->alive) continue;
         world->resident.gears[g] = gear_for_backend(world, gear);
         world->resident.gear_force[g++] = gear->last.force;
-        gear->edited = false;
+        gear->dirty = false;
         gear->set_at = -1;
     }
     world->resident.gear_count = (int32_t)g;
-    world->resident.gears_edited = false;
+    world->resident.gears_dirty = false;
     world->resident.joint_constraints += (int32_t)g;
     return SADMM_OK;
 }
 
-/* ---- edits ------------------------------------------------------------------------------------------------------- */
+/* ---- updates ----------------------------------------------------------------------------------------------------- */
 
-void sadmm_world_edit_gear(sadmm_world *world, struct sadmm_world_gear *gear)
+void sadmm_world_update_gear(sadmm_world *world, struct sadmm_world_gear *gear)
 {
     if (!world->resident.loaded) return;
-    gear->edited = world->resident.gears_edited = true;
+    gear->dirty = world->resident.gears_dirty = true;
     gear->set_at = world->resident.enqueued;
 }
 
-static void edit_gears_again(sadmm_world *world)
+static void update_gears_again(sadmm_world *world)
 {
     for (size_t slot = 0; world->resident.gear_count > 0 && slot < world->gear_slots; ++slot) {
         struct sadmm_world_gear *gear = &world->gears[slot];
         if (!gear->alive || gear->set_at < world->resident.done) continue;
-        gear->edited = world->resident.gears_edited = true;
+        gear->dirty = world->resident.gears_dirty = true;
         gear->set_at = world->resident.done;
     }
 }
 
-static void forget_gear_edits(sadmm_world *world)
+static void forget_gear_updates(sadmm_world *world)
 {
-    for (size_t slot = 0; world->resident.gears_edited && slot < world->gear_slots; ++slot)
-        world->gears[slot].edited = false;
-    world->resident.gears_edited = false;
+    for (size_t slot = 0; world->resident.gears_dirty && slot < world->gear_slots; ++slot)
+        world->gears[slot].dirty = false;
+    world->resident.gears_dirty = false;
 }
 
 /* Room is there. */
-static void list_gear_edits(sadmm_world *world, size_t *count)
+static void list_gear_updates(sadmm_world *world, size_t *count)
 {
     int32_t g = 0;
-    for (size_t slot = 0; world->resident.gears_edited && slot < world->gear_slots; ++slot) {
+    for (size_t slot = 0; world->resident.gears_dirty && slot < world->gear_slots; ++slot) {
         const struct sadmm_world_gear *gear = &world->gears[slot];
         if (!gear->alive) continue;
-        if (gear->edited)
-            world->resident.edits[(*count)++] =
-                (struct sadmm_resident_edit){SADMM_EDIT_GEAR, g, {gear->def.enabled}};
+        if (gear->dirty)
+            world->resident.updates[(*count)++] =
+                (struct sadmm_resident_update){SADMM_UPDATE_GEAR, g, {gear->def.enabled}};
         ++g;
     }
 }
 
-static void mark(sadmm_world *world, struct sadmm_world_joint *joint, uint32_t edits)
+static void mark(sadmm_world *world, struct sadmm_world_joint *joint, uint32_t updates)
 {
-    if (edits && !joint->edits)
-        world->resident.edited_joints[world->resident.edited_joint_count++] = (uint32_t)(joint - world->joints);
-    joint->edits |= edits;
+    if (updates && !joint->dirty)
+        world->resident.dirty_joints[world->resident.dirty_joint_count++] = (uint32_t)(joint - world->joints);
+    joint->dirty |= updates;
 }
 
-bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
+bool sadmm_world_update_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_update update)
 {
     if (!world->resident.loaded) return true;
     if (sadmm_joint_constraints(joint) > joint->resident_constraints) return false;
-    mark(world, joint, UINT32_C(1) << edit);
-    joint->set_at[edit] = world->resident.enqueued;
+    mark(world, joint, UINT32_C(1) << update);
+    joint->set_at[update] = world->resident.enqueued;
     return true;
 }
 
-void sadmm_world_edit_joints_again(sadmm_world *world)
+void sadmm_world_update_joints_again(sadmm_world *world)
 {
     for (int32_t i = 0; i < world->resident.joint_count; ++i) {
         struct sadmm_world_joint *joint = &world->joints[world->resident.joint_slots[i]];
-        for (int edit = 0; edit < SADMM_JOINT_EDITS; ++edit) {
-            if (joint->set_at[edit] < world->resident.done) continue;
-            mark(world, joint, UINT32_C(1) << edit);
-            joint->set_at[edit] = world->resident.done;
+        for (int update = 0; update < SADMM_JOINT_UPDATES; ++update) {
+            if (joint->set_at[update] < world->resident.done) continue;
+            mark(world, joint, UINT32_C(1) << update);
+            joint->set_at[update] = world->resident.done;
         }
     }
-    edit_gears_again(world);
+    update_gears_again(world);
 }
 
-void sadmm_world_forget_joint_edits(sadmm_world *world)
+void sadmm_world_forget_joint_updates(sadmm_world *world)
 {
-    for (size_t k = 0; k < world->resident.edited_joint_count; ++k)
-        world->joints[world->resident.edited_joints[k]].edits = 0;
-    world->resident.edited_joint_count = 0;
-    forget_gear_edits(world);
+    for (size_t k = 0; k < world->resident.dirty_joint_count; ++k)
+        world->joints[world->resident.dirty_joints[k]].dirty = 0;
+    world->resident.dirty_joint_count = 0;
+    forget_gear_updates(world);
 }
 
-static void put_target(const struct sadmm_rigid *target, double values[SADMM_EDIT_VALUES])
+static void put_target(const struct sadmm_rigid *target, double values[SADMM_UPDATE_VALUES])
 {
     memcpy(values, target->position, sizeof target->position);
     memcpy(values + 3, target->orientation, sizeof target->orientation);
     memcpy(values + 7, target->velocity, sizeof target->velocity);
 }
 
-sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count)
+sadmm_status sadmm_world_list_joint_updates(sadmm_world *world, size_t *count)
 {
-    const size_t gears = world->resident.gears_edited ? (size_t)world->resident.gear_count : 0;
-    if (!sadmm_grow(&world->resident.edits, &world->resident.edit_capacity, *count,
-                    *count + SADMM_JOINT_EDITS * world->resident.edited_joint_count + gears,
-                    sizeof *world->resident.edits))
+    const size_t gears = world->resident.gears_dirty ? (size_t)world->resident.gear_count : 0;
+    if (!sadmm_grow(&world->resident.updates, &world->resident.update_capacity, *count,
+                    *count + SADMM_JOINT_UPDATES * world->resident.dirty_joint_count + gears,
+                    sizeof *world->resident.updates))
         return sadmm_fail_memory(&world->error, "changes of joints");
-    for (size_t k = 0; k < world->resident.edited_joint_count; ++k) {
-        const struct sadmm_world_joint *joint = &world->joints[world->resident.edited_joints[k]];
-        for (int edit = 0; edit < SADMM_JOINT_EDITS; ++edit) {
-            if (!(joint->edits >> edit & 1)) continue;
-            struct sadmm_resident_edit *out = &world->resident.edits[(*count)++];
+    for (size_t k = 0; k < world->resident.dirty_joint_count; ++k) {
+        const struct sadmm_world_joint *joint = &world->joints[world->resident.dirty_joints[k]];
+        for (int update = 0; update < SADMM_JOINT_UPDATES; ++update) {
+            if (!(joint->dirty >> update & 1)) continue;
+            struct sadmm_resident_update *out = &world->resident.updates[(*count)++];
             memset(out, 0, sizeof *out);
-            out->kind = SADMM_EDIT_JOINT;
-            out->target = SADMM_JOINT_TARGETS * joint->resident + edit;
-            if (edit == SADMM_JOINT_TARGET) put_target(&world->couplings[joint->coupling - 1].last.target, out->values);
-            else if (edit == SADMM_JOINT_ENABLED) out->values[0] = joint->def.enabled;
-            else joint_coordinate_numbers(&joint->def.coordinates[edit], out->values);
+            out->kind = SADMM_UPDATE_JOINT;
+            out->target = SADMM_JOINT_TARGETS * joint->resident + update;
+            if (update == SADMM_JOINT_TARGET)
+                put_target(&world->couplings[joint->coupling - 1].last.target, out->values);
+            else if (update == SADMM_JOINT_ENABLED) out->values[0] = joint->def.enabled;
+            else joint_coordinate_numbers(&joint->def.coordinates[update], out->values);
         }
     }
-    list_gear_edits(world, count);
+    list_gear_updates(world, count);
     return SADMM_OK;
 }
 

@@ -2,8 +2,8 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "core/model/extrapolation.h"
 #include "core/model/kinematic.h"
-#include "core/model/steady.h"
 #include "world_internal.h"
 
 sadmm_status sadmm_world_list_kinematic(sadmm_world *world)
@@ -17,7 +17,7 @@ sadmm_status sadmm_world_list_kinematic(sadmm_world *world)
     for (size_t k = 0; k < n; ++k) {
         const struct sadmm_world_body *body = &world->bodies[world->kinematic_slots[k]];
         world->resident.kinematic[k] = (struct sadmm_kinematic_body){
-            .rigid = body->rigid, .steady = body->steady, .slot = world->kinematic_slots[k]};
+            .rigid = body->rigid, .extrapolation = body->extrapolation, .slot = world->kinematic_slots[k]};
     }
     return SADMM_OK;
 }
@@ -27,10 +27,10 @@ sadmm_status sadmm_world_list_kinematic(sadmm_world *world)
 static void take_kinematic(sadmm_world *world, size_t k, const struct sadmm_kinematic_body *read)
 {
     struct sadmm_world_body *body = &world->bodies[world->kinematic_slots[k]];
-    body->steady = read->steady;
-    if (body->set_at[SADMM_EDIT_STATE] < world->resident.done) body->rigid = read->rigid;
-    else steady_place(&body->steady, &read->rigid, body->rigid.position, body->rigid.orientation);
-    if (body->set_at[SADMM_EDIT_TARGET] < world->resident.done) body->target.set = false;
+    body->extrapolation = read->extrapolation;
+    if (body->set_at[SADMM_UPDATE_STATE] < world->resident.done) body->rigid = read->rigid;
+    else extrapolation_place(&body->extrapolation, &read->rigid, body->rigid.position, body->rigid.orientation);
+    if (body->set_at[SADMM_UPDATE_TARGET] < world->resident.done) body->target.set = false;
     if (world->plan.wrenches)
         memcpy(body->contact_wrench, world->resident.kinematic_wrench + 6 * k, sizeof body->contact_wrench);
 }

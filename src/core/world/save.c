@@ -77,9 +77,9 @@ sadmm_status sadmm_world_save(sadmm_world *world, void *buffer, size_t capacity,
     TRY(sadmm_check_given(world, "world", NULL));
     TRY(sadmm_check_given(size, "size", &world->error));
     if (capacity > 0) TRY(sadmm_check_given(buffer, "buffer", &world->error));
-    TRY(sadmm_world_pull_bodies(world));
-    TRY(sadmm_world_pull_contacts(world));
-    TRY(sadmm_world_pull_joints(world));
+    TRY(sadmm_world_download_bodies(world));
+    TRY(sadmm_world_download_contacts(world));
+    TRY(sadmm_world_download_joints(world));
     struct sadmm_archive counting = {.error = &world->error};
     archive_world(&counting, world);
     TRY(counting.status);
@@ -180,7 +180,7 @@ sadmm_status sadmm_world_restore(sadmm_world *world, const void *buffer, size_t 
         sadmm_archive_expect(&reading, reading.at == reading.size, "something follows its end");
     /* Steps begun have nothing to end in; what they say is of no use any more. */
     if (reading.status == SADMM_OK) {
-        (void)sadmm_world_settle(world);
+        (void)sadmm_world_synchronise(world);
         exchange(world, fresh);
     }
     sadmm_world_destroy(fresh);

@@ -13,7 +13,7 @@
 #define LISTED(type, size) _Static_assert(sizeof(type) == (size), #type " has other members than the list of a saved world")
 LISTED(sadmm_settings, 168);
 LISTED(struct sadmm_rigid, 320);
-LISTED(struct sadmm_steady, 72);
+LISTED(struct sadmm_extrapolation, 72);
 LISTED(sadmm_joint_coordinate, 112);
 LISTED(sadmm_joint_def, 840);
 LISTED(struct sadmm_joint_memory, 560);
@@ -120,9 +120,10 @@ static bool body_fits(const sadmm_world *world, const struct sadmm_world_body *b
     if (!sadmm_all_finite(rigid->owed, 6) || !sadmm_all_finite(rigid->stiffness, 6) ||
         (rigid->rolls & ~(ROLLING_OWES | ROLLING_IS_STIFF | ROLLING_TURNS_ON)))
         return false;
-    return sadmm_all_finite(&rigid->gravity_scale, 1) && sadmm_all_finite(rigid->damping, 2) && sadmm_all_finite(body->steady.change, 6) &&
-           body->steady.dt >= 0 && sadmm_all_finite(&body->steady.dt, 1) && body->steady.streak[0] >= 0 &&
-           body->steady.streak[1] >= 0 && sadmm_all_finite(body->contact_wrench, 6);
+    return sadmm_all_finite(&rigid->gravity_scale, 1) && sadmm_all_finite(rigid->damping, 2) &&
+           sadmm_all_finite(body->extrapolation.change, 6) && body->extrapolation.dt >= 0 &&
+           sadmm_all_finite(&body->extrapolation.dt, 1) && body->extrapolation.streak[0] >= 0 &&
+           body->extrapolation.streak[1] >= 0 && sadmm_all_finite(body->contact_wrench, 6);
 }
 
 static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size_t slot)
@@ -136,7 +137,7 @@ static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size
     rolling_clear(&body->rigid); /* equal worlds have equal saves */
     SADMM_ARCHIVE(archive, body->rigid);
     SADMM_ARCHIVE(archive, body->contact_wrench);
-    SADMM_ARCHIVE(archive, body->steady);
+    SADMM_ARCHIVE(archive, body->extrapolation);
     sadmm_archive_flag(archive, &body->target.set);
     SADMM_ARCHIVE(archive, body->target.position);
     SADMM_ARCHIVE(archive, body->target.orientation);

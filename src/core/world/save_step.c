@@ -173,7 +173,7 @@ _Static_assert(sizeof(struct sadmm_plan) == 40 && sizeof(sadmm_step_report) == 2
 static void archive_plan(struct sadmm_archive *archive, struct sadmm_plan *plan)
 {
     bool *const flags[] = {&plan->rows_apart, &plan->rigid, &plan->gyroscopic, &plan->warm_start, &plan->warm,
-                           &plan->penalty_updates, &plan->predict, &plan->weight_refresh, &plan->limit,
+                           &plan->penalty_updates, &plan->initialise, &plan->weight_updates, &plan->energy_limit,
                            &plan->momentum, &plan->residuals, &plan->wrenches, &plan->certificate};
     SADMM_ARCHIVE(archive, plan->bodies);
     SADMM_ARCHIVE(archive, plan->pairs);

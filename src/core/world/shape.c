@@ -146,8 +146,8 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     double ignored[4];
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", error));
-    TRY(check_def(body, def, ignored, error)); /* before the world is taken back */
-    TRY(sadmm_world_take_back(world));
+    TRY(check_def(body, def, ignored, error)); /* before the world is detached */
+    TRY(sadmm_world_detach(world));
 
     const size_t slot = sadmm_slots_free(&world->shapes_taken);
     if (slot >= (size_t)1 << 28)
@@ -194,7 +194,7 @@ sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     sadmm_world_kill_shape(world, id.slot - 1);
     return SADMM_OK;
 }
@@ -266,7 +266,7 @@ sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id i
     struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
     if (!shape) return SADMM_ERROR_STALE_ID;
     TRY(check_material("", friction, restitution, error));
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     world->bouncing_count += (restitution > 0) - (shape->restitution > 0);
     shape->friction = friction;
     shape->restitution = restitution;
@@ -282,12 +282,12 @@ sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a,
     if (a.slot == b.slot) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "a and b are the same shape");
     uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
     if (friction == -1) {
-        TRY(sadmm_world_take_back(world));
+        TRY(sadmm_world_detach(world));
         sadmm_pair_table_remove(&world->friction_pairs, key);
         return SADMM_OK;
     }
     TRY(sadmm_check_range("friction (or -1 for the geometric mean)", friction, 0, 1e6, error));
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     return sadmm_pair_table_set(&world->friction_pairs, key, friction, error);
 }
 

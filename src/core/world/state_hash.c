@@ -22,7 +22,7 @@ sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *out)
     uint64_t hash = UINT64_C(0xcbf29ce484222325);
     TRY(sadmm_check_given(world, "world", NULL));
     TRY(sadmm_check_given(out, "hash", &world->error));
-    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_download_bodies(world));
     for (size_t slot = 0; slot < world->body_slots; ++slot) {
         const struct sadmm_world_body *body = &world->bodies[slot];
         if (!body->alive) continue;

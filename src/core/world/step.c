@@ -8,7 +8,7 @@
 #include "core/base/memory.h"
 #include "core/solve/registry.h"
 #include "core/model/joint_momentum.h"
-#include "core/model/steady.h"
+#include "core/model/extrapolation.h"
 #include "core/model/push_law.h"
 #include "world_internal.h"
 
@@ -118,8 +118,8 @@ static void commit_share(void *argument, int thread, int threads)
     sadmm_share((size_t)world->dynamic_count, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-        if (settings.substeps > 1) body->steady = world->steady[i];
-        steady_keep(&body->steady, &world->start.rigid[i], &world->next[i], settings.dt);
+        if (settings.substeps > 1) body->extrapolation = world->extrapolation[i];
+        extrapolation_keep(&body->extrapolation, &world->start.rigid[i], &world->next[i], settings.dt);
         body->rigid = world->next[i];
         if (!world->plan.wrenches) continue;
         const double *last = world->wrench + 6 * i;
@@ -382,7 +382,7 @@ static sadmm_status host_step(sadmm_world *world)
     struct host_step step = {
         .world = world, .settings = sadmm_settings_of_substep(&world->def.settings), .islands_above = -1};
     step.stages = sadmm_stages_of(&world->plan, &step.settings, true);
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     world->certified_step = -1;
     world->team.ran = 1;
     const struct sadmm_plan last_plan = world->plan;
@@ -420,14 +420,14 @@ sadmm_status sadmm_world_step_async(sadmm_world *world)
 sadmm_status sadmm_world_wait(sadmm_world *world)
 {
     TRY(sadmm_check_given(world, "world", NULL));
-    return sadmm_world_settle(world);
+    return sadmm_world_synchronise(world);
 }
 
 sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     TRY(sadmm_check_given(report, "report", &world->error));
-    TRY(sadmm_world_settle(world));
+    TRY(sadmm_world_synchronise(world));
     *report = world->report;
     return SADMM_OK;
 }

@@ -85,12 +85,12 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->start.impulse, world->last_start.rigid, world->last_start.velocity,
                       world->last_start.impulse, world->start.kinematic, world->last_start.kinematic, world->kinematic,
                       world->kinematic_slots, world->support_motion, world->supports, world->support_labels,
-                      world->next, world->velocity, world->wrench, world->steady, world->wrench_sum, world->slot_of,
-                      world->resident.steady, world->resident.kinematic, world->resident.kinematic_wrench,
-                      world->resident.gears, world->resident.gear_force, world->resident.tables,
-                      world->resident.edited, world->resident.edits, world->resident.held,
+                      world->next, world->velocity, world->wrench, world->extrapolation, world->wrench_sum,
+                      world->slot_of, world->resident.extrapolation, world->resident.kinematic,
+                      world->resident.kinematic_wrench, world->resident.gears, world->resident.gear_force,
+                      world->resident.tables, world->resident.dirty, world->resident.updates, world->resident.held,
                       world->resident.joints, world->resident.memory, world->resident.joint_slots,
-                      world->resident.solution, world->resident.edited_joints,
+                      world->resident.solution, world->resident.dirty_joints,
                       world->resident.coupling_memory, world->query.prelude, world->query.hits,
                       world->query.slots, world->query.spare};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
@@ -117,7 +117,7 @@ sadmm_status sadmm_world_set_backend(sadmm_world *world, sadmm_backend backend, 
     if (device < 0) return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "device = %d: must be >= 0", device);
     TRY(sadmm_backend_choose(backend, precision, 0, &kernels, NULL, 0, &world->error));
     TRY(sadmm_world_check_inertias(world, precision));
-    TRY(sadmm_world_take_back(world));
+    TRY(sadmm_world_detach(world));
     if (world->context) world->kernels->destroy(world->context);
     world->context = NULL;
     world->kernels = NULL; /* chosen at the next step */

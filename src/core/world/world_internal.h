@@ -9,7 +9,7 @@
  *   gear_rows, joint_rows            gears and joints as constraint rows
  *   joint_momentum, joint_move       where joints let bodies go, with what momentum
  *   resident_joints, resident_kinematic, resident   where a backend keeps the world
- *   query_scene                      what queries look at
+ *   query_scene                      what queries search
  *   shape_form, shape, mass, joint, coupling, gear, body, contacts,
  *   query_ray, query_shape, explain  what callers see of it, and change
  *   arrays                           the same, of many at once
@@ -57,15 +57,15 @@ struct sadmm_world_body {
     struct sadmm_rigid rigid;
     uint32_t first_shape, first_joint; /* links: names of a shape are its slot + 1, of a joint below */
     double contact_wrench[6];
-    struct sadmm_steady steady;
+    struct sadmm_extrapolation extrapolation;
     struct {
         bool set; /* a kinematic body is to be there after the next step */
         double position[3], orientation[4];
     } target;
     void *user_data;     /* the caller's */
     char *name;          /* a block of its own, so that it stays where it is when slots are added; NULL: none */
-    uint32_t edits;                   /* bit of enum sadmm_edit_kind: no step has taken that along yet */
-    int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
+    uint32_t dirty;                     /* bit of enum sadmm_update_kind: no step has taken that along yet */
+    int64_t set_at[SADMM_BODY_UPDATES]; /* steps enqueued since the world was loaded, when that was set; -1: before */
 };
 
 /* What the definition of a hull's shape had, or a mesh's; contact finding has the shape in another frame. */
@@ -83,7 +83,7 @@ struct sadmm_world_kinematic {
 };
 
 /* What may be set of a joint without loading the world again: its coordinates, 0 to 5, and (TARGET: of a coupling) */
-enum sadmm_joint_edit { SADMM_JOINT_ENABLED = JOINT_COORDINATES, SADMM_JOINT_TARGET, SADMM_JOINT_EDITS };
+enum sadmm_joint_update { SADMM_JOINT_ENABLED = JOINT_COORDINATES, SADMM_JOINT_TARGET, SADMM_JOINT_UPDATES };
 
 /* A joint slot. That of a coupling is out of callers' sight: its frame a is the target, whose motion is prescribed, and
  * what acts are position drives of all coordinates. */
@@ -101,8 +101,8 @@ struct sadmm_world_joint {
     uint32_t first_gear;
     int32_t resident;       /* its number in the backend that keeps the world */
     int32_t resident_constraints; /* that its rows may take there */
-    uint32_t edits;         /* bits of enum sadmm_joint_edit, as in a body */
-    int64_t set_at[SADMM_JOINT_EDITS];
+    uint32_t dirty;         /* bits of enum sadmm_joint_update, as in a body */
+    int64_t set_at[SADMM_JOINT_UPDATES];
 };
 
 /* A coupling slot. */
@@ -123,7 +123,7 @@ struct sadmm_world_gear {
     struct sadmm_link on_joint[2]; /* their names: 2 x slot + side + 1 */
     bool acts;       /* it has a row in the (sub-)step at hand */
     struct { double force; } last, next; /* along the first coordinate, of the last step and of the one at hand */
-    bool edited;     /* its being enabled was set, and no step has taken that along yet; set_at: as in a body */
+    bool dirty;      /* its being enabled was set, and no step has taken that along yet; set_at: as in a body */
     int64_t set_at;
 };
 
@@ -236,15 +236,15 @@ struct sadmm_world {
     struct sadmm_step_start start, last_start;     /* of the step at hand; a failing step swaps it back */
     struct sadmm_rigid *next;                      /* dynamic bodies after the step */
     double *velocity, *wrench;                     /* dynamic bodies x 6 */
-    struct sadmm_steady *steady;                   /* dynamic bodies, after the sub-steps made so far */
+    struct sadmm_extrapolation *extrapolation;     /* dynamic bodies, after the sub-steps made so far */
     struct sadmm_world_kinematic *kinematic;       /* in slot order */
     double *support_motion;                        /* dynamic bodies x 6: of their support */
     int32_t *supports, *support_labels;            /* islands, and at their labels what supports them */
     double *wrench_sum;                            /* dynamic bodies x 6, of these; both only where there are several */
     int32_t *slot_of;                              /* dynamic body -> slot */
     size_t collision_body_capacity, next_capacity, velocity_capacity, wrench_capacity, slot_of_capacity,
-        steady_capacity, wrench_sum_capacity, kinematic_capacity, kinematic_slot_capacity, support_motion_capacity,
-        support_capacity, support_label_capacity;
+        extrapolation_capacity, wrench_sum_capacity, kinematic_capacity, kinematic_slot_capacity,
+        support_motion_capacity, support_capacity, support_label_capacity;
     struct sadmm_plan plan;
     sadmm_settings step_settings;                  /* of the whole step */
     bool stepped;
@@ -260,34 +260,34 @@ struct sadmm_world {
         int64_t enqueued, done, repeats; /* steps since it was loaded: begun, done as far as known, repeated */
         int64_t kept_step;   /* steps and time of the bodies above */
         double kept_time;
-        struct sadmm_steady *steady; /* dynamic bodies */
+        struct sadmm_extrapolation *extrapolation; /* dynamic bodies */
         struct sadmm_kinematic_body *kinematic; /* kinematic bodies, as they are loaded, and as they are read; */
         double *kinematic_wrench;    /* (x 6) likewise */
-        uint32_t *edited;    /* slots of bodies with `edits`; capacity: all that move */
-        struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
+        uint32_t *dirty;     /* slots of bodies with `dirty`; capacity: all that move */
+        struct sadmm_resident_update *updates; /* for the backend, when a step is enqueued */
         unsigned char *held; /* by body slot: joints hold it (hits.c) */
         bool hits_behind;    /* those of the last step are not here yet */
-        size_t held_capacity, steady_capacity, kinematic_capacity, kinematic_wrench_capacity, edited_count,
-            edited_capacity, edit_capacity;
+        size_t held_capacity, extrapolation_capacity, kinematic_capacity, kinematic_wrench_capacity, dirty_count,
+            dirty_capacity, update_capacity;
         struct sadmm_resident_joint *joints; /* as they were loaded; */
         struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
         int32_t *joint_slots;                /* their slots */
         struct sadmm_coupling_memory *coupling_memory; /* of those that are of couplings, in their order */
         double *solution;                    /* of their rows */
-        uint32_t *edited_joints;             /* slots of joints with `edits`; capacity: all */
+        uint32_t *dirty_joints;              /* slots of joints with `dirty`; capacity: all */
         double *tables;                      /* of springs, joint by joint */
         size_t table_numbers, table_capacity;
         struct sadmm_resident_gear *gears;   /* in slot order */
         double *gear_force;                  /* likewise */
-        bool gears_edited;                   /* some of them */
+        bool gears_dirty;                    /* some of them */
         size_t gear_capacity, gear_force_capacity;
         int32_t joint_count, joint_constraints, coupling_count, gear_count;
         size_t joint_capacity, memory_capacity, coupling_memory_capacity, joint_slot_capacity, solution_capacity,
-            edited_joint_count,
-            edited_joint_capacity;
+            dirty_joint_count,
+            dirty_joint_capacity;
     } resident;
 
-    /* What queries look at (query_scene.c). */
+    /* What queries search (query_scene.c). */
     struct {
         bool listed;  /* the tree has the world's shapes, and */
         bool current; /* has them where they are */
@@ -356,7 +356,7 @@ sadmm_status sadmm_world_slot_not_finite(sadmm_world *world, int32_t slot);
 
 /* Dynamic bodies in slot order into `start` and what else a step works on, and all bodies as collision sees them. */
 sadmm_status sadmm_world_gather(sadmm_world *world);
-/* The same from one sub-step to the next: from `next`, and without a look at the bodies' slots. substep: the one that
+/* The same from one sub-step to the next: from `next`, and without the bodies' slots. substep: the one that
  * has ended. */
 void sadmm_world_turn(sadmm_world *world, int substep);
 /* Exchange `start` and `last_start`. */
@@ -473,21 +473,21 @@ bool sadmm_world_may_reside(const sadmm_world *world);
 /* Enqueue a step; `wait`: until it is done, with its report. */
 sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait);
 /* Until every enqueued step is done. The error of a step that failed is returned once. */
-sadmm_status sadmm_world_settle(sadmm_world *world);
+sadmm_status sadmm_world_synchronise(sadmm_world *world);
 /* The same for calls that return no status: the error stays for the next one that does. */
-void sadmm_world_settle_quietly(sadmm_world *world);
-/* Bring the bodies (or contacts and everything else) of the last step back, where the backend is ahead. */
-sadmm_status sadmm_world_pull_bodies(sadmm_world *world);
-sadmm_status sadmm_world_pull_contacts(sadmm_world *world);
+void sadmm_world_synchronise_quietly(sadmm_world *world);
+/* Download the bodies (or contacts and everything else) of the last step, where the backend is ahead. */
+sadmm_status sadmm_world_download_bodies(sadmm_world *world);
+sadmm_status sadmm_world_download_contacts(sadmm_world *world);
 /* Which pairs of the last step touch, where the contacts are behind and no step is running: of every one of the report's
  * pairs. */
 sadmm_status sadmm_world_read_touching(sadmm_world *world, struct sadmm_touching_shapes *touching);
-sadmm_status sadmm_world_pull_joints(sadmm_world *world);
+sadmm_status sadmm_world_download_joints(sadmm_world *world);
 /* All of it, and from here on the host's world is the one that counts: before anything but a state or a wrench is
  * changed. */
-sadmm_status sadmm_world_take_back(sadmm_world *world);
+sadmm_status sadmm_world_detach(sadmm_world *world);
 /* A dynamic body's state or wrench has been set, or a kinematic one's state or target: the next step takes it along. */
-void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sadmm_edit_kind kind);
+void sadmm_world_update(sadmm_world *world, struct sadmm_world_body *body, enum sadmm_update_kind kind);
 /* Passes `status` on. After SADMM_ERROR_DEVICE the backend's context is given up, the host's world counts again, and
  * the next step begins with a new context. */
 sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status);
@@ -497,16 +497,16 @@ sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status);
 /* Joints of a world that is about to be loaded, into resident.joints and what is beside it. */
 sadmm_status sadmm_world_list_joints(sadmm_world *world);
 /* A joint's coordinate, whether it is enabled, or its target has been set: the next step takes it along. False: the
- * backend has no room for its rows, the world is to be taken back. */
-bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
+ * backend has no room for its rows, the world is to be detached. */
+bool sadmm_world_update_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_update update);
 /* Gears, once joints are listed. */
 sadmm_status sadmm_world_list_gears(sadmm_world *world);
-void sadmm_world_edit_gear(sadmm_world *world, struct sadmm_world_gear *gear);
-/* Edits into resident.edits, from *count on. */
-sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count);
-void sadmm_world_forget_joint_edits(sadmm_world *world);
+void sadmm_world_update_gear(sadmm_world *world, struct sadmm_world_gear *gear);
+/* Updates into resident.updates, from *count on. */
+sadmm_status sadmm_world_list_joint_updates(sadmm_world *world, size_t *count);
+void sadmm_world_forget_joint_updates(sadmm_world *world);
 /* As of bodies: what was set for steps that have not been done. */
-void sadmm_world_edit_joints_again(sadmm_world *world);
+void sadmm_world_update_joints_again(sadmm_world *world);
 /* What joints keep; the last step's rows. Nothing is enqueued. */
 sadmm_status sadmm_world_read_joints(sadmm_world *world);
 sadmm_status sadmm_world_read_rows(sadmm_world *world);
@@ -591,7 +591,7 @@ sadmm_status sadmm_world_check_body_state(const struct sadmm_world_body *body, c
 sadmm_status sadmm_world_check_wrench(const double force[3], const double torque[3], struct sadmm_error *error);
 sadmm_status sadmm_world_check_mass(const sadmm_world *world, double mass, const double inertia[3],
                                     struct sadmm_error *error);
-/* INVALID_ARGUMENT where a body's moments of inertia lie further apart than the precision can tell. */
+/* INVALID_ARGUMENT where a body's moments of inertia lie further apart than the precision can resolve. */
 sadmm_status sadmm_world_check_inertias(sadmm_world *world, sadmm_precision precision);
 
 /* ---- gear.c ---- */
@@ -629,7 +629,8 @@ sadmm_status sadmm_world_check_coordinate(const struct sadmm_world_joint *joint,
 /* What joints have beside their slots. */
 void sadmm_world_free_tables(sadmm_world *world);
 /* Something of a joint has been set: the next step of the backend that keeps the world takes it along. */
-sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
+sadmm_status sadmm_world_take_update(sadmm_world *world, struct sadmm_world_joint *joint,
+                                     enum sadmm_joint_update update);
 /* Room for so many slots of joints; false when memory runs out. */
 bool sadmm_world_reserve_joints(sadmm_world *world, size_t slots);
 /* A joint in a slot is on its bodies' lists, a gear on its joints', from here on. */

@@ -1,5 +1,6 @@
-/* Whole steps on the device: a step is planned before it is known, from the statistics of an earlier one (world.h).
- * Where there is none its contacts are found first. A guess costs time where it is wrong, never a result. */
+/* Speculation of whole steps on the device: a step is planned before it is known, from the statistics of an earlier one
+ * (world.h). Where there is none its contacts are found first. A speculation that is wrong costs time, never a
+ * result. */
 #include <algorithm>
 
 #include "backend_cuda/graph/graph.h"
@@ -16,8 +17,8 @@ static sadmm_status copy_out(struct sadmm_context *c, void *to, const void *from
     return SADMM_OK;
 }
 
-/* Contacts of the next step and what they are like, seen by the host. */
-struct preview {
+/* Counts and statistics of the next step's contacts, read by the host. */
+struct speculated_step {
     struct cuda_live live;
     struct cuda_graph_statistics statistics;
     struct sadmm_cuda_contact_counts counts;
@@ -36,11 +37,11 @@ static sadmm_status reserve_hits(struct sadmm_context *c, struct sadmm_error *er
     return COLLISION(reserve_hits)(c->step->collision, error);
 }
 
-static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, struct sadmm_error *error)
+static sadmm_status speculate_contacts(struct sadmm_context *c, struct speculated_step *out, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
     TRY(CUDA(reserve)(c, PINNED_OUT, sizeof *out, error));
-    struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
+    struct speculated_step *staged = buffer<struct speculated_step>(c, PINNED_OUT);
     for (;;) {
         TRY(COLLISION(reserve)(s->collision, c->settings.substeps > 1, &s->candidate_capacity, &s->point_capacity,
                                error));
@@ -86,8 +87,8 @@ struct substep_plan CUDA(plan_of)(const struct sadmm_context *c, int32_t pairs, 
     plan.rigid = true;
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
     plan.threads = 1;
-    sadmm_plan_settle(&plan, &c->settings,
-                      plan_mostly_warm(plan.pairs + joints->constraints, statistics->warm + joints->warm));
+    sadmm_plan_complete(&plan, &c->settings,
+                        plan_mostly_warm(plan.pairs + joints->constraints, statistics->warm + joints->warm));
     const int32_t warm = sadmm_plan_depends_on_warmth(&c->settings) ? plan.warm : -1;
     const struct substep_plan out = {plan, plan.contact_rows, warm, s->joints > 0 ? joints->constraints > 0 : -1};
     return out;
@@ -104,7 +105,7 @@ void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_g
 }
 
 /* Plans of the sub-steps, and the most that any of them is known to need. */
-static void plan_substeps(struct sadmm_context *c, struct preview *seen)
+static void plan_substeps(struct sadmm_context *c, struct speculated_step *seen)
 {
     struct cuda_step *s = c->step;
     const int substeps = c->settings.substeps;
@@ -124,10 +125,10 @@ static void plan_substeps(struct sadmm_context *c, struct preview *seen)
 }
 
 /* The layout once, for what its parts are really like. Not where later sub-steps are known to differ. */
-static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen, struct sadmm_error *error)
+static sadmm_status tighten(struct sadmm_context *c, const struct speculated_step *seen, struct sadmm_error *error)
 {
     if (c->partition.tier == SADMM_CUDA_TIER_STREAM || c->step->learned.step >= 0) return SADMM_OK;
-    struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
+    struct speculated_step *staged = buffer<struct speculated_step>(c, PINNED_OUT);
     staged->live = seen->live;
     CUDA_CALL(
         c, cudaMemcpyAsync(c->view.model.live, &staged->live, sizeof staged->live, cudaMemcpyHostToDevice, c->stream),
@@ -149,25 +150,25 @@ bool CUDA(may_be_apart)(const struct sadmm_context *c)
            !stop_rule_checked(c);
 }
 
-sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error)
+sadmm_status CUDA(speculate)(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    struct preview seen;
-    for (s->apart = s->untouched >= s->patience;; s->apart = false) {
-        TRY(preview_step(c, &seen, error));
+    struct speculated_step seen;
+    for (s->apart = s->untouched >= s->backoff;; s->apart = false) {
+        TRY(speculate_contacts(c, &seen, error));
         plan_substeps(c, &seen);
         if (!s->apart || CUDA(may_be_apart)(c)) break; /* settings may be other than they were */
     }
-    s->guess.apart = s->apart;
-    s->guess.contact_rows = s->plans[0].contact_rows;
-    s->guess.point_slots = seen.statistics.point_slots <= 1   ? 1
-                           : seen.statistics.point_slots <= 4 ? 4
-                                                              : SADMM_MAX_POINTS;
-    s->guess.warm = s->plans[0].warm;
-    s->guess.rows = s->plans[0].rows;
+    s->speculation.apart = s->apart;
+    s->speculation.contact_rows = s->plans[0].contact_rows;
+    s->speculation.point_slots = seen.statistics.point_slots <= 1   ? 1
+                                 : seen.statistics.point_slots <= 4 ? 4
+                                                                    : SADMM_MAX_POINTS;
+    s->speculation.warm = s->plans[0].warm;
+    s->speculation.rows = s->plans[0].rows;
     CUDA(view_counts)(c, generous(seen.counts.pairs));
     c->view.model.points = 0; /* results are read elsewhere */
-    seen.statistics.point_slots = s->guess.point_slots;
+    seen.statistics.point_slots = s->speculation.point_slots;
     c->statistics = seen.statistics;
     TRY(CUDA(choose_partition)(c, &seen.statistics, &c->partition, error));
     TRY(CUDA(reserve_layout)(c, error));

@@ -1,6 +1,6 @@
 /* After the last iteration: momentum that no contact may change is restored, in either method; in the method `fast` no
- * island keeps more energy than it may have (math/limit.h), in `paper` those that do are counted. Energies and the work
- * of contacts are added up at the bodies that name the islands. */
+ * island keeps more energy than it may have (math/energy_limit.h), in `paper` those that do are counted. Energies and
+ * the work of contacts are added up at the bodies that name the islands. */
 #include <float.h>
 #include <string.h>
 
@@ -19,12 +19,12 @@ static double inverse_form(const struct ref_body *body, const double x[6], const
 static void add_up_energies(struct sadmm_context *c)
 {
     for (int32_t i = 0; i < c->system->body_count; ++i) {
-        memset(&c->bodies[i].limit, 0, sizeof c->bodies[i].limit);
+        memset(&c->bodies[i].energies, 0, sizeof c->bodies[i].energies);
         c->bodies[i].along = 0;
     }
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         const struct ref_body *body = &c->bodies[i];
-        struct limit_energies *sum = &c->bodies[body->label].limit;
+        struct island_energies *sum = &c->bodies[body->label].energies;
         double momentum[6];
         dense6_mul(body->A, body->v, momentum);
         sum->now += dense6_dot(momentum, body->v) / 2;
@@ -34,32 +34,32 @@ static void add_up_energies(struct sadmm_context *c)
     sadmm_ref_sum_impulses(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         const struct ref_body *body = &c->bodies[i];
-        struct limit_energies *sum = &c->bodies[body->label].limit;
+        struct island_energies *sum = &c->bodies[body->label].energies;
         sum->drive -= inverse_form(body, body->impulse, body->b);
         sum->response += inverse_form(body, body->impulse, body->impulse);
     }
     for (size_t k = 0; k < c->system->contacts->point_count; ++k) {
         const struct ref_constraint *constraint = &c->constraints[k];
         int32_t body = constraint->side[0].body >= 0 ? constraint->side[0].body : constraint->side[1].body;
-        struct limit_energies *sum = &c->bodies[c->bodies[body].label].limit;
+        struct island_energies *sum = &c->bodies[c->bodies[body].label].energies;
         sum->work += fmax(0, -constraint->e[0]) * constraint->lambda[0];
         sum->drive -= constraint->e[0] * constraint->lambda[0];
     }
     for (size_t p = 0; p < c->system->contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[p];
         if (sadmm_pair_gives_energy(c->system, pair))
-            c->bodies[c->bodies[pair->body_a >= 0 ? pair->body_a : pair->body_b].label].limit.kinematic = 1;
+            c->bodies[c->bodies[pair->body_a >= 0 ? pair->body_a : pair->body_b].label].energies.kinematic = 1;
     }
 }
 
 /* By what an island is slowed down. */
-static double factor_of(struct ref_body *island, bool bounces)
+static double factor_of(struct ref_body *island, bool rebounds)
 {
     const struct momentum_energies rigid = momentum_energies_of(&island->motions);
     if (island->rows) return 1; /* the energies are those of contacts alone */
-    if (island->floating) limit_take_rigid(&island->limit, &island->along, &rigid);
-    double factor = limit_factor(&island->limit, DBL_EPSILON);
-    if (bounces) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
+    if (island->floating) energy_limit_subtract_rigid(&island->energies, &island->along, &rigid);
+    double factor = energy_limit_factor(&island->energies, DBL_EPSILON);
+    if (rebounds) factor = fmin(factor, energy_limit_rebound_factor(&island->energies, island->along, DBL_EPSILON));
     return factor;
 }
 
@@ -74,11 +74,11 @@ static void name_islands(struct sadmm_context *c)
     }
 }
 
-sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
+sadmm_status sadmm_ref_limit_energy(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     (void)error;
     const bool fast = c->settings->method == SADMM_METHOD_FAST;
-    const bool bounces = fast && limit_under_iterated(c->plan->warm, c->settings->iterations);
+    const bool rebounds = fast && energy_limit_tests_rebound(c->plan->warm, c->settings->iterations);
     *limited = 0;
     if (!fast) name_islands(c);
     sadmm_ref_find_motions(c);
@@ -86,7 +86,7 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
         if (island->label != i) continue;
-        const double factor = factor_of(island, bounces);
+        const double factor = factor_of(island, rebounds);
         island->slow_down = fast ? factor : 1;
         *limited += factor < 1;
     }

@@ -1,5 +1,5 @@
 /* After the last iteration: momentum that no contact may change is restored (cpu_momentum.c); in the method `fast` no
- * island keeps more energy than it may have (math/limit.h), in `paper` those that do are counted. */
+ * island keeps more energy than it may have (math/energy_limit.h), in `paper` those that do are counted. */
 #include "core/math/dense6.h"
 #include "core/math/relax.h"
 #include "cpu_rows.h"
@@ -32,7 +32,7 @@ static void energies(const struct sadmm_context *c, size_t i, double terms[3])
 }
 
 /* Of a pair: work of its contacts that push apart, and what e adds to the drive. */
-static void add_pair(const struct sadmm_context *c, size_t record, struct limit_energies *sum)
+static void add_pair(const struct sadmm_context *c, size_t record, struct island_energies *sum)
 {
     const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];
     size_t l = record % (size_t)LANES;
@@ -57,35 +57,37 @@ static void add_pair(const struct sadmm_context *c, size_t record, struct limit_
 }
 
 /* Sums over islands in the order of bodies, whatever the threads. */
-static bool any_suspect(struct sadmm_context *c, bool bounces)
+static bool any_candidate(struct sadmm_context *c, bool rebounds)
 {
     bool any = false;
     for (int32_t i = 0; i < c->bodies; ++i) {
-        memset(&c->islands[i].limit, 0, sizeof c->islands[i].limit);
+        memset(&c->islands[i].energies, 0, sizeof c->islands[i].energies);
         c->islands[i].along = 0;
     }
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct cpu_island *sum = &c->islands[c->label[i]];
-        sum->limit.now += c->body_sums[BODY_SUMS * i];
-        sum->limit.free += c->body_sums[BODY_SUMS * i + 1];
+        sum->energies.now += c->body_sums[BODY_SUMS * i];
+        sum->energies.free += c->body_sums[BODY_SUMS * i + 1];
         sum->along += c->body_sums[BODY_SUMS * i + 2];
     }
     for (int32_t k = 0; k < c->floating_count; ++k) {
         const struct momentum_energies rigid = momentum_energies_of(&c->floating[k].motions);
         struct cpu_island *island = &c->islands[c->label[c->floating_bodies[c->floating[k].first_body]]];
-        limit_take_rigid(&island->limit, &island->along, &rigid);
+        energy_limit_subtract_rigid(&island->energies, &island->along, &rigid);
     }
     for (size_t p = 0; c->system->kinematic_count > 0 && p < c->system->contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[p];
-        if (sadmm_pair_gives_energy(c->system, pair)) cpu_island_of(c, pair->body_a, pair->body_b)->limit.kinematic = 1;
+        if (sadmm_pair_gives_energy(c->system, pair))
+            cpu_island_of(c, pair->body_a, pair->body_b)->energies.kinematic = 1;
     }
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[i];
-        if (c->label[i] != i || island->rows || island->limit.kinematic) continue;
-        if (limit_is_rounding(&island->limit, (double)SADMM_EPSILON)) continue;
-        any = any || limit_suspects(island->limit.now, island->limit.free) ||
-              (bounces &&
-               limit_bounces(island->limit.now, island->limit.free, island->along, (double)SADMM_EPSILON));
+        if (c->label[i] != i || island->rows || island->energies.kinematic) continue;
+        if (energy_limit_is_rounding(&island->energies, (double)SADMM_EPSILON)) continue;
+        any = any || energy_limit_exceeded(island->energies.now, island->energies.free) ||
+              (rebounds &&
+               energy_limit_rebounds(island->energies.now, island->energies.free, island->along,
+                                     (double)SADMM_EPSILON));
     }
     return any;
 }
@@ -93,7 +95,7 @@ static bool any_suspect(struct sadmm_context *c, bool bounces)
 static void add_impulses(struct sadmm_context *c)
 {
     for (int32_t i = 0; i < c->bodies; ++i) {
-        struct limit_energies *sum = &c->islands[c->label[i]].limit;
+        struct island_energies *sum = &c->islands[c->label[i]].energies;
         const double *terms = &c->body_sums[BODY_SUMS * i];
         sum->drive += terms[0];
         sum->response += terms[1];
@@ -101,7 +103,7 @@ static void add_impulses(struct sadmm_context *c)
     for (size_t r = 0; r < c->pair_block_count * (size_t)LANES; ++r) {
         if (c->pair_blocks[r / (size_t)LANES].pair[r % (size_t)LANES] < 0) continue;
         const struct sadmm_contact_pair *pair = cpu_pair(c, r);
-        add_pair(c, r, &cpu_island_of(c, pair->body_a, pair->body_b)->limit);
+        add_pair(c, r, &cpu_island_of(c, pair->body_a, pair->body_b)->energies);
     }
 }
 
@@ -135,13 +137,13 @@ static void impulses_share(void *context, int thread, int threads)
 }
 
 /* By what the island of body i is slowed down. */
-static double factor_of(const struct sadmm_context *c, int32_t i, bool bounces)
+static double factor_of(const struct sadmm_context *c, int32_t i, bool rebounds)
 {
     const struct cpu_island *island = &c->islands[c->label[i]];
     if (island->rows) return 1; /* the energies are those of contacts alone */
-    const double factor = limit_factor(&island->limit, (double)SADMM_EPSILON);
-    if (!bounces) return factor;
-    return min_of(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
+    const double factor = energy_limit_factor(&island->energies, (double)SADMM_EPSILON);
+    if (!rebounds) return factor;
+    return min_of(factor, energy_limit_rebound_factor(&island->energies, island->along, (double)SADMM_EPSILON));
 }
 
 static void invert_share(void *context, int thread, int threads)
@@ -163,14 +165,14 @@ static void prepare_paper(struct sadmm_context *c)
 
 static void limit_energies(struct sadmm_context *c, int32_t *limited)
 {
-    const bool bounces = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
+    const bool rebounds = c->fast && energy_limit_tests_rebound(c->plan.warm, c->settings.iterations);
     cpu_parallel(c, energies_share, c);
-    if (!any_suspect(c, bounces)) return;
+    if (!any_candidate(c, rebounds)) return;
     CPU(sum_wrenches)(c);
     cpu_parallel(c, impulses_share, c);
     add_impulses(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
-        const double factor = factor_of(c, i, bounces);
+        const double factor = factor_of(c, i, rebounds);
         const int32_t floating = c->floating_of[c->label[i]];
         if (factor == 1) continue;
         *limited += c->label[i] == i;
@@ -181,7 +183,7 @@ static void limit_energies(struct sadmm_context *c, int32_t *limited)
     }
 }
 
-sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
+sadmm_status CPU(limit_energy)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     (void)error;
     *limited = 0;

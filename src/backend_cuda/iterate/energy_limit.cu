@@ -1,9 +1,10 @@
 /* After the last iteration: momentum that no contact may change is restored (iterate/motions.h), and in the method
- * `fast` energies are limited (math/limit.h). In double, from this precision's data; once a step, eight lanes a body.
+ * `fast` energies are limited (math/energy_limit.h). In double, from this precision's data; once a step, eight lanes a
+ * body.
  *
  *   motions   of floating islands: which may be restored (beside the iterations, where these do not find out
  *             themselves what is anchored)
- *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no anchored island does.
+ *   candidate is there a body with more energy than its free motion has, or that rebounds? Else no anchored island does.
  *             Persistent kernels test that themselves, those of tier BLOCK see to the rest too
  *   limit     energies and work, sums over islands (weight/island_sums.h), the factor of each island's velocities: of
  *             anchored islands, if there is such a body; of floating ones in any case, and the rigid motion that
@@ -21,22 +22,23 @@
 #include "core/math/relax.h"
 
 template <bool RIGID>
-static __device__ __forceinline__ bool suspect(const body_view &bodies, const body_thread &t, bool bounces)
+static __device__ __forceinline__ bool has_candidate(const body_view &bodies, const body_thread &t, bool rebounds)
 {
     const wide_row<RIGID> row = row_of_body<RIGID>(bodies, t);
     const bool speaks = t.live && t.lane == 0;
     const double free = speaks ? bodies.free_energy[t.body] : 0;
-    wait_for_stream(); /* of all that, iterations change velocities alone */
+    pdl_wait(); /* of all that, iterations change velocities alone */
     const double velocity = t.live && t.lane < 6 ? (double)bodies.state[t.body * ROW + (size_t)t.lane] : 0;
-    return suspect_body(bounces, speaks, free, velocity, row.b, row.a);
+    return is_candidate(rebounds, speaks, free, velocity, row.b, row.a);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
-    suspect_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+    candidate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const body_thread t = body_of_thread(v.model, v.graph);
-    if (v.bodies.rigid ? suspect<true>(v.bodies, t, args.bounces) : suspect<false>(v.bodies, t, args.bounces))
-        *v.islands.suspects = 1;
+    if (v.bodies.rigid ? has_candidate<true>(v.bodies, t, args.rebounds)
+                       : has_candidate<false>(v.bodies, t, args.rebounds))
+        *v.islands.candidates = 1;
 }
 
 /* Worlds have rigid bodies; the others are of problems. By itself: the kernel comes by the other one, too. */
@@ -55,43 +57,43 @@ static __device__ __forceinline__ void limit_anchored(const cuda_view &v, const 
 {
     double total[TERMS];
     if (add_up_island<add_terms>(v.graph, v.islands, t, on, term, total) && t.lane == 0)
-        limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.bounces, !args.paper);
+        limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.rebounds, !args.paper);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
     motions_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    pdl_wait();
+    pdl_trigger(v.model.bodies);
     if (!args.paper && !*v.islands.floating) return; /* paper does not ask */
     const body_thread t = body_of_thread(v.model, v.graph);
     find_motions(v, t, is_floating(v, t));
 }
 
 /* So many blocks have registers on a multiprocessor at once: large scenes run in waves of them. */
-enum { LIMIT_BLOCKS = 10 };
+enum { ENERGY_LIMIT_BLOCKS = 10 };
 
-static __global__ void __launch_bounds__(BODY_THREADS, LIMIT_BLOCKS)
-    limit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+static __global__ void __launch_bounds__(BODY_THREADS, ENERGY_LIMIT_BLOCKS)
+    energy_limit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const body_thread t = body_of_thread(v.model, v.graph); /* iterations do not change the layout */
     const int32_t label = t.live ? v.graph.label[t.body] : 0;
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    pdl_wait();
+    pdl_trigger(v.model.bodies);
     /* neither waits for the other */
     const bool floating = v.islands.motions && t.live && !v.islands.info[label].anchored;
-    const bool suspected = *v.islands.suspects != 0, anchored = t.live && suspected && !floating;
+    const bool candidates = *v.islands.candidates != 0, anchored = t.live && candidates && !floating;
     if (__ballot_sync((unsigned)ALL_LANES, floating || anchored) == 0) return;
-    const bool energies = suspected || !args.paper;
+    const bool energies = candidates || !args.paper;
     const double term = energies ? energies_in_lanes(v, t, floating || anchored) : 0;
-    if (suspected) limit_anchored(v, args, t, anchored, term);
-    if (v.islands.motions) restore_islands(v, t, floating, energies, term, args.bounces, !args.paper);
+    if (candidates) limit_anchored(v, args, t, anchored, term);
+    if (v.islands.motions) restore_islands(v, t, floating, energies, term, args.rebounds, !args.paper);
 }
 
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    pdl_wait();
+    pdl_trigger(v.model.bodies);
     const int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     solver_real *state = v.bodies.state + (size_t)i * ROW, velocity[6];
@@ -102,8 +104,8 @@ static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __
 /* Islands that kinematic bodies push are left alone, as those with rows are. A thread a pair. */
 static __global__ void kinematic_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    let_next_begin(v.model.bodies);
+    pdl_wait();
+    pdl_trigger(v.model.bodies);
     const int32_t p = thread_index();
     if (p >= live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
@@ -117,8 +119,8 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
 {
     cuda_args args = {};
     args.paper = !c->fast;
-    args.bounces = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
-    return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
+    args.rebounds = c->fast && energy_limit_tests_rebound(c->plan.warm, c->settings.iterations);
+    return CUDA(launch_pdl)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
 sadmm_status CUDA(enqueue_motions)(struct sadmm_context *c, struct sadmm_error *error)
@@ -127,10 +129,10 @@ sadmm_status CUDA(enqueue_motions)(struct sadmm_context *c, struct sadmm_error *
     return launch(c, motions_kernel, "motions", error);
 }
 
-sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
+sadmm_status CUDA(enqueue_energy_limit)(struct sadmm_context *c, bool candidates, struct sadmm_error *error)
 {
-    if (!suspected) TRY(launch(c, suspect_kernel, "energies", error));
-    return launch(c, limit_kernel, "limit", error);
+    if (!candidates) TRY(launch(c, candidate_kernel, "energies", error));
+    return launch(c, energy_limit_kernel, "energy limit", error);
 }
 
 sadmm_status CUDA(enqueue_pushed)(struct sadmm_context *c, struct sadmm_error *error)
@@ -143,14 +145,14 @@ sadmm_status CUDA(enqueue_pushed)(struct sadmm_context *c, struct sadmm_error *e
 
 /* ---- entries ----------------------------------------------------------------------------------------------------- */
 
-extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
+extern "C" sadmm_status CUDA(limit_energy)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     cuda_args args = {};
     CUDA_ENTER(c);
     TRY(CUDA(enqueue_pushed)(c, error));
     TRY(CUDA(enqueue_motions)(c, error));
-    TRY(CUDA(enqueue_limit)(c, false, error));
-    TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));
+    TRY(CUDA(enqueue_energy_limit)(c, false, error));
+    TRY(CUDA(launch)(c, slow_kernel, "limit_energy", blocks_for(c->view.model.bodies), &args, error));
     TRY(CUDA(download)(c, c->view.islands.limited, sizeof *limited, error));
     memcpy(limited, c->buffers[PINNED_OUT].data, sizeof *limited);
     if (c->fast) c->exact_since = RELAX_RESIDUAL_PERIOD; /* residuals are recomputed, should anything follow */

@@ -1,4 +1,4 @@
-#include "loads.h"
+#include "impulse_initialisation.h"
 
 #include <math.h>
 #include <string.h>
@@ -20,7 +20,7 @@ enum { STOPS = 3 };
 /* Errors up to this share of the motion to be stopped are left to the iteration. */
 #define LEFT_OVER 1e-3
 
-struct predictor {
+struct initialisation {
     struct sadmm_system *system;
     const struct sadmm_settings *settings;
     int32_t *offsets, *incident; /* body -> its pairs: (bodies + 2), twice the pairs */
@@ -43,7 +43,7 @@ static int32_t other_body(const struct sadmm_contact_pair *pair, int32_t i)
     return pair->body_a == i ? pair->body_b : pair->body_a;
 }
 
-static void list_pairs(struct predictor *p)
+static void list_pairs(struct initialisation *p)
 {
     const struct sadmm_contact_set *contacts = p->system->contacts;
     for (size_t k = 0; k < contacts->pair_count; ++k)
@@ -60,7 +60,7 @@ static void list_pairs(struct predictor *p)
 }
 
 /* Breadth first from the ground. */
-static void find_depths(struct predictor *p)
+static void find_depths(struct initialisation *p)
 {
     const struct sadmm_contact_set *contacts = p->system->contacts;
     for (int32_t i = 0; i < p->system->body_count; ++i) {
@@ -82,7 +82,7 @@ static void find_depths(struct predictor *p)
 static vec3 point_velocity(const double v[6], vec3 arm) { return v3_add(v3_load(v), v3_cross(v3_load(v + 3), arm)); }
 
 /* Contacts with nearer ones that the body would move into with velocity v; -1: one of them has to push it off. */
-static int find_supports(const struct predictor *p, int32_t i, const double v[6],
+static int find_supports(const struct initialisation *p, int32_t i, const double v[6],
                          struct support supports[MOST_SUPPORTS])
 {
     const struct sadmm_contact_set *contacts = p->system->contacts;
@@ -156,7 +156,7 @@ static bool hold(const double A[36], const double momentum[6], double own, struc
 }
 
 /* A body's supports take what it brings and hand it on. False where they cannot stop it. */
-static bool stop(struct predictor *p, int32_t i)
+static bool stop(struct initialisation *p, int32_t i)
 {
     struct support supports[MOST_SUPPORTS];
     double A[36], b[6], L[36], *momentum = &p->momentum[6 * (size_t)i], *v = &p->system->velocity[6 * (size_t)i];
@@ -181,7 +181,7 @@ static bool stop(struct predictor *p, int32_t i)
 }
 
 /* Islands that were not stopped start from nothing. */
-static void forget_failures(struct predictor *p)
+static void forget_failures(struct initialisation *p)
 {
     struct sadmm_system *system = p->system;
     for (size_t at = 0; at < system->contacts->pair_count; ++at) {
@@ -198,7 +198,7 @@ static void forget_failures(struct predictor *p)
     }
 }
 
-static void predict(struct predictor *p)
+static void initialise(struct initialisation *p)
 {
     struct sadmm_system *system = p->system;
     for (size_t k = 0; k < system->contacts->point_count; ++k)
@@ -207,7 +207,7 @@ static void predict(struct predictor *p)
     list_pairs(p);
     find_depths(p);
     sadmm_islands(system, p->label);
-    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k) { /* what rows carry is not predicted */
+    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k) { /* impulses of rows are not initialised */
         const struct sadmm_row_constraint *constraint = &system->rows->constraints[k];
         p->failed[p->label[constraint->body_a >= 0 ? constraint->body_a : constraint->body_b]] = true;
     }
@@ -229,11 +229,11 @@ static void predict(struct predictor *p)
     forget_failures(p);
 }
 
-sadmm_status sadmm_loads_predict(struct sadmm_system *system, const struct sadmm_settings *settings,
-                                 struct sadmm_error *error)
+sadmm_status sadmm_impulses_initialise(struct sadmm_system *system, const struct sadmm_settings *settings,
+                                       struct sadmm_error *error)
 {
     size_t n = (size_t)system->body_count;
-    struct predictor p = {.system = system, .settings = settings};
+    struct initialisation p = {.system = system, .settings = settings};
     p.offsets = sadmm_alloc(n + 2, sizeof *p.offsets);
     p.incident = sadmm_alloc(2 * system->contacts->pair_count, sizeof *p.incident);
     p.depth = sadmm_alloc(n, sizeof *p.depth);
@@ -242,7 +242,7 @@ sadmm_status sadmm_loads_predict(struct sadmm_system *system, const struct sadmm
     p.failed = sadmm_alloc(n, sizeof *p.failed);
     p.momentum = sadmm_alloc(6 * n, sizeof *p.momentum);
     bool allocated = p.offsets && p.incident && p.depth && p.order && p.label && p.failed && p.momentum;
-    if (allocated) predict(&p);
+    if (allocated) initialise(&p);
     sadmm_free(p.offsets);
     sadmm_free(p.incident);
     sadmm_free(p.depth);
@@ -250,5 +250,5 @@ sadmm_status sadmm_loads_predict(struct sadmm_system *system, const struct sadmm
     sadmm_free(p.label);
     sadmm_free(p.failed);
     sadmm_free(p.momentum);
-    return allocated ? SADMM_OK : sadmm_fail_memory(error, "the loads to start from");
+    return allocated ? SADMM_OK : sadmm_fail_memory(error, "the initial impulses");
 }

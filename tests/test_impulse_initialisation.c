@@ -1,8 +1,8 @@
-/* Predicted loads (core/solve/loads.h): a solution where bodies rest on what is nearer to the ground, and nothing
- * anywhere else. */
+/* Initialised impulses (core/solve/impulse_initialisation.h): a solution where bodies rest on what is nearer to the
+ * ground, and nothing anywhere else. */
 #include "contact_problems.h"
 #include "core/solve/certificate.h"
-#include "core/solve/loads.h"
+#include "core/solve/impulse_initialisation.h"
 #include "core/solve/plan.h"
 #include "core/model/system_math.h"
 #include "run_suite.h"
@@ -11,11 +11,11 @@
 
 static const double g_dt = 9.81 * 0.005; /* of the default settings, m/s */
 
-static sadmm_certificate predict(struct contact_problem *problem, const sadmm_settings *settings)
+static sadmm_certificate initialise(struct contact_problem *problem, const sadmm_settings *settings)
 {
     struct sadmm_error error = {SADMM_OK, ""};
     sadmm_certificate certificate;
-    ck_assert_int_eq(sadmm_loads_predict(&problem->system, settings, &error), SADMM_OK);
+    ck_assert_int_eq(sadmm_impulses_initialise(&problem->system, settings, &error), SADMM_OK);
     ck_assert_int_eq(sadmm_certify(&problem->system, settings, &certificate, &error), SADMM_OK);
     return certificate;
 }
@@ -28,7 +28,7 @@ static double largest_impulse(const struct contact_problem *problem)
     return largest;
 }
 
-/* Every body keeps 1e-7 of its motion (loads.c, STIFF), and what carries it is a solution to that. */
+/* Every body keeps 1e-7 of its motion (impulse_initialisation.c, STIFF), and what carries it is a solution to that. */
 START_TEST(piles_at_rest_are_solved)
 {
     static const double masses[] = {100, 1, 0.01, 3};
@@ -36,7 +36,7 @@ START_TEST(piles_at_rest_are_solved)
                                           contact_problem_stack(masses, 4, 0), contact_problem_plates(1, 0.5)};
     sadmm_settings s = sadmm_settings_default();
     for (size_t k = 0; k < sizeof problems / sizeof *problems; ++k) {
-        sadmm_certificate c = predict(problems[k], &s);
+        sadmm_certificate c = initialise(problems[k], &s);
         ck_assert_msg(c.ncp_max <= 1e-5 * g_dt, "%zu: natural map %g", k, c.ncp_max);
         ck_assert_msg(c.momentum_max <= 1e-6, "%zu: momentum %g", k, c.momentum_max);
         ck_assert_double_gt(largest_impulse(problems[k]), 0);
@@ -51,7 +51,7 @@ START_TEST(loads_add_up)
     struct contact_problem *problem = contact_problem_pyramid(10, 0.5);
     sadmm_settings s = sadmm_settings_default();
     double sum = 0;
-    predict(problem, &s);
+    initialise(problem, &s);
     for (size_t p = 0; p < problem->contacts.pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &problem->contacts.pairs[p];
         for (int k = 0; k < pair->count && pair->body_a < 0; ++k)
@@ -62,8 +62,8 @@ START_TEST(loads_add_up)
 }
 END_TEST
 
-/* Nothing is known of what slides, flies up, is pushed out, or has no ground; nor does an island without a prediction
- * spoil another. */
+/* Nothing is known of what slides, flies up, is pushed out, or has no ground; nor does an island without initial
+ * impulses spoil another. */
 START_TEST(others_start_from_nothing)
 {
     static const double one[] = {1, 1};
@@ -77,7 +77,7 @@ START_TEST(others_start_from_nothing)
     problems[4]->contacts.pairs[0].body_a = 1; /* the lower one no longer on the ground */
     for (int k = 0; k < 5; ++k) {
         if (k == 1) s.gravity[0] = 0;
-        predict(problems[k], &s);
+        initialise(problems[k], &s);
         ck_assert_msg(largest_impulse(problems[k]) == 0, "%d: largest impulse %g", k, largest_impulse(problems[k]));
         for (int i = 0; i < 2; ++i) {
             double A[36], b[6];
@@ -91,7 +91,7 @@ START_TEST(others_start_from_nothing)
     int32_t thrown = contact_problem_box(two, 1, 0.1, 0.1, 0.1, 5, 0, 0.1);
     two->rigid[thrown].velocity[0] = 3;
     contact_problem_touch(two, -1, thrown, (double[]){5, 0, 0}, (double[]){0, 0, 1}, 0, 0.5, 0);
-    predict(two, &s);
+    initialise(two, &s);
     ck_assert_double_gt(two->contacts.points[0].impulse[2], 0);
     ck_assert_double_eq(two->contacts.points[two->contacts.point_count - 1].impulse[2], 0);
     contact_problem_free(two);
@@ -108,7 +108,7 @@ START_TEST(small_errors_are_left_to_the_iteration)
         struct contact_problem *problem = contact_problem_stack(one, 1, 0.5);
         const double off = shares[k % 2] * g_dt * s.dt, gap = k < 2 ? off : -s.slop - off / s.baumgarte;
         problem->contacts.points[1].gap = problem->contacts.points[3].gap = gap;
-        predict(problem, &s);
+        initialise(problem, &s);
         ck_assert_msg((largest_impulse(problem) > 0) == (k % 2 == 0), "gap %g m: largest impulse %g", gap,
                       largest_impulse(problem));
         contact_problem_free(problem);
@@ -116,8 +116,8 @@ START_TEST(small_errors_are_left_to_the_iteration)
 }
 END_TEST
 
-/* Where loads are predicted, and that backends are told to start from them even where nothing else is kept. */
-START_TEST(plans_that_predict)
+/* Where impulses are initialised, and that backends start from them even where nothing else is kept. */
+START_TEST(plans_that_initialise)
 {
     static const double one[] = {1, 1};
     struct contact_problem *p = contact_problem_stack(one, 2, 0.5);
@@ -127,14 +127,14 @@ START_TEST(plans_that_predict)
         s.method = SADMM_METHOD_FAST;
         p->system.first = true;
         struct sadmm_plan plan = sadmm_plan_make(&p->system, &s);
-        ck_assert(plan.predict && plan.warm_start && !plan.warm && plan.weight_refresh);
+        ck_assert(plan.initialise && plan.warm_start && !plan.warm && plan.weight_updates);
         p->system.first = false;
         plan = sadmm_plan_make(&p->system, &s);
-        ck_assert(!plan.predict && plan.warm_start == s.warm_start);
+        ck_assert(!plan.initialise && plan.warm_start == s.warm_start);
         p->system.first = true;
         s.method = SADMM_METHOD_PAPER;
         plan = sadmm_plan_make(&p->system, &s);
-        ck_assert(!plan.predict && plan.warm_start == s.warm_start);
+        ck_assert(!plan.initialise && plan.warm_start == s.warm_start);
     }
     contact_problem_free(p);
 }
@@ -148,7 +148,7 @@ int main(void)
     tcase_add_test(cases, loads_add_up);
     tcase_add_test(cases, others_start_from_nothing);
     tcase_add_test(cases, small_errors_are_left_to_the_iteration);
-    tcase_add_test(cases, plans_that_predict);
+    tcase_add_test(cases, plans_that_initialise);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }
