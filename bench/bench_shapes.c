@@ -34,8 +34,8 @@ struct bench {
     struct form forms[FORMS];
     int form_count;
     sadmm_hull *hulls[FORMS];
-    double *pool;
-    size_t pool_doubles, pool_capacity;
+    double *shape_data;
+    size_t shape_data_doubles, shape_data_capacity;
     struct sadmm_shape shapes[2 * PAIRS];
     struct sadmm_geometry geometries[2];
     struct sadmm_collision_body bodies[2 * PAIRS];
@@ -48,7 +48,7 @@ static struct form *add_form(struct bench *b, const char *name, int type, double
 {
     struct form *form = &b->forms[b->form_count++];
     *form = (struct form){.name = name,
-                          .geometry = {.type = type, .children = 1, .size = {s0, s1, s2}},
+                          .geometry = {.type = type, .subshapes = 1, .size = {s0, s1, s2}},
                           .down = {1, 0, 0, 0}, .below = s2};
     return form;
 }
@@ -64,18 +64,19 @@ static quat turn_down(const double n[3])
 static sadmm_status append_block(struct bench *b, struct form *form, const double *block, size_t doubles,
                                  struct sadmm_error *error)
 {
-    if (!sadmm_grow(&b->pool, &b->pool_capacity, b->pool_doubles, b->pool_doubles + doubles, sizeof *b->pool))
-        return sadmm_fail_memory(error, "the pool");
-    form->geometry.hull = (uint32_t)b->pool_doubles;
-    memcpy(b->pool + b->pool_doubles, block, doubles * sizeof *b->pool);
-    b->pool_doubles += doubles;
+    if (!sadmm_grow(&b->shape_data, &b->shape_data_capacity, b->shape_data_doubles, b->shape_data_doubles + doubles,
+                    sizeof *b->shape_data))
+        return sadmm_fail_memory(error, "shape data");
+    form->geometry.hull = (uint32_t)b->shape_data_doubles;
+    memcpy(b->shape_data + b->shape_data_doubles, block, doubles * sizeof *b->shape_data);
+    b->shape_data_doubles += doubles;
     return SADMM_OK;
 }
 
-static sadmm_status add_hull(struct bench *b, const char *name, const double *points, size_t count, double rounding,
-                             struct sadmm_error *error)
+static sadmm_status add_hull(struct bench *b, const char *name, const double *points, size_t count,
+                             double convex_radius, struct sadmm_error *error)
 {
-    const sadmm_hull_def def = {.points = points, .point_count = count, .merge = 1e-6, .rounding = rounding};
+    const sadmm_hull_def def = {.points = points, .point_count = count, .merge = 1e-6, .convex_radius = convex_radius};
     sadmm_hull *hull;
     sadmm_status status = sadmm_hull_create(&def, &hull);
     if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_last_message());
@@ -83,7 +84,7 @@ static sadmm_status add_hull(struct bench *b, const char *name, const double *po
     struct form *form = add_form(b, name, SADMM_SHAPE_HULL, hull->half[0], hull->half[1], hull->half[2]);
     TRY(append_block(b, form, hull->block, hull->doubles, error));
     struct polytope p;
-    polytope_at(b->pool, form->geometry.hull, &p);
+    polytope_at(b->shape_data, form->geometry.hull, &p);
     const double n[3] = {p.nx[0], p.ny[0], p.nz[0]};
     form->down = turn_down(n);
     form->below = p.offset[0] + p.radius;
@@ -126,7 +127,7 @@ static sadmm_status add_ground(struct bench *b, const char *name, bool in_triang
     sadmm_mesh *mesh = NULL;
     TRY(make_ground(17, 0.5, 0, in_triangles, &mesh, error));
     struct form *form = add_form(b, name, SADMM_SHAPE_MESH, mesh->half[0], mesh->half[1], mesh->half[2]);
-    form->geometry.children = 0;
+    form->geometry.subshapes = 0;
     form->down = (quat){0, 1, 0, 0}; /* bodies rest on its upper side */
     form->below = 0;
     const sadmm_status status = append_block(b, form, mesh->block, mesh->doubles, error);
@@ -147,10 +148,10 @@ static void spread(int count, double *points)
 static sadmm_status make_forms(struct bench *b, struct sadmm_error *error)
 {
     double cube[24], ball[3 * 128];
-    if (!sadmm_grow(&b->pool, &b->pool_capacity, 0, HULL_FIRST_OWN, sizeof *b->pool))
+    if (!sadmm_grow(&b->shape_data, &b->shape_data_capacity, 0, HULL_FIRST_OWN, sizeof *b->shape_data))
         return sadmm_fail_memory(error, "the hulls");
-    sadmm_hull_prelude(b->pool);
-    b->pool_doubles = HULL_FIRST_OWN;
+    sadmm_hull_prelude(b->shape_data);
+    b->shape_data_doubles = HULL_FIRST_OWN;
     add_form(b, "sphere", SADMM_SHAPE_SPHERE, 1, 0, 0)->below = 1;
     const double z[3] = {1, 0, 0};
     struct form *capsule = add_form(b, "capsule", SADMM_SHAPE_CAPSULE, 0.5, 0.5, 0);
@@ -248,7 +249,7 @@ static sadmm_status run(struct bench *b, struct sadmm_error *error)
     TRY(sadmm_candidates_init(&b->candidates, sadmm_broad_phase_default(), error));
     b->input = (struct sadmm_collision_input){
         .shapes = b->shapes, .shape_count = 2 * PAIRS, .geometries = b->geometries, .geometry_count = 2,
-        .hulls = b->pool, .hull_doubles = b->pool_doubles, .bodies = b->bodies, .body_count = 2 * PAIRS,
+        .hulls = b->shape_data, .hull_doubles = b->shape_data_doubles, .bodies = b->bodies, .body_count = 2 * PAIRS,
         .dt = 0.005, .margin = 0.02, .threads = 1, .gravity = 9.81};
     printf("%-12s %-12s %8s %10s %10s   (%d pairs, %s, us a pair)\n", "on", "rests", "points", "warm", "cold", PAIRS,
            b->candidates.kernels->variant);
@@ -278,7 +279,7 @@ int bench_shapes(int argc, char **argv)
         sadmm_contact_set_free(&b->before);
         sadmm_contact_set_free(&b->after);
         for (int k = 0; k < FORMS; ++k) sadmm_hull_destroy(b->hulls[k]);
-        sadmm_free(b->pool);
+        sadmm_free(b->shape_data);
     }
     sadmm_free(b);
     if (status == SADMM_OK) return 0;

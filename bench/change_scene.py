@@ -19,7 +19,7 @@ def hulls(scene):
         if size not in numbers:
             numbers[size] = len(scene["hulls"])
             corners = itertools.product(*[(-x, x) for x in size])
-            scene["hulls"].append({"points": [list(p) for p in corners], "merge": 1e-6, "rounding": 0.0})
+            scene["hulls"].append({"points": [list(p) for p in corners], "merge": 1e-6, "convex_radius": 0.0})
         shape.update(type="hull", size=[], hull=numbers[size])
 
 

@@ -120,7 +120,7 @@ static sadmm_status add_joints(struct known_world *w)
         joint.kind = axis ? SADMM_JOINT_REVOLUTE : SADMM_JOINT_SPHERICAL;
         if (a) joint.body_a = w->bodies[point->a].id;
         joint.body_b = w->bodies[point->b].id;
-        if (axis) { /* from z to the axis: half a turn about what lies midway */
+        if (axis) { /* from z to the axis: half a turn about the direction halfway between them */
             const vec3 along = m3_mul(turn, v3_load(axis->axis)), middle = v3_add(along, v3(0, 0, 1));
             q_store(q_normalize((quat){0, middle.x, middle.y, middle.z}), frame);
         }

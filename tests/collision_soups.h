@@ -3,7 +3,7 @@
 #ifndef TESTS_COLLISION_SOUPS_H
 #define TESTS_COLLISION_SOUPS_H
 
-#include "hull_pool.h"
+#include "hull_shapes.h"
 #include "mesh_tools.h"
 
 #include "backend_cuda/collide/pipeline.h"
@@ -71,9 +71,9 @@ static inline void check_same(const struct sadmm_contact_set *host, const struct
                   device->point_count, host->pair_count, host->point_count);
     for (size_t i = 0; i < host->pair_count; ++i) {
         const struct sadmm_contact_pair *p = &host->pairs[i], *q = &device->pairs[i];
-        SAME(p->shape_a == q->shape_a && p->shape_b == q->shape_b && p->child == q->child,
-                      "%s: pair %zu is %d-%d, child %u, instead of %d-%d, child %u", about, i, q->shape_a, q->shape_b,
-                      q->child, p->shape_a, p->shape_b, p->child);
+        SAME(p->shape_a == q->shape_a && p->shape_b == q->shape_b && p->subshape == q->subshape,
+                      "%s: pair %zu is %d-%d, subshape %u, instead of %d-%d, subshape %u", about, i, q->shape_a,
+                      q->shape_b, q->subshape, p->shape_a, p->shape_b, p->subshape);
         SAME(p->body_a == q->body_a && p->body_b == q->body_b && p->first == q->first &&
                           p->count == q->count && p->cache == q->cache && p->revision == q->revision &&
                           p->placed == q->placed,
@@ -90,8 +90,8 @@ static inline void check_same(const struct sadmm_contact_set *host, const struct
         SAME(p->feature == q->feature && p->migrates == q->migrates, "%s: point %zu: feature %u instead of %u",
                       about, k, q->feature, p->feature);
         SAME(same_numbers(p->arm_a, q->arm_a, 3) && same_numbers(p->arm_b, q->arm_b, 3) &&
-                          same_numbers(&p->gap, &q->gap, 1) && same_numbers(&p->error, &q->error, 1),
-                      "%s: point %zu: gap %.17g instead of %.17g", about, k, q->gap, p->gap);
+                          same_numbers(&p->separation, &q->separation, 1) && same_numbers(&p->error, &q->error, 1),
+                      "%s: point %zu: separation %.17g instead of %.17g", about, k, q->separation, p->separation);
         SAME(same_numbers(p->impulse, q->impulse, 3),
                       "%s: point %zu: impulse %.17g %.17g %.17g instead of %.17g %.17g %.17g", about, k, q->impulse[0],
                       q->impulse[1], q->impulse[2], p->impulse[0], p->impulse[1], p->impulse[2]);
@@ -179,7 +179,7 @@ struct shape_soup {
     double *values;
     struct sadmm_collision_input input;
     uint32_t revisions;
-    struct test_pool *pool;    /* of hulls; NULL: there are none */
+    struct test_shape_data *shape_data; /* of hulls; NULL: there are none */
     struct sadmm_geometry forms[8];
     struct sadmm_geometry meshes[4];
 };
@@ -191,7 +191,7 @@ struct soup_kind {
     double size_low, size_high;
     double static_share, filter_share, disabled_share, friction_share, dead_share;
     int steps, tree_from;
-    int children;           /* of a geometry, at most; 0: one */
+    int subshapes;          /* of a geometry, at most; 0: one */
     int hulls;              /* forms of hulls; 0: no shape is one */
     int meshes;             /* forms of meshes, what static bodies are; 0: none is */
     double smooth;          /* share of cylinders, cones and ellipsoids */
@@ -224,7 +224,7 @@ static inline void random_shape(struct shape_soup *s, const struct soup_kind *ki
     memset(shape, 0, sizeof *shape);
     shape->geometry = (uint32_t)(shape - s->shapes);
     geometry->type = SADMM_SHAPE_SPHERE + below(3);
-    geometry->children = 1 + (kind->children ? below(kind->children) : 0);
+    geometry->subshapes = 1 + (kind->subshapes ? below(kind->subshapes) : 0);
     for (int k = 0; k < 3; ++k) geometry->size[k] = kind->size_low * pow(kind->size_high / kind->size_low, uniform());
     if (chance(0.3)) geometry->size[1] = geometry->size[2] = geometry->size[0];
     if (kind->smooth > 0 && chance(kind->smooth)) geometry->type = SADMM_SHAPE_CYLINDER + below(3);
@@ -246,10 +246,10 @@ static inline double rough(double x, double y)
     return 0.1 * (sin(5 * x) + cos(7 * y)) + 0.2 * fabs(x);
 }
 
-/* A mesh in the pool: a rough ground, a ball, a box in pieces, a heightfield. */
-static inline struct sadmm_geometry pooled_mesh(struct test_pool *pool, int form, double size)
+/* A mesh in the shape data: a rough ground, a ball, a box in pieces, a heightfield. */
+static inline struct sadmm_geometry mesh_in_data(struct test_shape_data *shape_data, int form, double size)
 {
-    struct sadmm_geometry geometry = {.type = SADMM_SHAPE_MESH, .hull = (uint32_t)pool->used};
+    struct sadmm_geometry geometry = {.type = SADMM_SHAPE_MESH, .hull = (uint32_t)shape_data->used};
     const double half[3] = {size, 2 * size, 0.5 * size};
     double heights[20 * 15];
     sadmm_mesh *mesh = NULL;
@@ -264,9 +264,9 @@ static inline struct sadmm_geometry pooled_mesh(struct test_pool *pool, int form
         for (int i = 0; i < 20 * 15; ++i) heights[i] = size * (uniform() - 0.5);
         ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);
     }
-    ck_assert_uint_le(pool->used + mesh->doubles, TEST_POOL);
-    memcpy(pool->numbers + pool->used, mesh->block, mesh->doubles * sizeof *pool->numbers);
-    pool->used += mesh->doubles;
+    ck_assert_uint_le(shape_data->used + mesh->doubles, TEST_SHAPE_DATA);
+    memcpy(shape_data->numbers + shape_data->used, mesh->block, mesh->doubles * sizeof *shape_data->numbers);
+    shape_data->used += mesh->doubles;
     memcpy(geometry.size, mesh->half, sizeof geometry.size);
     sadmm_mesh_destroy(mesh);
     return geometry;
@@ -282,7 +282,7 @@ static inline struct shape_soup shape_soup_new(const struct soup_kind *kind, uin
     seed(number);
     if (kind->hulls || kind->smooth > 0) {
         uint64_t state = 4711 + number;
-        s.pool = test_pool_new();
+        s.shape_data = test_shape_data_new();
         for (int form = 0; form < kind->hulls; ++form) {
             double size[3];
             struct test_hull h;
@@ -290,13 +290,13 @@ static inline struct shape_soup shape_soup_new(const struct soup_kind *kind, uin
             if (form == 0) box_hull(size, &h);
             else if (form == 1) prism_hull(20, 0.5, &h);
             else random_hull(&state, form == 2 ? 60 : 6 + below(20), size, &h);
-            if (form > 2 || chance(0.3)) h.rounding = between(0, 0.3 * kind->size_low);
-            s.forms[form] = test_pool_add(s.pool, &h);
+            if (form > 2 || chance(0.3)) h.convex_radius = between(0, 0.3 * kind->size_low);
+            s.forms[form] = test_shape_data_add(s.shape_data, &h);
         }
         for (int form = 0; form < kind->meshes; ++form)
-            s.meshes[form] = pooled_mesh(s.pool, form, 3 * kind->size_high);
-        s.input.hulls = s.pool->numbers;
-        s.input.hull_doubles = s.pool->used;
+            s.meshes[form] = mesh_in_data(s.shape_data, form, 3 * kind->size_high);
+        s.input.hulls = s.shape_data->numbers;
+        s.input.hull_doubles = s.shape_data->used;
         s.input.hull_revision = (uint32_t)number;
     }
     s.shapes = calloc((size_t)shapes + 1, sizeof *s.shapes);
@@ -369,7 +369,7 @@ static inline void shape_soup_free(struct shape_soup *s)
     free(s->disabled);
     free(s->friction);
     free(s->values);
-    free(s->pool);
+    free(s->shape_data);
 }
 
 /* A step later: everything moved, some shapes gone, new or others. */

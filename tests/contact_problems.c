@@ -113,7 +113,7 @@ int32_t contact_problem_box(struct contact_problem *p, double mass, double hx, d
 }
 
 void contact_problem_touch(struct contact_problem *p, int32_t a, int32_t b, const double at[3], const double normal[3],
-                           double gap, double friction, double restitution)
+                           double separation, double friction, double restitution)
 {
     struct sadmm_contact_set *set = &p->contacts;
     struct sadmm_contact_pair *last = set->pair_count ? &set->pairs[set->pair_count - 1] : NULL;
@@ -127,7 +127,7 @@ void contact_problem_touch(struct contact_problem *p, int32_t a, int32_t b, cons
         if (a >= 0) point->arm_a[i] = at[i] - p->rigid[a].position[i];
         if (b >= 0) point->arm_b[i] = at[i] - p->rigid[b].position[i];
     }
-    point->gap = gap;
+    point->separation = separation;
     if (!joins) {
         set->pairs = resize(set->pairs, set->pair_count + 1, sizeof *set->pairs);
         last = &set->pairs[set->pair_count++];
@@ -323,8 +323,8 @@ struct contact_problem *contact_problem_mixed(uint64_t seed, double friction)
         random_unit(normal, 3);
         for (int j = 0; j <= k % 4; ++j) {
             double at[3] = {contact_problem_random(), contact_problem_random(), contact_problem_random()};
-            double gap = 2e-3 * contact_problem_random();
-            contact_problem_touch(p, a, b, at, normal, gap, mu, restitution);
+            double separation = 2e-3 * contact_problem_random();
+            contact_problem_touch(p, a, b, at, normal, separation, mu, restitution);
         }
     }
     /* Contacts given by Jacobians, with an error in every row. */

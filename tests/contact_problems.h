@@ -5,7 +5,8 @@
 #include "core/solve/plan.h"
 #include "core/model/system.h"
 
-/* Owns what its `system` points to. Bodies are rigid and contacts have gaps until contact_problem_raw() is called. */
+/* Owns what its `system` points to. Bodies are rigid and contacts have separations until contact_problem_raw() is
+ * called. */
 struct contact_problem {
     struct sadmm_system system;
     struct sadmm_contact_set contacts;
@@ -29,11 +30,12 @@ int32_t contact_problem_box(struct contact_problem *problem, double mass, double
                             double y, double z);
 /* A contact at a world point; joins the last pair when bodies, normal, friction and restitution are the same. */
 void contact_problem_touch(struct contact_problem *problem, int32_t a, int32_t b, const double at[3],
-                           const double normal[3], double gap, double friction, double restitution);
+                           const double normal[3], double separation, double friction, double restitution);
 /* A zeroed block to fill; valid until the next call. */
 sadmm_problem_block *contact_problem_block(struct contact_problem *problem, sadmm_block_kind kind, int32_t rows,
                                            int32_t a, int32_t b);
-/* Give A, b and e instead of rigid bodies and gaps. `coupling` > 0 mixes linear and angular parts of A, relatively. */
+/* Give A, b and e instead of rigid bodies and separations. `coupling` > 0 mixes linear and angular parts of A,
+ * relatively. */
 void contact_problem_raw(struct contact_problem *problem, const sadmm_settings *settings, double coupling);
 /* Random start values. */
 void contact_problem_warm(struct contact_problem *problem, double speed, double impulse);
@@ -48,8 +50,8 @@ struct contact_problem *contact_problem_stack(const double *masses, int count, d
 struct contact_problem *contact_problem_pyramid(int rows, double friction);
 /* 10 kg plates on four 50 g cubes each, tilted by the direction of gravity the caller chooses. */
 struct contact_problem *contact_problem_plates(int layers, double friction);
-/* Rotated, spinning bodies with contacts (gaps, penetration, restitution), general contacts, welds and joints with
- * free rows, soft rows, a body on its own, and blocks to the static world on either side. */
+/* Rotated, spinning bodies with contacts (separations, penetration, restitution), general contacts, welds and joints
+ * with free rows, soft rows, a body on its own, and blocks to the static world on either side. */
 struct contact_problem *contact_problem_mixed(uint64_t seed, double friction);
 
 #endif

@@ -30,7 +30,7 @@ static inline double own_support(const struct pair_of *t, int s, const double wo
     default: break;
     }
     for (int v = 0; v < t->h[s].vertices; ++v) most = fmax(most, t_dot(t->h[s].x[v], d));
-    return most + t->h[s].rounding;
+    return most + t->h[s].convex_radius;
 }
 
 /* How far a point of the world is outside of shape s, near its surface; negative: inside. */
@@ -61,14 +61,14 @@ static inline double own_outside(const struct pair_of *t, int s, const double wo
     }
     const struct test_hull *h = &t->h[s];
     for (int f = 0; f < h->faces; ++f) most = fmax(most, t_dot(h->plane[f], p) - h->plane[f][3]);
-    if (h->rounding > 0 && most > 0) { /* beyond an edge or a corner */
+    if (h->convex_radius > 0 && most > 0) { /* beyond an edge or a corner */
         most = HUGE_VAL;
         for (int f = 0; f < h->faces; ++f)
             for (int c = 2; c < h->corners[f]; ++c)
                 most = fmin(most, test_point_triangle(p, h->x[h->corner[f][0]], h->x[h->corner[f][c - 1]],
                                                       h->x[h->corner[f][c]]));
     }
-    return most - h->rounding;
+    return most - h->convex_radius;
 }
 
 /* The separation of the two along a unit vector of the world, from a to b. */
@@ -94,7 +94,7 @@ static inline struct manifold pair_touch(const struct pair_of *t, double limit, 
     const struct pair_pose pose = pair_of_pose(t);
     struct manifold m;
     memset(&m, 0x55, sizeof m);
-    pair_manifold(&t->g[0], &t->g[1], t->pool->numbers, 0, &pose, limit, cache, &m);
+    pair_manifold(&t->g[0], &t->g[1], t->shape_data->numbers, 0, &pose, limit, cache, &m);
     ck_assert_int_ge(m.count, 0);
     ck_assert_int_le(m.count, SADMM_MANIFOLD_POINTS);
     return m;
@@ -113,13 +113,13 @@ static inline void point_in_world(const struct pair_of *t, vec3 x, double world[
     for (int k = 0; k < 3; ++k) world[k] += t->x[1][k];
 }
 
-/* How far the two points that face each other across `gap` are outside of their bodies, the worse of them. */
-static inline double points_outside(const struct pair_of *t, vec3 n, vec3 middle, double gap)
+/* How far the two points that face each other across `separation` are outside of their bodies, the worse of them. */
+static inline double points_outside(const struct pair_of *t, vec3 n, vec3 middle, double separation)
 {
     double outside = -HUGE_VAL;
     for (int s = 0; s < 2; ++s) {
         double world[3];
-        point_in_world(t, v3_madd(middle, s == 0 ? -gap / 2 : gap / 2, n), world);
+        point_in_world(t, v3_madd(middle, s == 0 ? -separation / 2 : separation / 2, n), world);
         outside = fmax(outside, own_outside(t, s, world));
     }
     return outside;
@@ -128,15 +128,15 @@ static inline double points_outside(const struct pair_of *t, vec3 n, vec3 middle
 /* A shape of any type; hulls: of so many points, rounded now and then. scale: m. */
 static inline void random_shape_of(struct random *r, struct pair_of *t, int s, int type, double scale)
 {
-    struct sadmm_geometry g = {.type = type, .children = 1};
+    struct sadmm_geometry g = {.type = type, .subshapes = 1};
     const double flat = pow(10, random_in(r, -1.5, 0));
     const int thin = (int)(3 * random_unit(r));
     for (int k = 0; k < 3; ++k) g.size[k] = scale * random_in(r, 0.3, 1) * (k == thin ? flat : 1);
     if (type == SADMM_SHAPE_HULL) {
         if (random_unit(r) < 0.3) box_hull(g.size, &t->h[s]);
         else random_hull(&r->state, 5 + (int)(random_unit(r) * 20), g.size, &t->h[s]);
-        t->h[s].rounding = random_unit(r) < 0.3 ? 0.2 * scale * flat : 0;
-        g = test_pool_add(t->pool, &t->h[s]);
+        t->h[s].convex_radius = random_unit(r) < 0.3 ? 0.2 * scale * flat : 0;
+        g = test_shape_data_add(t->shape_data, &t->h[s]);
     }
     t->g[s] = g;
 }

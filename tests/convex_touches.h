@@ -14,7 +14,7 @@ static inline struct convex_axis nearest_axis(const struct pair_of *t)
     struct convex_axis axis, flat;
     struct convex_active active;
     memset(&axis, 0, sizeof axis);
-    convex_pair_make(&t->g[0], &t->g[1], t->pool->numbers, &pose, &pair);
+    convex_pair_make(&t->g[0], &t->g[1], t->shape_data->numbers, &pose, &pair);
     ck_assert(convex_find(&pair, v3_norm2(pair.t) > 0 ? v3_neg(pair.t) : v3(0, 0, 1), false, 1e300, &axis, &active));
     if (convex_flat_beside(&pair, axis.n, &flat) && flat.separation >= axis.separation - 2 * pair.slack) axis = flat;
     else convex_nearest(&pair, &active, &axis);
@@ -23,13 +23,13 @@ static inline struct convex_axis nearest_axis(const struct pair_of *t)
 
 struct found {
     double apart; /* of the two along n, by their own supports */
-    double off;   /* how far from a certificate: |gap of two points - apart|, or how far these are outside */
+    double off;   /* how far from a certificate: |separation of two points - apart|, or how far these are outside */
     double n[3];  /* world */
 };
 
-static inline double off_by(const struct pair_of *t, vec3 n, vec3 middle, double gap, double apart)
+static inline double off_by(const struct pair_of *t, vec3 n, vec3 middle, double separation, double apart)
 {
-    return fmax(fabs(gap - apart), points_outside(t, n, middle, gap));
+    return fmax(fabs(separation - apart), points_outside(t, n, middle, separation));
 }
 
 /* By the optimum's own points, or those of the manifold. */
@@ -97,13 +97,13 @@ static inline struct pair_of *new_pair(void)
 {
     struct pair_of *t = calloc(1, sizeof *t);
     ck_assert_ptr_nonnull(t);
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     return t;
 }
 
 static inline void free_pair(struct pair_of *t)
 {
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 

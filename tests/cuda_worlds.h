@@ -119,8 +119,8 @@ static inline void expect_same_world(sadmm_world *a, sadmm_world *b, const char 
     MUST(a, sadmm_world_contacts(a, 0, count, x));
     MUST(b, sadmm_world_contacts(b, 0, count, y));
     for (int32_t k = 0; k < count; ++k)
-        ck_assert_msg(memcmp(&x[k], &y[k], sizeof *x) == 0, "%s: contact %d differs: gap %g %g, impulse %g %g", what, k,
-                      x[k].gap, y[k].gap, x[k].impulse[2], y[k].impulse[2]);
+        ck_assert_msg(memcmp(&x[k], &y[k], sizeof *x) == 0, "%s: contact %d differs: separation %g %g, impulse %g %g",
+                      what, k, x[k].separation, y[k].separation, x[k].impulse[2], y[k].impulse[2]);
     free(x);
     free(y);
     for (int32_t i = 0; i < sadmm_world_body_count(a); ++i) {

@@ -15,7 +15,7 @@ enum { TEST_HULL_POINTS = 64, TEST_HULL_FACES = 2 * TEST_HULL_POINTS, TEST_HULL_
 
 struct test_hull {
     int vertices, faces, edges;
-    double rounding; /* radius of the ball around every point of it */
+    double convex_radius; /* radius of the ball around every point of it */
     double x[TEST_HULL_POINTS][3];
     double plane[TEST_HULL_FACES][4];
     int corners[TEST_HULL_FACES], corner[TEST_HULL_FACES][TEST_HULL_POINTS];
@@ -108,7 +108,7 @@ static inline int test_hull_edge(const struct test_hull *h, int from, int to)
 }
 
 /* The block, of hull_doubles(vertices, faces, edges) doubles. */
-static inline void test_hull_block(const struct test_hull *h, double *block)
+static inline void test_hull_data(const struct test_hull *h, double *block)
 {
     struct sadmm_hull_header *header = (struct sadmm_hull_header *)block;
     const int v = hull_stride(h->vertices), f = hull_stride(h->faces);
@@ -122,7 +122,7 @@ static inline void test_hull_block(const struct test_hull *h, double *block)
     header->vertex_stride = v;
     header->face_stride = f;
     header->doubles = hull_doubles(h->vertices, h->faces, h->edges);
-    header->rounding = h->rounding;
+    header->convex_radius = h->convex_radius;
     header->climbs = 1; /* of convex faces, flat but for rounding */
     for (int k = 0; k < 3; ++k)
         for (int i = 0; i < v; ++i) number[k * v + i] = h->x[i < h->vertices ? i : 0][k];

@@ -88,13 +88,13 @@ static inline void shuffle_cloud(struct cloud *c, uint64_t seed)
     }
 }
 
-static inline sadmm_status try_round_hull(const struct cloud *c, double merge, double rounding, sadmm_hull **hull)
+static inline sadmm_status try_round_hull(const struct cloud *c, double merge, double convex_radius, sadmm_hull **hull)
 {
     sadmm_hull_def def = sadmm_hull_def_default();
     def.points = c->x;
     def.point_count = c->count;
     def.merge = merge;
-    def.rounding = rounding;
+    def.convex_radius = convex_radius;
     return sadmm_hull_create(&def, hull);
 }
 
@@ -183,8 +183,8 @@ static inline void check_convex(const sadmm_hull *hull, const struct cloud *poin
     }
 }
 
-/* The block that contact finding reads says the same in its own frame. rounding: m. */
-static inline void check_block(const sadmm_hull *hull, double rounding)
+/* The block that contact finding reads says the same in its own frame. convex_radius: m. */
+static inline void check_block(const sadmm_hull *hull, double convex_radius)
 {
     struct polytope p;
     const mat3 turn = q_matrix(q_load(hull->orientation));
@@ -199,11 +199,11 @@ static inline void check_block(const sadmm_hull *hull, double rounding)
         const int same = v < p.vertices ? v : 0;
         const double x[3] = {p.x[v], p.y[v], p.z[v]};
         const vec3 given = v3_add(v3_load(hull->position), m3_mul(turn, v3_load(x)));
-        HOLDS(v3_norm(v3_sub(given, v3_load(hull->vertices + 3 * same))) <= rounding);
+        HOLDS(v3_norm(v3_sub(given, v3_load(hull->vertices + 3 * same))) <= convex_radius);
         for (int k = 0; k < 3; ++k) most[k] = fmax(most[k], fabs(x[k]));
     }
-    for (int k = 0; k < 3; ++k) HOLDS(most[k] + hull->rounding == hull->half[k]);
-    HOLDS(header->rounding == hull->rounding && p.radius == hull->rounding);
+    for (int k = 0; k < 3; ++k) HOLDS(most[k] + hull->convex_radius == hull->half[k]);
+    HOLDS(header->convex_radius == hull->convex_radius && p.radius == hull->convex_radius);
     for (int f = 0; f < p.faces; ++f) {
         const vec3 n = polytope_normal(&p, f);
         double offset = -INFINITY;

@@ -14,7 +14,7 @@ static inline struct manifold touch_two(const struct pair_of *t, double limit, u
     const struct pair_pose pose = pair_of_pose(t);
     struct manifold m;
     memset(&m, 0x55, sizeof m);
-    pair_manifold(&t->g[0], &t->g[1], t->pool->numbers, 0, &pose, limit, cache, &m);
+    pair_manifold(&t->g[0], &t->g[1], t->shape_data->numbers, 0, &pose, limit, cache, &m);
     ck_assert_int_ge(m.count, 0);
     ck_assert_int_le(m.count, SADMM_MANIFOLD_POINTS);
     return m;
@@ -94,8 +94,8 @@ static inline void check_manifold(const struct pair_of *t, const struct manifold
              * nearest points are not quite across the normal of a face that is preferred to theirs: each is half the
              * way aside, at up to 8 degrees */
             ck_assert_msg(fabs(most) <= 6e-3 * thin + 0.07 * fabs(p->separation) + rounding,
-                          "%s: point %d of %d (%08x) is %g off surface %d, thin %g, gap %g, s %g, best %g", what, i,
-                          m->count, p->feature, most, side, thin, p->separation, s, best);
+                          "%s: point %d of %d (%08x) is %g off surface %d, thin %g, separation %g, s %g, best %g", what,
+                          i, m->count, p->feature, most, side, thin, p->separation, s, best);
         }
     }
 }
@@ -108,7 +108,7 @@ static inline double nearest(const struct pair_of *t, vec3 start)
     struct polytope_axis axis;
     vec3 pa, pb;
     uint32_t feature;
-    polytope_pair_make(&t->g[0], &t->g[1], t->pool->numbers, &pose, &pair);
+    polytope_pair_make(&t->g[0], &t->g[1], t->shape_data->numbers, &pose, &pair);
     ck_assert(hull_nearest(&pair, start, 1e300, &axis, &pa, &pb, &feature));
     /* the points are as far apart as the axis says */
     ck_assert_double_eq_tol(v3_dot(axis.n, v3_sub(pb, pa)), axis.separation, 1e-9 * size_of(t));
@@ -160,10 +160,10 @@ static inline void touch_hulls(uint64_t seed, const struct extent *extent)
     struct pair_of *t = calloc(1, sizeof *t);
     int tried = 0, touching = 0, close_by = 0;
     ck_assert_ptr_nonnull(t);
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     for (int form = 0; tried < extent->poses; ++form) {
         double scale = 1;
-        t->pool->used = HULL_FIRST_OWN;
+        t->shape_data->used = HULL_FIRST_OWN;
         for (int s = 0; s < 2; ++s) {
             double size[3];
             const bool needle = form % 5 == 4;
@@ -174,9 +174,9 @@ static inline void touch_hulls(uint64_t seed, const struct extent *extent)
                 size[k] = scale * ((k == form % 3) != needle ? flat : random_in(&r, 0.5, 1));
             if (form % 4 == 3) box_hull(size, &t->h[s]);
             else random_hull(&r.state, corners_of(&r, extent), size, &t->h[s]);
-            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+            t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
             if (s == 0 && form % 8 == 7) {
-                const struct sadmm_geometry box = {.type = SADMM_SHAPE_BOX, .children = 1,
+                const struct sadmm_geometry box = {.type = SADMM_SHAPE_BOX, .subshapes = 1,
                                                    .size = {size[0], size[1], size[2]}};
                 t->g[s] = box;
             }
@@ -217,19 +217,19 @@ static inline void touch_hulls(uint64_t seed, const struct extent *extent)
         }
     }
     ck_assert_int_le(touching - close_by, tried / 20000);
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 
-/* Put b onto a: against its separation along the normal from a to b, with `gap` left. */
-static inline void put_together(struct pair_of *t, double gap)
+/* Put b onto a: against its separation along the normal from a to b, with `separation` left. */
+static inline void put_together(struct pair_of *t, double separation)
 {
     const struct manifold m = touch_two(t, 100 * size_of(t), 0);
     double n[3], world[3];
     ck_assert_int_gt(m.count, 0);
     v3_store(m.normal, n);
     for (int k = 0; k < 3; ++k) world[k] = t_dot(t->R[1] + 3 * k, n);
-    const double way = along(t, m.normal) - gap;
+    const double way = along(t, m.normal) - separation;
     for (int k = 0; k < 3; ++k) t->x[1][k] -= way * world[k];
 }
 
@@ -239,12 +239,12 @@ static inline void touch_round(uint64_t seed, bool capsule, const struct extent 
     struct random r = {.state = 31 + seed};
     struct pair_of *t = calloc(1, sizeof *t);
     const double unit[3] = {1, 0.8, 0.6};
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     for (int pose = 0; pose < extent->poses; ++pose) {
         const double radius = random_in(&r, 0.05, 0.5), length = capsule ? random_in(&r, 0.05, 1) : 0;
-        t->pool->used = HULL_FIRST_OWN;
+        t->shape_data->used = HULL_FIRST_OWN;
         random_hull(&r.state, corners_of(&r, extent), unit, &t->h[1]);
-        t->g[1] = test_pool_add(t->pool, &t->h[1]);
+        t->g[1] = test_shape_data_add(t->shape_data, &t->h[1]);
         memset(&t->h[0], 0, sizeof t->h[0]);
         t->h[0].vertices = length > 0 ? 2 : 1;
         t->h[0].edges = length > 0 ? 1 : 0;
@@ -252,7 +252,7 @@ static inline void touch_round(uint64_t seed, bool capsule, const struct extent 
         t->h[0].x[0][2] = -length;
         t->h[0].x[1][2] = length;
         const struct sadmm_geometry round = {.type = length > 0 ? SADMM_SHAPE_CAPSULE : SADMM_SHAPE_SPHERE,
-                                             .children = 1, .size = {radius, length, 0}};
+                                             .subshapes = 1, .size = {radius, length, 0}};
         t->g[0] = round;
         random_pose(&r, random_in(&r, 0, 2), t);
         const double best = reference(t) - radius, found = nearest(t, v3(0, 0, 1));
@@ -269,14 +269,14 @@ static inline void touch_round(uint64_t seed, bool capsule, const struct extent 
         ck_assert_double_eq_tol(least, best, MANIFOLD_FLAT * radius + 1e-9); /* ends of a capsule that lie evenly */
         ck_assert_double_eq_tol(along(t, m.normal) - radius, best, 1e-9);
     }
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 
 /* How far the rounds of the two reach out of what `reference` and `along` measure. */
 static inline double rounds_of(const struct pair_of *t)
 {
-    return t->h[0].rounding + t->h[1].rounding;
+    return t->h[0].convex_radius + t->h[1].convex_radius;
 }
 
 /* A round goes around its hull: as near as the hulls are, less the rounds, along the nearest points' own normal. */
@@ -284,21 +284,21 @@ static inline void touch_rounded(uint64_t seed, bool with_boxes, const struct ex
 {
     struct random r = {.state = 131 + seed};
     struct pair_of *t = calloc(1, sizeof *t);
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     for (int pose = 0; pose < extent->poses; ++pose) {
         const double scale = pow(10, random_in(&r, -extent->exponent, extent->exponent)),
                      flat = pow(10, random_in(&r, -2, 0));
-        t->pool->used = HULL_FIRST_OWN;
+        t->shape_data->used = HULL_FIRST_OWN;
         for (int s = 0; s < 2; ++s) {
             double size[3];
             for (int k = 0; k < 3; ++k) size[k] = scale * (k == pose % 3 ? flat : random_in(&r, 0.5, 1));
             if (pose % 4 == 3) box_hull(size, &t->h[s]);
             else random_hull(&r.state, corners_of(&r, extent), size, &t->h[s]);
-            t->h[s].rounding = (pose + s) % 3 ? scale * pow(10, random_in(&r, -2, 0)) : 0;
-            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+            t->h[s].convex_radius = (pose + s) % 3 ? scale * pow(10, random_in(&r, -2, 0)) : 0;
+            t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
         }
         if (with_boxes && pose % 2) { /* a box, which has no round of its own */
-            const struct sadmm_geometry box = {.type = SADMM_SHAPE_BOX, .children = 1,
+            const struct sadmm_geometry box = {.type = SADMM_SHAPE_BOX, .subshapes = 1,
                                                .size = {0.3 * scale, 0.5 * scale, 0.7 * scale}};
             t->g[0] = box;
             box_hull(box.size, &t->h[0]);
@@ -322,13 +322,13 @@ static inline void touch_rounded(uint64_t seed, bool with_boxes, const struct ex
                 ck_assert_double_eq_tol(along(t, again.normal) - rounds, best,
                                         2e-5 * thin + rounding); /* MANIFOLD_SNAP */
             }
-            /* midway between the surfaces: no plane across the normal is nearer */
+            /* halfway between the surfaces: no plane across the normal is nearer */
             for (int i = 0; i < m.count; ++i)
                 ck_assert_double_ge(m.points[i].separation, along(t, m.normal) - rounds - rounding);
             put_together(t, near == 0 ? 1e-3 * rounds : near == 1 ? rounds : random_unit(&r) * rounds);
         }
     }
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 

@@ -24,7 +24,7 @@ void manifold_in_float(int type_a, const double size_a[3], int type_b, const dou
                        struct world_manifold *out)
 {
     struct pair_pose pose = pair_pose(type_a == SADMM_SHAPE_PLANE, Ra, xa, Rb, xb);
-    struct sadmm_geometry a = {.type = type_a, .children = 1}, b = {.type = type_b, .children = 1};
+    struct sadmm_geometry a = {.type = type_a, .subshapes = 1}, b = {.type = type_b, .subshapes = 1};
     struct manifold m;
     double n[3];
 

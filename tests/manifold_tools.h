@@ -33,7 +33,7 @@ static inline double random_in(struct random *r, double lo, double hi) { return 
 /* The geometry of a type and its sizes. */
 static inline struct sadmm_geometry geometry_of(int type, const double size[3])
 {
-    struct sadmm_geometry geometry = {.type = type, .children = 1, .size = {size[0], size[1], size[2]}};
+    struct sadmm_geometry geometry = {.type = type, .subshapes = 1, .size = {size[0], size[1], size[2]}};
     return geometry;
 }
 
@@ -205,8 +205,8 @@ static inline void spread_direction(int k, int n, double d[3])
     d[2] = z;
 }
 
-/* Largest separation over n directions: at most the true one, and below it by no more than the gap between directions
- * allows. */
+/* Largest separation over n directions: at most the true one, and below it by no more than the separation between
+ * directions allows. */
 static inline double sweep_separation(const struct solid *a, const struct solid *b, int n)
 {
     double best = -HUGE_VAL, d[3];

@@ -6,7 +6,7 @@
 #include "mesh_tools.h"
 
 /* What holds of the manifold with a triangle: a unit normal, points with features of their own within the limit. The
- * least gap, HUGE_VAL: no points. */
+ * least separation, HUGE_VAL: no points. */
 static inline double soup_check_manifold(const struct manifold *m, double limit)
 {
     double least = HUGE_VAL;

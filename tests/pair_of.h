@@ -1,13 +1,13 @@
-/* Two shapes with poses, and the pool that hulls of theirs are in. */
+/* Two shapes with poses, and the shape data of their hulls. */
 #ifndef SADMM_TESTS_PAIR_OF_H
 #define SADMM_TESTS_PAIR_OF_H
 
-#include "hull_pool.h"
+#include "hull_shapes.h"
 #include "manifold_tools.h"
 
 /* h: of a hull, or as a hull would be. */
 struct pair_of {
-    struct test_pool *pool;
+    struct test_shape_data *shape_data;
     struct test_hull h[2];
     struct sadmm_geometry g[2];
     double R[2][9], x[2][3];

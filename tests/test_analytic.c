@@ -579,7 +579,7 @@ START_TEST(overlaps_are_pushed_out)
         sadmm_body_id id = add_sphere(world, sadmm_frame_moved(sadmm_frame_world(), 0, 0, 0.1 - depths[k]), 1, 0);
         set_velocity(world, id, none, none);
         step_world(world, 1);
-        const double share = def.settings.baumgarte * (depths[k] - def.settings.slop) / def.settings.dt;
+        const double share = def.settings.correction_factor * (depths[k] - def.settings.slop) / def.settings.dt;
         ck_assert(share < 0.5 || k == 1);
         const sadmm_body_state state = body_state(world, id);
         ck_assert_double_eq_tol(state.position[2], 0.1 - depths[k] + def.settings.dt * fmin(share, 0.5),

@@ -97,7 +97,7 @@ START_TEST(arrays_read_what_single_calls_read)
 {
     const struct machine m = build_machine();
     double state[MOST], wrench[MOST], contact[MOST], inertia[MOST], position[MOST], speed[MOST], drive[MOST], load[MOST],
-        target[MOST], target_speed[MOST], aim[MOST], felt[MOST];
+        target[MOST], target_speed[MOST], aim[MOST], reaction[MOST];
     const double push[3] = {1, 2, 3}, turn[3] = {0.1, 0.2, 0.3};
     sadmm_body_id second;
     MUST(m.world, sadmm_world_body_at(m.world, 1, &second));
@@ -148,7 +148,7 @@ START_TEST(arrays_read_what_single_calls_read)
         }
     }
     get(&m, SADMM_ARRAY_COUPLING_TARGET, aim);
-    get(&m, SADMM_ARRAY_COUPLING_FELT, felt);
+    get(&m, SADMM_ARRAY_COUPLING_REACTION, reaction);
     for (int32_t i = 0; i < m.couplings; ++i) {
         sadmm_coupling_id id;
         sadmm_coupling_state one;
@@ -159,8 +159,8 @@ START_TEST(arrays_read_what_single_calls_read)
         expect_row(aim + 13 * i, def.target_position, 3);
         expect_row(aim + 13 * i + 3, def.target_orientation, 4);
         expect_row(aim + 13 * i + 7, def.target_velocity, 6);
-        expect_row(felt + 6 * i, one.felt_force, 3);
-        expect_row(felt + 6 * i + 3, one.felt_torque, 3);
+        expect_row(reaction + 6 * i, one.reaction_force, 3);
+        expect_row(reaction + 6 * i + 3, one.reaction_torque, 3);
     }
     /* A range is the rows of the whole. */
     double part[3 * 13];
@@ -299,7 +299,7 @@ START_TEST(bad_arguments_are_refused)
     ck_assert_int_eq(sadmm_world_array_rows(NULL, SADMM_ARRAY_BODY_STATE), 0);
     ck_assert_int_eq(sadmm_world_get_array(NULL, SADMM_ARRAY_BODY_STATE, 0, 0, values), SADMM_ERROR_INVALID_ARGUMENT);
     ck_assert_int_eq(sadmm_world_get_array(m.world, SADMM_ARRAY_BODY_STATE, 0, 1, NULL), SADMM_ERROR_INVALID_ARGUMENT);
-    ck_assert_int_eq(sadmm_world_set_array(m.world, SADMM_ARRAY_COUPLING_FELT, 0, 1, values),
+    ck_assert_int_eq(sadmm_world_set_array(m.world, SADMM_ARRAY_COUPLING_REACTION, 0, 1, values),
                      SADMM_ERROR_INVALID_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(sadmm_world_message(m.world), "must be one that can be set"));
     step_world(m.world, 1);

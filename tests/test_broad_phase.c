@@ -308,7 +308,7 @@ static void fill_scene(struct scene *s, struct random *r, int environments)
         shape->category = 1u << i % 3;
         shape->mask = i % 5 ? ~0u : 5u;
         shape->orientation[0] = 1;
-        s->geometries[i] = (struct sadmm_geometry){.type = plane ? SADMM_SHAPE_PLANE : 1 + i % 3, .children = 1};
+        s->geometries[i] = (struct sadmm_geometry){.type = plane ? SADMM_SHAPE_PLANE : 1 + i % 3, .subshapes = 1};
         for (int k = 0; k < 3; ++k) {
             s->geometries[i].size[k] = size * random_in(r, 0.3, 1);
             shape->position[k] = random_in(r, -0.1, 0.1);
@@ -410,8 +410,8 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
         const double dt = random_in(&r, 0.001, 0.02), margin = trial % 3 ? 0.02 : 0;
         const double gravity = trial % 5 ? random_in(&r, 0, 20) : 0;
         const bool plane = trial % 4 == 0;
-        struct sadmm_geometry geometry[2] = {{.type = plane ? SADMM_SHAPE_PLANE : SADMM_SHAPE_SPHERE, .children = 1},
-                                             {.type = SADMM_SHAPE_SPHERE, .children = 1}};
+        struct sadmm_geometry geometry[2] = {{.type = plane ? SADMM_SHAPE_PLANE : SADMM_SHAPE_SPHERE, .subshapes = 1},
+                                             {.type = SADMM_SHAPE_SPHERE, .subshapes = 1}};
         struct sadmm_shape shape[2] = {{.geometry = 0}, {.geometry = 1}};
         struct sadmm_collision_body body[2] = {{.system_body = plane ? -1 : 0}, {.system_body = 1}};
         struct sadmm_proxy proxy[2];

@@ -54,7 +54,7 @@ START_TEST(zero_at_exact_solutions)
         {"sliding without friction", 0, 0, 0.7, 0, 0, 1},
         {"apart", 0.2, 0.5, 1, 0, 0, 0},
         {"separating", 0, 0.5, 1, 0.3, 0, 0},
-        {"closing the gap exactly", 0.2, 0.5, 0, -0.2, 0, 1},
+        {"closing the separation exactly", 0.2, 0.5, 0, -0.2, 0, 1},
         {"pushed out", -0.1, 0.5, 0, 0.1, 0, 1},
         {"grazing", 0, 0.5, 0.4, 0, 0, 0},
     };
@@ -235,7 +235,7 @@ START_TEST(worst_constraint)
 }
 END_TEST
 
-/* The same data in its different clothes: rigid bodies and gaps, A and b and e, contacts as Jacobian rows. */
+/* The same data in its different clothes: rigid bodies and separations, A and b and e, contacts as Jacobian rows. */
 START_TEST(one_value_for_every_form)
 {
     sadmm_settings s = sadmm_settings_default();

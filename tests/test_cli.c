@@ -475,7 +475,7 @@ START_TEST(options_matter)
     }
     hash_of("run pile:20 --backend cpu --precision f64 --steps 100 --set iterations=41 --set dt=0.005 --json -", other);
     ck_assert_str_eq(hash, other);
-    hash_of("run pile:20 --backend cpu --steps 100 --set baumgarte=0.3 --set gravity=0,1,-5 --json -", other);
+    hash_of("run pile:20 --backend cpu --steps 100 --set correction_factor=0.3 --set gravity=0,1,-5 --json -", other);
     ck_assert_str_ne(hash, other);
     hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --method paper --penalty-period 10 --json -", hash);
     hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --method paper --penalty-period 0 --json -", other);
@@ -651,7 +651,7 @@ START_TEST(scenes_are_reported)
         double dynamic = 0;
         json_array_foreach(hulls, i, hull) {
             ck_assert_uint_ge(json_array_size(at(hull, "points")), 4);
-            ck_assert(number(hull, "rounding") >= 0 && number(hull, "merge") >= 0);
+            ck_assert(number(hull, "convex_radius") >= 0 && number(hull, "merge") >= 0);
         }
         json_array_foreach(meshes, i, mesh) expect_mesh(mesh);
         json_array_foreach(bodies, i, body) {

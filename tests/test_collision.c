@@ -200,11 +200,11 @@ START_TEST(a_box_on_the_ground)
     ck_assert_double_eq_tol(p->normal[2], 1, 1e-15);
     for (int i = 0; i < 4; ++i) {
         const struct sadmm_contact_point *c = &s->contacts.points[i];
-        ck_assert_double_eq_tol(c->gap, -0.0005, 1e-15);
+        ck_assert_double_eq_tol(c->separation, -0.0005, 1e-15);
         ck_assert_double_eq(dot3(c->arm_a, c->arm_a), 0); /* the static side has no arm */
         ck_assert_double_eq_tol(fabs(c->arm_b[0]), 0.05, 1e-15);
         ck_assert_double_eq_tol(fabs(c->arm_b[1]), 0.05, 1e-15);
-        ck_assert_double_eq_tol(c->arm_b[2], -0.04975, 1e-15); /* midway: a quarter of a millimetre above the corner */
+        ck_assert_double_eq_tol(c->arm_b[2], -0.04975, 1e-15); /* halfway: a quarter of a millimetre above the corner */
         ck_assert_double_eq(dot3(c->impulse, c->impulse), 0);
     }
     free_scene(s);
@@ -244,9 +244,9 @@ START_TEST(arms_start_at_the_centre_of_mass)
                 place[k] = s->bodies[p->body_a].position[k] + c->arm_a[k];
                 ck_assert_double_eq_tol(place[k], s->bodies[p->body_b].position[k] + c->arm_b[k], 1e-12);
             }
-            /* midway between the surfaces: from neither farther than the overlap (2 % of the size: line contacts) */
-            ck_assert_double_le(outside(&solids[0], place), fabs(c->gap) + 0.002);
-            ck_assert_double_le(outside(&solids[1], place), fabs(c->gap) + 0.002);
+            /* halfway between the surfaces: from neither farther than the overlap (2 % of the size: line contacts) */
+            ck_assert_double_le(outside(&solids[0], place), fabs(c->separation) + 0.002);
+            ck_assert_double_le(outside(&solids[1], place), fabs(c->separation) + 0.002);
         }
         /* b moved along the normal gets away from a */
         ck_assert_double_gt(separation_along(&solids[0], &solids[1], p->normal), -0.2);
@@ -280,7 +280,7 @@ START_TEST(pairs_come_sorted_by_type_and_slot)
         if (i == 0) continue;
         const struct sadmm_contact_pair *q = p - 1;
         ck_assert(q->shape_a < p->shape_a || (q->shape_a == p->shape_a && q->shape_b < p->shape_b));
-        ck_assert_uint_eq(p->child, 0); /* a type of one piece */
+        ck_assert_uint_eq(p->subshape, 0); /* a type of one piece */
     }
     ck_assert_uint_eq((size_t)next, s->contacts.point_count);
     free_scene(s);
@@ -313,7 +313,8 @@ START_TEST(friction_and_restitution_of_a_pair)
 }
 END_TEST
 
-/* ---- geometries and their children ------------------------------------------------------------------------------- */
+/* ---- geometries and their subshapes
+ * ------------------------------------------------------------------------------- */
 
 /* A shape is what its handle says: the same contacts, bit for bit, whether equal boxes have a geometry each or share
  * one. */
@@ -347,7 +348,7 @@ START_TEST(shapes_may_share_a_geometry)
 END_TEST
 
 /* Two shapes of two and three pieces have six manifolds: pairs of their own, in order, each as of the whole. */
-START_TEST(a_pair_has_a_manifold_for_each_child)
+START_TEST(a_pair_has_a_manifold_for_each_subshape)
 {
     struct scene *s = make_scene(NULL), *t = make_scene(NULL);
     for (int which = 0; which < 2; ++which) {
@@ -355,15 +356,15 @@ START_TEST(a_pair_has_a_manifold_for_each_child)
         add_ground(scene);
         for (int i = 0; i < 2; ++i) add_box(scene, 0.05, 0.01 * i, 0, 0.05 + 0.0999 * i);
     }
-    t->geometries[1].children = 2;
-    t->geometries[2].children = 3;
+    t->geometries[1].subshapes = 2;
+    t->geometries[2].subshapes = 3;
     find(s);
     find(t);
     ck_assert_uint_eq(s->contacts.pair_count, 2);
     ck_assert_uint_eq(t->contacts.pair_count, 2 + 6); /* on the ground, and on each other */
     for (size_t i = 0; i < t->contacts.pair_count; ++i) {
         const struct sadmm_contact_pair *p = &t->contacts.pairs[i], *whole = pair_of(s, p->shape_a, p->shape_b);
-        ck_assert_uint_eq(p->child, i < 2 ? i : i - 2);
+        ck_assert_uint_eq(p->subshape, i < 2 ? i : i - 2);
         ck_assert_int_eq(p->shape_b, i < 2 ? 1 : 2);
         ck_assert_int_eq(p->first, i == 0 ? 0 : t->contacts.pairs[i - 1].first + t->contacts.pairs[i - 1].count);
         ck_assert_int_eq(p->count, whole->count);
@@ -375,9 +376,9 @@ START_TEST(a_pair_has_a_manifold_for_each_child)
 }
 END_TEST
 
-/* Impulses belong to (shape, shape, child). Of the four children of a pair the last step had three;
+/* Impulses belong to (shape, shape, subshape). Of the four subshapes of a pair the last step had three;
  * each goes on with what was its own, and the one that was not there starts without. */
-START_TEST(what_is_kept_is_kept_by_child)
+START_TEST(what_is_kept_is_kept_by_subshape)
 {
     struct scene *s = make_scene(NULL);
     struct sadmm_contact_set *set = &s->contacts;
@@ -385,21 +386,21 @@ START_TEST(what_is_kept_is_kept_by_child)
     int32_t high = add_shape(s, add_body(s, true, 0, 0, 0.0999), SADMM_SHAPE_BOX, 0.05, 0.05, 0.05);
     add_box(s, 0.05, 0.5, 0, 0); /* pairs before and after */
     add_box(s, 0.05, 0.5, 0, 0.0999);
-    s->geometries[low].children = s->geometries[high].children = 2;
+    s->geometries[low].subshapes = s->geometries[high].subshapes = 2;
     find(s);
     ck_assert_uint_eq(set->pair_count, 4 + 1);
     for (size_t i = 0; i < set->pair_count; ++i)
         for (int32_t j = 0; j < set->pairs[i].count; ++j)
             for (int k = 0; k < 3; ++k)
                 set->points[set->pairs[i].first + j].impulse[k] = (double)(1 + i) * set->pairs[i].normal[k];
-    /* without child 1 */
+    /* without subshape 1 */
     memmove(&set->pairs[1], &set->pairs[2], 3 * sizeof *set->pairs);
     --set->pair_count;
     find(s);
     ck_assert_uint_eq(set->pair_count, 4 + 1);
     for (size_t i = 0; i < set->pair_count; ++i) {
         const struct sadmm_contact_pair *p = &set->pairs[i];
-        ck_assert_uint_eq(p->child, i < 4 ? i : 0);
+        ck_assert_uint_eq(p->subshape, i < 4 ? i : 0);
         for (int32_t j = 0; j < p->count; ++j)
             for (int k = 0; k < 3; ++k) /* the normal is unit to rounding */
                 ck_assert_double_eq_tol(set->points[p->first + j].impulse[k],
@@ -409,13 +410,14 @@ START_TEST(what_is_kept_is_kept_by_child)
 }
 END_TEST
 
-/* A cube has gone so far into another that two faces are equally near: each child stays with the face that it had. */
-START_TEST(the_axis_is_kept_by_child)
+/* A cube has gone so far into another that two faces are equally near: each subshape stays with the face that it
+ * had. */
+START_TEST(the_axis_is_kept_by_subshape)
 {
     struct scene *s = make_scene(NULL);
     int32_t a = add_box(s, 0.05, 0, 0, 0);
     add_box(s, 0.05, 0.09, 0, 0.09);
-    s->geometries[a].children = 2;
+    s->geometries[a].subshapes = 2;
     find(s);
     ck_assert_uint_eq(s->contacts.pair_count, 2);
     uint32_t x, z;
@@ -474,12 +476,12 @@ START_TEST(shapes_without_manifolds_are_refused)
         geometry->type = SADMM_SHAPE_PLANE; /* on a body that moves, where it might meet another plane */
         expect_refused(s, "only static bodies");
         *geometry = good;
-        geometry->children = 0;
-        expect_refused(s, "children = 0");
-        geometry->children = SADMM_MOST_CHILDREN + 1;
-        expect_refused(s, "children = 65536");
+        geometry->subshapes = 0;
+        expect_refused(s, "subshapes = 0");
+        geometry->subshapes = SADMM_MOST_SUBSHAPES + 1;
+        expect_refused(s, "subshapes = 65536");
         *geometry = good;
-        geometry->type = SADMM_SHAPE_HULL; /* of a pool that there is not */
+        geometry->type = SADMM_SHAPE_HULL; /* without shape data */
         expect_refused(s, "hull = 0");
         *geometry = good;
         s->shapes[shape].geometry = MAX_SHAPES;
@@ -586,7 +588,7 @@ START_TEST(a_plane_that_is_moved_takes_its_contacts_along)
     s->bodies[s->shapes[ground].body].position[2] = 0.95;
     find(s);
     ck_assert_ptr_nonnull(pair_of(s, ground, far));
-    ck_assert_double_eq_tol(s->contacts.points[pair_of(s, ground, far)->first].gap, 0, 1e-12);
+    ck_assert_double_eq_tol(s->contacts.points[pair_of(s, ground, far)->first].separation, 0, 1e-12);
     s->bodies[s->shapes[ground].body].position[2] = -1;
     find(s);
     ck_assert_uint_eq(s->contacts.pair_count, 0);
@@ -637,7 +639,7 @@ END_TEST
 START_TEST(rest_gets_no_useless_contacts)
 {
     struct scene *s = make_scene(NULL);
-    /* a grid of cubes with gaps just above the margin (2 mm): nothing but the ground */
+    /* a grid of cubes with separations just above the margin (2 mm): nothing but the ground */
     add_ground(s);
     for (int x = 0; x < 5; ++x)
         for (int y = 0; y < 5; ++y)
@@ -670,7 +672,7 @@ START_TEST(a_fall_from_rest_is_foreseen)
 }
 END_TEST
 
-START_TEST(gaps_are_exact_far_from_the_origin)
+START_TEST(separations_are_exact_far_from_the_origin)
 {
     for (int i = 0; i < 2; ++i) {
         const double far = 1048576; /* 2^20: coordinates keep 2^-32 m */
@@ -681,7 +683,7 @@ START_TEST(gaps_are_exact_far_from_the_origin)
         find(s);
         ck_assert_uint_eq(s->contacts.point_count, 4);
         ck_assert_ptr_nonnull(pair_of(s, 0, box));
-        for (int k = 0; k < 4; ++k) ck_assert_double_eq_tol(s->contacts.points[k].gap, -0x1p-12, 1e-15);
+        for (int k = 0; k < 4; ++k) ck_assert_double_eq_tol(s->contacts.points[k].separation, -0x1p-12, 1e-15);
         free_scene(s);
     }
 }
@@ -1056,7 +1058,7 @@ START_TEST(slots_do_not_change_the_contacts)
             for (int32_t k = 0; k < q->count; ++k) {
                 const struct sadmm_contact_point *c = &s->contacts.points[p->first + j],
                                                  *d = &t->contacts.points[q->first + k];
-                double off = fabs(c->gap - d->gap);
+                double off = fabs(c->separation - d->separation);
                 for (int l = 0; l < 3; ++l) off = fmax(off, fabs(c->arm_a[l] - d->arm_b[l]));
                 nearest = fmin(nearest, off);
             }
@@ -1101,9 +1103,9 @@ int main(void)
     tcase_add_test(cases, pairs_come_sorted_by_type_and_slot);
     tcase_add_test(cases, friction_and_restitution_of_a_pair);
     tcase_add_test(cases, shapes_may_share_a_geometry);
-    tcase_add_test(cases, a_pair_has_a_manifold_for_each_child);
-    tcase_add_test(cases, what_is_kept_is_kept_by_child);
-    tcase_add_test(cases, the_axis_is_kept_by_child);
+    tcase_add_test(cases, a_pair_has_a_manifold_for_each_subshape);
+    tcase_add_test(cases, what_is_kept_is_kept_by_subshape);
+    tcase_add_test(cases, the_axis_is_kept_by_subshape);
     tcase_add_loop_test(cases, shapes_without_manifolds_are_refused, 0, 2);
     tcase_add_test(cases, filters);
     tcase_add_loop_test(cases, environments_share_space_without_meeting, 0, 2);
@@ -1111,7 +1113,7 @@ int main(void)
     tcase_add_test(cases, nothing_fast_is_missed);
     tcase_add_test(cases, rest_gets_no_useless_contacts);
     tcase_add_test(cases, a_fall_from_rest_is_foreseen);
-    tcase_add_test(cases, gaps_are_exact_far_from_the_origin);
+    tcase_add_test(cases, separations_are_exact_far_from_the_origin);
     tcase_add_test(cases, impulses_carry_over_by_feature);
     tcase_add_test(cases, impulses_follow_the_normal);
     tcase_add_test(cases, a_reused_slot_inherits_nothing);

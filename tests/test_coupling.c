@@ -124,7 +124,7 @@ START_TEST(couplings_come_and_go)
     ck_assert_double_eq_tol(read.target_position[0], 1.01, 1e-15);
     step_world(world, 1);
     ck_assert_int_eq(world_report(world).couplings, 1);
-    ck_assert(coupling_state(world, first).felt_force[2] == 0);
+    ck_assert(coupling_state(world, first).reaction_force[2] == 0);
 
     MUST(world, sadmm_world_remove_coupling(world, first));
     ck_assert_int_eq(sadmm_world_remove_coupling(world, first), SADMM_ERROR_STALE_ID);
@@ -219,7 +219,7 @@ START_TEST(bad_input_is_refused)
 }
 END_TEST
 
-/* ---- what is felt ------------------------------------------------------------------------------------------------ */
+/* ---- reaction ---------------------------------------------------------------------------------------------------- */
 
 /* A body that hangs by a point beside its centre: the spring gives by its weight, and the user holds the weight and its
  * torque. */
@@ -234,11 +234,11 @@ START_TEST(the_user_holds_the_weight)
     const sadmm_coupling_state state = coupling_state(world, id);
     const double close = solvers[_i].precision == SADMM_F32 ? 1e-5 : 1e-9; /* relative; oscillations are over */
     const double sag = state.rotation_error[1]; /* the weight, on its arm, tilts the body about y, against the spring */
-    ck_assert_double_eq_tol(state.felt_force[2], -2 * G, 2 * G * close);
+    ck_assert_double_eq_tol(state.reaction_force[2], -2 * G, 2 * G * close);
     ck_assert_double_eq_tol(state.body_force[2], 2 * G, 2 * G * close);
     ck_assert_double_eq_tol(state.position_error[2], 2 * G / 2000, 2 * G / 2000 * close);
-    ck_assert_double_eq_tol(state.felt_torque[1], -0.1 * cos(sag) * 2 * G, 0.1 * 2 * G * close);
-    ck_assert_double_eq_tol(state.felt_torque[1], -50 * sag, 0.1 * 2 * G * close);
+    ck_assert_double_eq_tol(state.reaction_torque[1], -0.1 * cos(sag) * 2 * G, 0.1 * 2 * G * close);
+    ck_assert_double_eq_tol(state.reaction_torque[1], -50 * sag, 0.1 * 2 * G * close);
     sadmm_world_destroy(world);
 }
 END_TEST
@@ -254,7 +254,7 @@ static vec3 torque_of(const sadmm_body_state *before, const sadmm_body_state *af
     return v3_scale(v3_sub(momentum_of(after, inertia), momentum_of(before, inertia)), 1 / dt);
 }
 
-/* From one step to the next, the body's wrench is m a, and the torque above, less weight and contacts; and what is felt
+/* From one step to the next, the body's wrench is m a, and the torque above, less weight and contacts; and the reaction
  * is its reaction, about the target's origin. Returns the largest error over the largest force, or torque. */
 static double wrench_error(sadmm_world *world, sadmm_body_id body, sadmm_coupling_id id, const sadmm_body_state *before,
                            const sadmm_coupling_def *target, double dt, const double contact[6])
@@ -266,26 +266,26 @@ static double wrench_error(sadmm_world *world, sadmm_body_id body, sadmm_couplin
     const vec3 center = rigid_move(v3_load(before->position), v3_load(before->linear_velocity), dt / 2),
                origin = rigid_move(v3_load(target->target_position), v3_load(target->target_velocity), dt / 2);
     double force_error = 0, torque_error = 0, size[2] = {1e-3, 1e-3}; /* N and N m, where all is at rest */
-    double force[3], own[3], felt[3];
+    double force[3], own[3], reaction[3];
     for (int k = 0; k < 3; ++k)
         force[k] = d.mass * ((after.linear_velocity[k] - before->linear_velocity[k]) / dt + (k == 2 ? G : 0)) -
                    contact[k];
     v3_store(v3_sub(torque, v3_load(contact + 3)), own);
-    v3_store(v3_neg(v3_add(v3_load(own), v3_cross(v3_sub(center, origin), v3_load(force)))), felt);
+    v3_store(v3_neg(v3_add(v3_load(own), v3_cross(v3_sub(center, origin), v3_load(force)))), reaction);
     for (int k = 0; k < 3; ++k) {
         size[0] = fmax(size[0], fmax(fabs(force[k]), fabs(contact[k])));
-        size[1] = fmax(size[1], fmax(fmax(fabs(own[k]), fabs(felt[k])), fabs(contact[k + 3])));
+        size[1] = fmax(size[1], fmax(fmax(fabs(own[k]), fabs(reaction[k])), fabs(contact[k + 3])));
         force_error = fmax(force_error, fabs(state.body_force[k] - force[k]));
-        force_error = fmax(force_error, fabs(state.felt_force[k] + force[k]));
+        force_error = fmax(force_error, fabs(state.reaction_force[k] + force[k]));
         torque_error = fmax(torque_error, fabs(state.body_torque[k] - own[k]));
-        torque_error = fmax(torque_error, fabs(state.felt_torque[k] - felt[k]));
+        torque_error = fmax(torque_error, fabs(state.reaction_torque[k] - reaction[k]));
     }
     return fmax(force_error / size[0], torque_error / size[1]);
 }
 
 /* A target that goes about and turns, jumps now and then, and pulls at a body in the air with three different moments,
  * beside its centre. */
-START_TEST(felt_is_inertia_and_weight)
+START_TEST(reaction_is_inertia_and_weight)
 {
     const double dt = 0.005;
     sadmm_world *world = new_world(_i, dt, true);
@@ -314,7 +314,7 @@ START_TEST(felt_is_inertia_and_weight)
 END_TEST
 
 /* A box that is pressed onto a floor with friction and pulled over it; and lifted, and dropped onto an edge. */
-START_TEST(felt_is_contact_inertia_and_weight)
+START_TEST(reaction_is_contact_inertia_and_weight)
 {
     /* single precision: friction takes iterations, and each rounds */
     const double dt = 0.005, rounding = _i == 2 ? 1e-3 : solvers[_i].rounding;
@@ -398,7 +398,7 @@ START_TEST(any_gains_are_stable)
 }
 END_TEST
 
-/* The target spins: without friction and weight the body follows it without lag, and nothing is felt. */
+/* The target spins: without friction and weight the body follows it without lag, and there is no reaction. */
 START_TEST(spinning_targets_are_followed)
 {
     static const double speeds[] = {1, 30, 120}; /* rad/s: up to 0.6 rad a step */
@@ -420,7 +420,7 @@ START_TEST(spinning_targets_are_followed)
         ck_assert_double_eq_tol(body_now.angular_velocity[2], speeds[k], close * speeds[k]);
         ck_assert_msg(norm3(state.rotation_error) < 10 * close && norm3(state.position_error) < 10 * close, "%g %g",
                       norm3(state.rotation_error), norm3(state.position_error));
-        ck_assert_double_lt(norm3(state.felt_torque), 10 * close * 40);
+        ck_assert_double_lt(norm3(state.reaction_torque), 10 * close * 40);
         sadmm_world_destroy(world);
     }
 }
@@ -455,7 +455,7 @@ START_TEST(forces_are_bounded)
     const sadmm_body_state before = body_state(world, body);
     step_world(world, 10);
     ck_assert_double_eq_tol(body_state(world, body).linear_velocity[0], before.linear_velocity[0], close);
-    ck_assert(coupling_state(world, id).felt_force[0] == 0);
+    ck_assert(coupling_state(world, id).reaction_force[0] == 0);
     sadmm_world_destroy(world);
 }
 END_TEST
@@ -490,7 +490,7 @@ static sadmm_coupling_id pull(sadmm_world *world)
     return add_coupling(world, &def);
 }
 
-/* A step of three sub-steps is three steps to the last bit, for the target moves on in each; what is felt is the
+/* A step of three sub-steps is three steps to the last bit, for the target moves on in each; the reaction is the
  * mean. */
 START_TEST(substeps_are_steps)
 {
@@ -508,9 +508,10 @@ START_TEST(substeps_are_steps)
             step_world(world, 1);
             const sadmm_coupling_state state = coupling_state(world, id);
             for (int j = 0; j < 3; ++j) {
-                if (!k && step >= 27) mean[j] += state.felt_force[j] / 3, mean[j + 3] += state.felt_torque[j] / 3;
-                if (k && step == 9) mean[j] -= state.felt_force[j], mean[j + 3] -= state.felt_torque[j];
-                size = fmax(size, fabs(state.felt_force[j]));
+                if (!k && step >= 27)
+                    mean[j] += state.reaction_force[j] / 3, mean[j + 3] += state.reaction_torque[j] / 3;
+                if (k && step == 9) mean[j] -= state.reaction_force[j], mean[j + 3] -= state.reaction_torque[j];
+                size = fmax(size, fabs(state.reaction_force[j]));
             }
         }
         hash[k] = state_hash(world);
@@ -540,7 +541,7 @@ START_TEST(a_step_that_fails_changes_no_coupling)
         step_world(world, 30);
         if (fails) fail_a_step(world, top);
         read[fails] = coupling_state(world, id);
-        ck_assert(read[fails].felt_force[2] != 0);
+        ck_assert(read[fails].reaction_force[2] != 0);
         step_world(world, 10);
         hash[fails] = state_hash(world);
         sadmm_world_destroy(world);
@@ -590,8 +591,8 @@ int main(void)
     tcase_add_test(cases, couplings_come_and_go);
     tcase_add_test(cases, bad_input_is_refused);
     tcase_add_loop_test(cases, the_user_holds_the_weight, 0, SOLVERS);
-    tcase_add_loop_test(cases, felt_is_inertia_and_weight, 0, SOLVERS);
-    tcase_add_loop_test(cases, felt_is_contact_inertia_and_weight, 0, SOLVERS);
+    tcase_add_loop_test(cases, reaction_is_inertia_and_weight, 0, SOLVERS);
+    tcase_add_loop_test(cases, reaction_is_contact_inertia_and_weight, 0, SOLVERS);
     tcase_add_loop_test(cases, any_gains_are_stable, 0, SOLVERS);
     tcase_add_loop_test(cases, spinning_targets_are_followed, 0, SOLVERS);
     tcase_add_loop_test(cases, forces_are_bounded, 0, SOLVERS);

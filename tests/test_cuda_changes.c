@@ -316,7 +316,7 @@ static void change_numbers(sadmm_world *world, int step)
     s.gravity[2] = -9.81 + 0.2 * (step % 3);
     if (step % 2) s.dt = 0.004 + 0.0005 * (step % 5);
     if (step % 3 == 1) s.relaxation = 1.6 + 0.02 * step;
-    if (step % 4 == 2) s.baumgarte = 0.1 + 0.01 * step;
+    if (step % 4 == 2) s.correction_factor = 0.1 + 0.01 * step;
     if (step % 4 == 3) s.slop = 1e-5 * step;
     if (step % 5 == 1) s.correction_speed = 0.5 + 0.02 * step;
     if (step % 5 == 2) s.restitution_threshold = 0.2 + 0.01 * step;

@@ -1,10 +1,10 @@
 /* Contact finding on the CUDA device against the host pipeline: the same set, in the same order, number for number.
  *
  * Every formula is the host's, in double and without contraction, so there are no tolerances: a difference of one bit
- * in a gap or an arm is a failure. Inputs are scenes that the CPU backend steps and random soups. The same checks run
- * on the emulated device (test_cuda_collision_emulated.c, cuda_emulation/), where every build can run them; here they
- * run on a real one, or the program is skipped and says why. One file: nearly all tests run the same two pipelines
- * (`both`), most of them on the same random soups.
+ * in a separation or an arm is a failure. Inputs are scenes that the CPU backend steps and random soups. The same
+ * checks run on the emulated device (test_cuda_collision_emulated.c, cuda_emulation/), where every build can run them;
+ * here they run on a real one, or the program is skipped and says why. One file: nearly all tests run the same two
+ * pipelines (`both`), most of them on the same random soups.
  */
 #include "collision_soups.h"
 #include "scene_tools.h"
@@ -34,10 +34,10 @@ static const struct soup_kind soups[] = {
      .friction_share = 1, .dead_share = 0.2, .steps = 5},
     {.name = "several manifolds a pair, tree", .bodies = 90, .shapes_a_body = 2, .groups = 3, .planes = 4, .density = 2,
      .size_low = 0.3, .size_high = 1, .static_share = 0.2, .friction_share = 1, .dead_share = 0.1, .steps = 4,
-     .tree_from = 1, .children = 3},
+     .tree_from = 1, .subshapes = 3},
     {.name = "several manifolds a pair, all pairs", .bodies = 90, .shapes_a_body = 2, .planes = 2, .density = 2,
      .size_low = 0.3, .size_high = 1, .static_share = 0.2, .friction_share = 1, .dead_share = 0.1, .steps = 4,
-     .children = 3},
+     .subshapes = 3},
     {.name = "more than small tiles are for, all pairs", .bodies = 1100, .shapes_a_body = 1, .planes = 1, .density = 2,
      .size_low = 0.3, .size_high = 1, .static_share = 0.1, .steps = 1, .tree_from = 1000000},
     {.name = "hulls among others, tree", .bodies = 150, .shapes_a_body = 1, .planes = 2, .density = 3, .size_low = 0.3,
@@ -218,7 +218,7 @@ END_TEST
 
 static struct sadmm_geometry geometry_of(int type, double s0, double s1, double s2)
 {
-    struct sadmm_geometry geometry = {.type = type, .children = 1, .size = {s0, s1, s2}};
+    struct sadmm_geometry geometry = {.type = type, .subshapes = 1, .size = {s0, s1, s2}};
     return geometry;
 }
 
@@ -320,11 +320,11 @@ START_TEST(a_ball_near_a_whole_mesh)
 {
     struct soup *ground = soup_ground(100, 100, 0.5, 0.2, 7, waves);
     sadmm_mesh *mesh = soup_mesh(ground);
-    struct test_pool *pool = test_pool_new();
-    const size_t own = pool->used;
-    ck_assert_uint_le(own + mesh->doubles, TEST_POOL);
-    memcpy(pool->numbers + own, mesh->block, mesh->doubles * sizeof *pool->numbers);
-    pool->used += mesh->doubles;
+    struct test_shape_data *shape_data = test_shape_data_new();
+    const size_t own = shape_data->used;
+    ck_assert_uint_le(own + mesh->doubles, TEST_SHAPE_DATA);
+    memcpy(shape_data->numbers + own, mesh->block, mesh->doubles * sizeof *shape_data->numbers);
+    shape_data->used += mesh->doubles;
     struct sadmm_collision_body bodies[2] = {
         {.orientation = {1, 0, 0, 0}, .system_body = -1},
         {.position = {0.3, -0.2, 39.8}, .orientation = {1, 0, 0, 0}, .system_body = 0},
@@ -334,24 +334,24 @@ START_TEST(a_ball_near_a_whole_mesh)
     struct sadmm_shape shapes[2] = {shape_of(0), shape_of(1)};
     struct sadmm_collision_input input = {.shapes = shapes, .shape_count = 2, .geometries = geometries,
                                           .geometry_count = 2, .bodies = bodies, .body_count = 2, .dt = 0.01,
-                                          .margin = 0.02, .hulls = pool->numbers, .hull_doubles = pool->used,
-                                          .hull_revision = 1};
+                                          .margin = 0.02, .hulls = shape_data->numbers,
+                                          .hull_doubles = shape_data->used, .hull_revision = 1};
     struct both b = both_new(_i ? 1 : 1000000);
     const struct sadmm_cuda_contacts out = both_find(&b, &input, "a ball near a whole mesh");
     ck_assert_int_eq(out.counts.candidates, 2 * 99 * 99);
     ck_assert_int_gt(out.counts.pairs, 0);
     both_free(&b);
     sadmm_mesh_destroy(mesh);
-    free(pool);
+    free(shape_data);
     free(ground);
 }
 END_TEST
 
 /* A world puts its hulls closer together when some are gone: contents stay, places change. */
-START_TEST(hulls_move_in_the_pool)
+START_TEST(hulls_move_in_the_shape_data)
 {
     const double size[3] = {0.5, 0.4, 0.3};
-    struct test_pool *pool = test_pool_new();
+    struct test_shape_data *shape_data = test_shape_data_new();
     struct test_hull h;
     struct both b = both_new(_i ? 1 : 1000000);
     struct sadmm_collision_body bodies[2] = {
@@ -359,37 +359,38 @@ START_TEST(hulls_move_in_the_pool)
         {.position = {0, 0, 0.59}, .orientation = {1, 0, 0, 0}, .system_body = 1},
     };
     box_hull(size, &h);
-    struct sadmm_geometry geometries[2] = {test_pool_add(pool, &h), geometry_of(SADMM_SHAPE_BOX, 0.2, 0.2, 0.3)};
+    struct sadmm_geometry geometries[2] = {test_shape_data_add(shape_data, &h),
+                                           geometry_of(SADMM_SHAPE_BOX, 0.2, 0.2, 0.3)};
     struct sadmm_shape shapes[2] = {shape_of(0), shape_of(1)};
     struct sadmm_collision_input input = {.shapes = shapes, .shape_count = 2, .geometries = geometries,
                                           .geometry_count = 2, .bodies = bodies, .body_count = 2, .dt = 0.01,
-                                          .margin = 0.02, .hulls = pool->numbers, .hull_doubles = pool->used,
-                                          .hull_revision = 1};
+                                          .margin = 0.02, .hulls = shape_data->numbers,
+                                          .hull_doubles = shape_data->used, .hull_revision = 1};
     both_find(&b, &input, "first");
     ck_assert_uint_eq(b.device_set.pair_count, 1);
     ck_assert_int_eq(b.device_set.pairs[0].count, 4);
     /* another hull takes its place, and it goes behind that one: no shape's revision says so */
-    const struct sadmm_geometry moved = test_pool_add(pool, &h);
+    const struct sadmm_geometry moved = test_shape_data_add(shape_data, &h);
     prism_hull(5, 3, &h);
-    test_hull_block(&h, pool->numbers + geometries[0].hull);
-    pool->used += 400; /* where the longer one reaches */
-    test_hull_block(&h, pool->numbers + geometries[0].hull);
+    test_hull_data(&h, shape_data->numbers + geometries[0].hull);
+    shape_data->used += 400; /* where the longer one reaches */
+    test_hull_data(&h, shape_data->numbers + geometries[0].hull);
     box_hull(size, &h);
     geometries[0].hull = moved.hull + 400;
-    test_hull_block(&h, pool->numbers + geometries[0].hull);
-    input.hull_doubles = pool->used;
+    test_hull_data(&h, shape_data->numbers + geometries[0].hull);
+    input.hull_doubles = shape_data->used;
     ++input.hull_revision;
     both_find(&b, &input, "moved");
     ck_assert_int_eq(b.device_set.pairs[0].count, 4);
     both_free(&b);
-    free(pool);
+    free(shape_data);
 }
 END_TEST
 
-/* Pairs are matched by (shape, shape, child): of the four manifolds of two cubes the last step had all but the second.
- * Each goes on with its own impulses and its own axis (two are equally good), and the one that was not there starts
- * without. */
-START_TEST(children_are_matched_by_number)
+/* Pairs are matched by (shape, shape, subshape): of the four manifolds of two cubes the last step had all but the
+ * second. Each goes on with its own impulses and its own axis (two are equally good), and the one that was not there
+ * starts without. */
+START_TEST(subshapes_are_matched_by_number)
 {
     struct sadmm_geometry geometries[3] = {geometry_of(SADMM_SHAPE_BOX, 0.05, 0.05, 0.05),
                                            geometry_of(SADMM_SHAPE_BOX, 0.05, 0.05, 0.05), ball(0.05)};
@@ -406,7 +407,7 @@ START_TEST(children_are_matched_by_number)
     uint32_t face[2];
     for (int k = 0; k < 2; ++k) { /* what is remembered of the face that is less deep: along x, along z */
         bodies[1].position[2 * k] = 0.095;
-        both_find(&b, &input, "one child each");
+        both_find(&b, &input, "one subshape each");
         ck_assert_uint_eq(b.device_set.pair_count, 2);
         ck_assert_int_eq(b.device_set.pairs[0].shape_a, 0);
         face[k] = b.device_set.pairs[0].cache;
@@ -414,10 +415,10 @@ START_TEST(children_are_matched_by_number)
         both_start_from(&b, &(struct sadmm_contact_set){0});
     }
     ck_assert_uint_ne(face[0], face[1]);
-    geometries[0].children = geometries[1].children = 2;
+    geometries[0].subshapes = geometries[1].subshapes = 2;
     shapes[0].revision = 10;
     shapes[1].revision = 11;
-    both_find(&b, &input, "two children each");
+    both_find(&b, &input, "two subshapes each");
     ck_assert_uint_eq(b.device_set.pair_count, 4 + 2); /* the ball is of one piece */
     for (int i = 0; i < 4; ++i) b.host_set.pairs[i].cache = face[i % 2];
     both_start_from(&b, &b.host_set);
@@ -434,7 +435,7 @@ START_TEST(children_are_matched_by_number)
     ck_assert_uint_eq(b.device_set.pair_count, 4 + 2);
     for (size_t i = 0; i < b.device_set.pair_count; ++i) {
         const struct sadmm_contact_pair *p = &b.device_set.pairs[i];
-        ck_assert_uint_eq(p->child, i < 4 ? i : i - 4);
+        ck_assert_uint_eq(p->subshape, i < 4 ? i : i - 4);
         if (i < 4 && i != 1) ck_assert_uint_eq(p->cache, face[i % 2]);
         for (int32_t j = 0; j < p->count; ++j)
             for (int k = 0; k < 3; ++k) /* the normal is unit to rounding */
@@ -461,14 +462,14 @@ START_TEST(shapes_without_manifolds_are_refused)
                                           .geometry_count = 2, .bodies = bodies, .body_count = 2, .dt = 0.01,
                                           .margin = 0.02};
     static const struct {
-        int32_t type, children;
+        int32_t type, subshapes;
         uint32_t handle;
         const char *words;
     } bad[] = {
         {SADMM_SHAPE_TYPE_COUNT, 1, 1, "shapes[1]: type = "}, {-1, 1, 1, "type = -1"},
-        {SADMM_SHAPE_PLANE, 1, 1, "only static bodies"},       {SADMM_SHAPE_SPHERE, 0, 1, "children = 0"},
+        {SADMM_SHAPE_PLANE, 1, 1, "only static bodies"},       {SADMM_SHAPE_SPHERE, 0, 1, "subshapes = 0"},
         {SADMM_SHAPE_SPHERE, 1, 2, "geometry = 2"},            {SADMM_SHAPE_HULL, 1, 1, "hull = 0"},
-        {SADMM_SHAPE_CONE, 1, 1, "type = 7: needs a pool"},
+        {SADMM_SHAPE_CONE, 1, 1, "type = 7: needs shape data"},
     };
     struct both b = both_new(0);
     shapes[0] = shape_of(0);
@@ -479,7 +480,7 @@ START_TEST(shapes_without_manifolds_are_refused)
         struct sadmm_error error = {0};
         struct sadmm_cuda_contacts out;
         geometries[1].type = bad[i].type;
-        geometries[1].children = bad[i].children;
+        geometries[1].subshapes = bad[i].subshapes;
         shapes[1].geometry = bad[i].handle;
         ++shapes[1].revision;
         for (int time = 0; time < 2; ++time) {
@@ -493,13 +494,13 @@ START_TEST(shapes_without_manifolds_are_refused)
         shapes[1].geometry = 1;
         both_find(&b, &input, "good again");
     }
-    /* a candidate is one 64-bit key: slots and children must fit into it */
+    /* a candidate is one 64-bit key: slots and subshapes must fit into it */
     struct sadmm_error error = {0};
-    geometries[1].children = SADMM_MOST_CHILDREN;
+    geometries[1].subshapes = SADMM_MOST_SUBSHAPES;
     ++shapes[1].revision;
     input.shape_count = MANY; /* but for two they are dead */
     ck_assert_int_eq(COLLISION(find)(b.device, NULL, &input, NULL, &error), SADMM_ERROR_LIMIT);
-    ck_assert_ptr_nonnull(strstr(error.message, "70000 shapes of up to 65535 children"));
+    ck_assert_ptr_nonnull(strstr(error.message, "70000 shapes of up to 65535 subshapes"));
     free(shapes);
     both_free(&b);
 }
@@ -706,8 +707,8 @@ int main(void)
     tcase_add_test(tests, one_place);
     tcase_add_test(tests, slots_are_reused);
     tcase_add_loop_test(tests, a_ball_near_a_whole_mesh, 0, 2);
-    tcase_add_loop_test(tests, hulls_move_in_the_pool, 0, 2);
-    tcase_add_loop_test(tests, children_are_matched_by_number, 0, 4);
+    tcase_add_loop_test(tests, hulls_move_in_the_shape_data, 0, 2);
+    tcase_add_loop_test(tests, subshapes_are_matched_by_number, 0, 4);
     tcase_add_test(tests, shapes_without_manifolds_are_refused);
     tcase_add_test(tests, a_find_can_be_undone);
     tcase_add_test(tests, side_by_side);

@@ -306,8 +306,8 @@ START_TEST(bodies_in_the_air_are_streamed)
 END_TEST
 #endif
 
-/* A column of boxes at rest with the impulses that hold it, and gaps of some um: loads pass 60 bodies, so that warm
- * steps take larger weights and ease the gaps (math/weight.h). */
+/* A column of boxes at rest with the impulses that hold it, and separations of some um: loads pass 60 bodies, so that
+ * warm steps take larger weights and ease the separations (math/weight.h). */
 static void start_deep_stack(struct runner *r, const struct sadmm_kernels *k, enum sadmm_cuda_tier tier)
 {
     static const double up[3] = {0, 0, 1};

@@ -437,7 +437,7 @@ START_TEST(fast_steps_in_the_queue)
 }
 END_TEST
 
-/* A tower tall enough to have its gaps eased. */
+/* A tower tall enough to have its separations eased. */
 static sadmm_world *tall_tower(int precision)
 {
     sadmm_world_def def = sadmm_world_def_default();

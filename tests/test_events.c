@@ -168,7 +168,7 @@ static void inspect(sadmm_world *world, struct pairs *pairs)
         const sadmm_contact *c = &contacts[k];
         double along = 0;
         for (int i = 0; i < 3; ++i) along += c->impulse[i] * c->normal[i];
-        if (along > 0 || c->gap <= 0) pairs->touch[c->shape_a.slot][c->shape_b.slot] = true;
+        if (along > 0 || c->separation <= 0) pairs->touch[c->shape_a.slot][c->shape_b.slot] = true;
     }
     for (int32_t i = 0; i < shapes; ++i) {
         sadmm_shape_id a, b;

@@ -177,8 +177,8 @@ START_TEST(weight_is_the_mass_carried)
 END_TEST
 
 /* N cubes of 1 kg on top of each other, at rest on exact impulses: the forces that the bodies feel add up to N^2 m g,
- * twice but for the one at the top, so that a load passes N / 2 bodies; stack_depth N / 20. Gaps of 1 um under every
- * third cube. */
+ * twice but for the one at the top, so that a load passes N / 2 bodies; stack_depth N / 20. Separations of 1 um under
+ * every third cube. */
 static struct contact_problem *deep_stack(int count)
 {
     double masses[64] = {0};
@@ -187,7 +187,7 @@ static struct contact_problem *deep_stack(int count)
     for (int i = 0; i < count; ++i)
         for (int k = 0; k < 4; ++k) {
             problem->contacts.points[4 * i + k].impulse[2] = (count - i) * 9.81 * 0.005 / 4;
-            if (i % 3 == 0 && k < 2) problem->contacts.points[4 * i + k].gap = 1e-6;
+            if (i % 3 == 0 && k < 2) problem->contacts.points[4 * i + k].separation = 1e-6;
         }
     return problem;
 }
@@ -329,7 +329,7 @@ START_TEST(under_iterated_tables_equal_ref)
     struct runner ref, own, three;
     int32_t limited[3];
     for (int k = 0; k < 20; ++k) problem->contacts.points[k].impulse[2] *= 3;
-    for (int k = 4; k < 20 && overlap; ++k) problem->contacts.points[k].gap = -1e-3;
+    for (int k = 4; k < 20 && overlap; ++k) problem->contacts.points[k].separation = -1e-3;
     runner_start_settings(&ref, literal(), &one_thread, problem);
     runner_start_settings(&own, table, &one_thread, problem);
     runner_start_settings(&three, table, &three_threads, problem);
@@ -358,7 +358,7 @@ START_TEST(solutions_are_not_slowed_down)
     sadmm_settings settings = warm_settings(300, 1);
     struct runner r;
     int32_t limited;
-    for (int k = 0; k < 20; ++k) problem->contacts.points[k].gap = -1e-3;
+    for (int k = 0; k < 20; ++k) problem->contacts.points[k].separation = -1e-3;
     runner_start_settings(&r, table, &settings, problem);
     iterate(&r, 300, false);
     CALL(&r, table->limit_energy(r.c, &limited, &r.error));
@@ -370,20 +370,20 @@ START_TEST(solutions_are_not_slowed_down)
 }
 END_TEST
 
-/* The deeper a stack, the smaller the share of a gap within the slop that a step closes: by depth^-6, down to a
+/* The deeper a stack, the smaller the share of a separation within the slop that a step closes: by depth^-6, down to a
  * thousandth; from 200 iterations on depth counts for less, by their root, and with enough of them for nothing. Larger
- * gaps are closed but for what the slop leaves of them, without a jump; overlaps are left alone. */
-START_TEST(small_gaps_are_eased)
+ * separations are closed but for what the slop leaves of them, without a jump; overlaps are left alone. */
+START_TEST(small_separations_are_eased)
 {
     static const int iterations[] = {1, 200, 800, 80000}; /* with 80,000 a depth of 20 is one of 1 */
     const double slop = 2e-3, less = _i < 2 ? 1 : sqrt(iterations[_i] / 200.0);
     for (double depth = 1; depth < 20; depth *= 1.25) {
-        const double share = weight_gap_share(depth, iterations[_i]);
+        const double share = weight_separation_share(depth, iterations[_i]);
         ck_assert_double_eq_tol(share, fmin(fmax(pow(depth / less, -6), 0.001), 1), 8 * DBL_EPSILON);
-        ck_assert_double_eq(weight_gap_error(-slop, share, slop), -slop);
-        ck_assert_double_eq(weight_gap_error(0, share, slop), 0);
+        ck_assert_double_eq(weight_separation_error(-slop, share, slop), -slop);
+        ck_assert_double_eq(weight_separation_error(0, share, slop), 0);
         for (double error = slop / 8; error < 8 * slop; error *= 2) {
-            const double left = error - weight_gap_error(error, share, slop);
+            const double left = error - weight_separation_error(error, share, slop);
             ck_assert_double_eq_tol(left, (1 - share) * fmin(error, slop), 4 * DBL_EPSILON * error);
         }
     }
@@ -786,7 +786,7 @@ int main(void)
     tcase_add_test(weights, work_counts_by_its_share);
     tcase_add_loop_test(weights, under_iterated_tables_equal_ref, 0, 2 * table_count);
     tcase_add_loop_test(weights, solutions_are_not_slowed_down, 0, table_count + 1);
-    tcase_add_loop_test(weights, small_gaps_are_eased, 0, 4);
+    tcase_add_loop_test(weights, small_separations_are_eased, 0, 4);
     tcase_add_test(weights, blocks_have_no_unit);
     tcase_add_test(weights, weight_scales_follow_the_imbalance);
     tcase_add_test(weights, contact_residuals_are_known);

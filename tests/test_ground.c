@@ -207,7 +207,7 @@ static void add_ground(sadmm_world *world, enum ground kind, uint64_t seed, doub
 
 /* ---- what lies in it --------------------------------------------------------------------------------------------- */
 
-/* The deepest gap of a body's contacts after a step without motion. */
+/* The deepest separation of a body's contacts after a step without motion. */
 static double deepest(enum ground kind, const sadmm_shape_def *shape, const double position[3],
                       const double orientation[4])
 {
@@ -219,7 +219,7 @@ static double deepest(enum ground kind, const sadmm_shape_def *shape, const doub
     for (int32_t i = 0; i < sadmm_world_contact_count(world); ++i) {
         sadmm_contact c;
         MUST(world, sadmm_world_contacts(world, i, 1, &c));
-        least = fmin(least, c.gap);
+        least = fmin(least, c.separation);
     }
     sadmm_world_destroy(world);
     return least;

@@ -55,8 +55,8 @@ START_TEST(a_rounded_box)
     ck_assert_int_eq(try_round_hull(&c, 1e-6, 0.05, &hull), SADMM_OK);
     check_hull(hull, &c, 0);
     expect_counts(hull, 8, 12, 6);
-    ck_assert_double_eq(sadmm_hull_rounding(hull), 0.05);
-    ck_assert_double_eq(sadmm_hull_rounding(sharp), 0);
+    ck_assert_double_eq(sadmm_hull_convex_radius(hull), 0.05);
+    ck_assert_double_eq(sadmm_hull_convex_radius(sharp), 0);
     ck_assert_mem_eq(sadmm_hull_vertices(hull), c.x, 24 * sizeof(double));
     for (int k = 0; k < 3; ++k) {
         ck_assert_double_eq(hull->half[k], sharp->half[k] + 0.05);
@@ -358,13 +358,13 @@ START_TEST(bad_arguments_are_refused)
         def.merge = merges[k];
         expect_refused(&def, bad, "def->merge");
     }
-    static const double roundings[] = {NAN, -1e-9, 1.01e6};
+    static const double radii[] = {NAN, -1e-9, 1.01e6};
     def.merge = 1e-6;
     for (int k = 0; k < 3; ++k) {
-        def.rounding = roundings[k];
-        expect_refused(&def, bad, "def->rounding");
+        def.convex_radius = radii[k];
+        expect_refused(&def, bad, "def->convex_radius");
     }
-    def.rounding = 0;
+    def.convex_radius = 0;
     for (size_t k = 0; k < sizeof values / sizeof *values; ++k) {
         c = box_cloud(1, 1, 1);
         c.x[13] = values[k];
@@ -480,11 +480,11 @@ START_TEST(memory_runs_out)
 }
 END_TEST
 
-/* ---- the blocks that every pool begins with ---- */
+/* ---- the blocks that all shape data begins with ---- */
 
-static const struct sadmm_hull_header *header_at(const double *pool, int offset)
+static const struct sadmm_hull_header *header_at(const double *shape_data, int offset)
 {
-    return (const struct sadmm_hull_header *)(pool + offset);
+    return (const struct sadmm_hull_header *)(shape_data + offset);
 }
 
 /* The farthest vertex in any direction is found, from wherever a search begins: also where merged faces, which are not
@@ -515,12 +515,12 @@ END_TEST
 
 START_TEST(the_first_blocks)
 {
-    double *pool = calloc(HULL_FIRST_OWN, sizeof *pool);
+    double *shape_data = calloc(HULL_FIRST_OWN, sizeof *shape_data);
     struct polytope cube, segment, point;
-    sadmm_hull_prelude(pool);
-    polytope_at(pool, HULL_CUBE, &cube);
+    sadmm_hull_prelude(shape_data);
+    polytope_at(shape_data, HULL_CUBE, &cube);
     ck_assert(cube.vertices == 8 && cube.faces == 6 && cube.edges == 12);
-    ck_assert_int_eq(header_at(pool, HULL_CUBE)->doubles, HULL_CUBE_DOUBLES);
+    ck_assert_int_eq(header_at(shape_data, HULL_CUBE)->doubles, HULL_CUBE_DOUBLES);
     for (int v = 0; v < 8; ++v)
         ck_assert(cube.x[v] == (v & 1 ? 1 : -1) && cube.y[v] == (v & 2 ? 1 : -1) && cube.z[v] == (v & 4 ? 1 : -1));
     for (int f = 0; f < 6; ++f) {
@@ -533,26 +533,26 @@ START_TEST(the_first_blocks)
     int32_t first[7], corners[24];
     for (int f = 0; f <= 6; ++f) first[f] = cube.face_first[f];
     for (int k = 0; k < 24; ++k) corners[k] = cube.corner_vertex[k];
-    sadmm_hull as_hull = {.vertex_count = 8, .edge_count = 12, .face_count = 6, .block = pool + HULL_CUBE,
+    sadmm_hull as_hull = {.vertex_count = 8, .edge_count = 12, .face_count = 6, .block = shape_data + HULL_CUBE,
                           .doubles = HULL_CUBE_DOUBLES, .half = {1, 1, 1}, .orientation = {1, 0, 0, 0},
                           .vertices = c.x, .face_first = first, .corners = corners};
     check_edges(&as_hull);
     check_convex(&as_hull, &c, 0);
     check_block(&as_hull, 0);
 
-    polytope_at(pool, HULL_SEGMENT, &segment);
+    polytope_at(shape_data, HULL_SEGMENT, &segment);
     ck_assert(segment.vertices == 2 && segment.faces == 0 && segment.edges == 1);
-    ck_assert_int_eq(header_at(pool, HULL_SEGMENT)->doubles, HULL_SEGMENT_DOUBLES);
+    ck_assert_int_eq(header_at(shape_data, HULL_SEGMENT)->doubles, HULL_SEGMENT_DOUBLES);
     ck_assert(segment.x[0] == 0 && segment.x[1] == 0 && segment.y[1] == 0 && segment.z[0] == -1 && segment.z[1] == 1);
     ck_assert(segment.edge_vertex[0] == 0 && segment.edge_vertex[1] == 1);
     ck_assert(segment.vertex_first[1] == 1 && segment.vertex_first[2] == 2);
     ck_assert(segment.vertex_next[0] == 1 && segment.vertex_next[1] == 0);
 
-    polytope_at(pool, HULL_POINT, &point);
+    polytope_at(shape_data, HULL_POINT, &point);
     ck_assert(point.vertices == 1 && point.faces == 0 && point.edges == 0);
-    ck_assert_int_eq(header_at(pool, HULL_POINT)->doubles, HULL_POINT_DOUBLES);
+    ck_assert_int_eq(header_at(shape_data, HULL_POINT)->doubles, HULL_POINT_DOUBLES);
     ck_assert(point.x[0] == 0 && point.y[0] == 0 && point.z[0] == 0 && point.vertex_first[1] == 0);
-    free(pool);
+    free(shape_data);
 }
 END_TEST
 

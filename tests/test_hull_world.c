@@ -1,5 +1,5 @@
-/* Hulls in worlds: shapes of them come and go, the pool that contact finding reads follows, definitions are read back
- * bit for bit, and memory that runs out changes nothing. */
+/* Hulls in worlds: shapes of them come and go, the shape data that contact finding reads follows, definitions are read
+ * back bit for bit, and memory that runs out changes nothing. */
 #include <check.h>
 
 #include "core/base/memory.h"
@@ -49,28 +49,28 @@ static sadmm_shape_id add_shape(sadmm_world *world, sadmm_body_id body, const sa
     return id;
 }
 
-/* Every live hull's shape finds its hull's block in the pool, between the first blocks and the end, and no more than
- * half of what follows these is nobody's (a hull has more numbers than these worlds have shapes). */
-static void check_pool(sadmm_world *world)
+/* Every live hull's shape finds its hull's block in the shape data, between the first blocks and the end, and no more
+ * than half of what follows these is nobody's (a hull has more numbers than these worlds have shapes). */
+static void check_shape_data(sadmm_world *world)
 {
     const struct sadmm_collision_input input = sadmm_world_collision_input(world, 0);
-    const struct sadmm_block_pool *pool = &world->block_pool;
+    const struct sadmm_shape_data *data = &world->shape_data;
     double first[HULL_FIRST_OWN];
     size_t used = 0, uses = 0, shapes = 0;
-    ck_assert((input.hulls == NULL) == (pool->count == 0));
+    ck_assert((input.hulls == NULL) == (data->count == 0));
     if (!input.hulls) {
         ck_assert_uint_eq(input.hull_doubles, 0);
         return;
     }
     sadmm_hull_prelude(first);
     ck_assert_mem_eq(input.hulls, first, sizeof first);
-    for (size_t k = 0; k < pool->count; ++k) {
-        const struct sadmm_pooled_block *pooled = &pool->pooled[k];
-        ck_assert_mem_eq(input.hulls + pooled->offset, pooled->of.block, pooled->of.doubles * sizeof *first);
-        const double *place = sadmm_key_tree_find(&pool->places, (uintptr_t)pooled->of.owner);
+    for (size_t k = 0; k < data->count; ++k) {
+        const struct sadmm_shape_data_entry *entry = &data->entries[k];
+        ck_assert_mem_eq(input.hulls + entry->offset, entry->of.block, entry->of.doubles * sizeof *first);
+        const double *place = sadmm_key_tree_find(&data->places, (uintptr_t)entry->of.owner);
         ck_assert(place && (size_t)*place == k);
-        used += pooled->of.doubles;
-        uses += pooled->uses;
+        used += entry->of.doubles;
+        uses += entry->uses;
     }
     for (size_t slot = 0; slot < world->shape_slots; ++slot) {
         const struct sadmm_geometry *geometry = &world->geometries[slot];
@@ -80,10 +80,10 @@ static void check_pool(sadmm_world *world)
         ck_assert_mem_eq(geometry->size, hull->half, sizeof hull->half);
         ++shapes;
     }
-    ck_assert_uint_eq(sadmm_key_tree_count(&pool->places), pool->count);
+    ck_assert_uint_eq(sadmm_key_tree_count(&data->places), data->count);
     ck_assert_uint_eq(uses, shapes);
-    ck_assert_uint_eq(input.hull_doubles, HULL_FIRST_OWN + used + pool->unused);
-    ck_assert_uint_le(2 * pool->unused, input.hull_doubles);
+    ck_assert_uint_eq(input.hull_doubles, HULL_FIRST_OWN + used + data->unused);
+    ck_assert_uint_le(2 * data->unused, input.hull_doubles);
 }
 
 START_TEST(a_hull_lives_as_long_as_it_is_used)
@@ -99,13 +99,13 @@ START_TEST(a_hull_lives_as_long_as_it_is_used)
     ck_assert_uint_eq(hull->uses, 2);
     MUST(one, sadmm_world_remove_shape(one, first));
     ck_assert_uint_eq(hull->uses, 2);
-    check_pool(one);
+    check_shape_data(one);
     MUST(one, sadmm_world_remove_shape(one, second));
     ck_assert_uint_eq(hull->uses, 1);
-    check_pool(one);
+    check_shape_data(one);
     ck_assert_ptr_null(sadmm_world_collision_input(one, 0).hulls);
     sadmm_world_destroy(one);
-    check_pool(two);
+    check_shape_data(two);
     /* Read back, it goes on to the next world. */
     sadmm_shape_def def;
     sadmm_shape_id id;
@@ -116,14 +116,14 @@ START_TEST(a_hull_lives_as_long_as_it_is_used)
     MUST(two, sadmm_world_remove_body(two, b));
     sadmm_world_destroy(two);
     ck_assert_uint_eq(hull->uses, 1);
-    check_pool(one);
+    check_shape_data(one);
     sadmm_world_destroy(one);
 }
 END_TEST
 
-/* Shapes of 12 hulls come and go, with others between; blocks move, and nothing but offsets and the pool's revision
- * with them. */
-START_TEST(the_pool_follows)
+/* Shapes of 12 hulls come and go, with others between; blocks move, and nothing but offsets and the shape data's
+ * revision with them. */
+START_TEST(shape_data_follows)
 {
     enum { HULLS = 12, SHAPES = 60 };
     sadmm_hull *hulls[HULLS];
@@ -135,15 +135,15 @@ START_TEST(the_pool_follows)
     for (int k = 0; k < HULLS; ++k) hulls[k] = make_hull(3 + 5 * k);
     for (int step = 0; step < 3000; ++step) {
         const int i = (int)((next_number(&seed) + 1) / 2 * SHAPES), k = (int)((next_number(&seed) + 1) / 2 * HULLS);
-        const uint32_t revision = world->block_pool.revision, shapes = world->shape_revisions;
-        const size_t doubles = world->block_pool.doubles;
+        const uint32_t revision = world->shape_data.revision, shapes = world->shape_revisions;
+        const size_t doubles = world->shape_data.doubles;
         if (ids[i].slot) {
             MUST(world, sadmm_world_remove_shape(world, ids[i]));
             ids[i].slot = 0;
             ck_assert_uint_eq(world->shape_revisions, shapes);
-            if (world->block_pool.doubles != doubles) {
-                ck_assert_uint_ne(world->block_pool.revision, revision);
-                ck_assert_uint_eq(world->block_pool.unused, 0);
+            if (world->shape_data.doubles != doubles) {
+                ck_assert_uint_ne(world->shape_data.revision, revision);
+                ck_assert_uint_eq(world->shape_data.unused, 0);
                 ++moved;
             }
         } else if (k == 0 && step % 7 != 0) {
@@ -155,7 +155,7 @@ START_TEST(the_pool_follows)
             /* Now and then many of one kind, so that others go. */
             ids[i] = add_shape(world, i % 2 ? body : other, hulls[step / 300 % 2 ? k % 2 : k]);
         }
-        check_pool(world);
+        check_shape_data(world);
         if (step % 500 == 499) {
             MUST(world, sadmm_world_remove_body(world, other));
             for (int s = 0; s < SHAPES; ++s) {
@@ -163,7 +163,7 @@ START_TEST(the_pool_follows)
                 if (ids[s].slot && sadmm_world_shape_def(world, ids[s], &def, NULL) != SADMM_OK) ids[s].slot = 0;
             }
             other = add_body(world, 5);
-            check_pool(world);
+            check_shape_data(world);
         }
     }
     ck_assert_int_gt(moved, 10);
@@ -242,7 +242,7 @@ START_TEST(bad_hulls_are_refused)
     ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), "def->type = 65539: must be in [0, "));
     ck_assert_uint_eq(hull->uses, 1);
     ck_assert_int_eq(sadmm_world_shape_count(world), 0);
-    check_pool(world);
+    check_shape_data(world);
     sadmm_world_destroy(world);
     sadmm_hull_destroy(hull);
 }
@@ -259,7 +259,7 @@ START_TEST(memory_runs_out)
     for (int k = 0; k < HULLS; ++k) {
         const sadmm_shape_def def = shape_of(hulls[k]);
         for (long n = 0;; ++n, ++failures) {
-            const struct sadmm_block_pool before = world->block_pool;
+            const struct sadmm_shape_data before = world->shape_data;
             sadmm_test_fail_allocations_after(n);
             const sadmm_status status = sadmm_world_add_shape(world, body, &def, NULL);
             sadmm_test_fail_allocations_after(-1);
@@ -267,18 +267,18 @@ START_TEST(memory_runs_out)
             ck_assert_int_eq(status, SADMM_ERROR_OUT_OF_MEMORY);
             ck_assert_int_eq(sadmm_world_shape_count(world), k);
             ck_assert_uint_eq(hulls[k]->uses, 1);
-            ck_assert_uint_eq(world->block_pool.revision, before.revision);
-            ck_assert_uint_eq(world->block_pool.doubles, before.doubles);
-            check_pool(world);
+            ck_assert_uint_eq(world->shape_data.revision, before.revision);
+            ck_assert_uint_eq(world->shape_data.doubles, before.doubles);
+            check_shape_data(world);
         }
-        check_pool(world);
+        check_shape_data(world);
     }
     ck_assert_int_gt(failures, 15);
     /* What goes needs no memory. */
     sadmm_test_fail_allocations_after(0);
     MUST(world, sadmm_world_remove_body(world, body));
     sadmm_test_fail_allocations_after(-1);
-    check_pool(world);
+    check_shape_data(world);
     sadmm_world_destroy(world);
     for (int k = 0; k < HULLS; ++k) {
         ck_assert_uint_eq(hulls[k]->uses, 1);
@@ -292,7 +292,7 @@ int main(void)
     Suite *suite = suite_create("hull_world");
     TCase *cases = tcase_create("hull_world");
     tcase_add_test(cases, a_hull_lives_as_long_as_it_is_used);
-    tcase_add_test(cases, the_pool_follows);
+    tcase_add_test(cases, shape_data_follows);
     tcase_add_test(cases, a_definition_is_read_back);
     tcase_add_test(cases, bad_hulls_are_refused);
     tcase_add_test(cases, memory_runs_out);

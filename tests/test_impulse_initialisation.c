@@ -73,7 +73,7 @@ START_TEST(others_start_from_nothing)
     s.gravity[0] = 5;
     problems[1]->rigid[0].velocity[0] = 3;
     problems[2]->rigid[0].velocity[2] = 3;
-    problems[3]->contacts.points[1].gap = -1e-3;
+    problems[3]->contacts.points[1].separation = -1e-3;
     problems[4]->contacts.pairs[0].body_a = 1; /* the lower one no longer on the ground */
     for (int k = 0; k < 5; ++k) {
         if (k == 1) s.gravity[0] = 0;
@@ -106,10 +106,10 @@ START_TEST(small_errors_are_left_to_the_iteration)
     sadmm_settings s = sadmm_settings_default();
     for (int k = 0; k < 4; ++k) {
         struct contact_problem *problem = contact_problem_stack(one, 1, 0.5);
-        const double off = shares[k % 2] * g_dt * s.dt, gap = k < 2 ? off : -s.slop - off / s.baumgarte;
-        problem->contacts.points[1].gap = problem->contacts.points[3].gap = gap;
+        const double off = shares[k % 2] * g_dt * s.dt, separation = k < 2 ? off : -s.slop - off / s.correction_factor;
+        problem->contacts.points[1].separation = problem->contacts.points[3].separation = separation;
         initialise(problem, &s);
-        ck_assert_msg((largest_impulse(problem) > 0) == (k % 2 == 0), "gap %g m: largest impulse %g", gap,
+        ck_assert_msg((largest_impulse(problem) > 0) == (k % 2 == 0), "separation %g m: largest impulse %g", separation,
                       largest_impulse(problem));
         contact_problem_free(problem);
     }

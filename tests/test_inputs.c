@@ -46,7 +46,7 @@ static const struct bad_setting {
     REAL(certificate_momentum_tolerance, 0, -1, NAN, INFINITY, END),
     INTEGER(ncp_points, -1, 129, END),
     INTEGER(check_period, 0, -10, 1000001, END),
-    REAL(baumgarte, -0.1, 1.1, NAN, END),
+    REAL(correction_factor, -0.1, 1.1, NAN, END),
     REAL(slop, -1e-6, 1.1, NAN, END),
     REAL(correction_speed, -1, 1.1e3, NAN, END),
     REAL(restitution_threshold, -1, NAN, INFINITY, END),
@@ -78,11 +78,12 @@ START_TEST(settings_at_the_ends_of_their_ranges)
     sadmm_settings s = sadmm_settings_default();
     OK(sadmm_settings_validate(&s, NULL));
     s.dt = 1, s.iterations = 1000000, s.penalty_period = 0, s.penalty_mass_factor = 0, s.penalty_offset = 1e15;
-    s.penalty_ratio_limit = 1, s.ncp_points = 0, s.check_period = 1, s.baumgarte = 1, s.slop = 0,
+    s.penalty_ratio_limit = 1, s.ncp_points = 0, s.check_period = 1, s.correction_factor = 1, s.slop = 0,
     s.correction_speed = 0, s.hits = 64, s.threads = 1024;
     OK(sadmm_settings_validate(&s, NULL));
     s.dt = 1e-6, s.iterations = 1, s.penalty_period = INT_MAX, s.penalty_mass_factor = 1e12, s.penalty_offset = 0;
-    s.penalty_ratio_limit = 1e6, s.ncp_points = 128, s.check_period = 1000000, s.baumgarte = 0, s.slop = 1, s.correction_speed = 1e3;
+    s.penalty_ratio_limit = 1e6, s.ncp_points = 128, s.check_period = 1000000, s.correction_factor = 0, s.slop = 1,
+                            s.correction_speed = 1e3;
     s.gravity[0] = 1e6, s.gravity[2] = 0;
     OK(sadmm_settings_validate(&s, NULL));
     s.penalty_mass_factor = 0; /* with an offset of 0 there is no penalty */

@@ -6,7 +6,7 @@
  *
  * One file: one function is under test, and these tolerances hold for all of its tests.
  */
-#include "hull_pool.h"
+#include "hull_shapes.h"
 #include "manifold_tools.h"
 #include "mesh_tools.h"
 
@@ -28,7 +28,7 @@ static double choice(const struct solid *a, const struct solid *b, double depth)
 static void expect_points_near_both(const struct solid *a, const struct solid *b, const struct world_manifold *m)
 {
     for (int i = 0; i < m->count; ++i) {
-        /* midway between the surfaces: no farther from either than half the separation, but where corners stay
+        /* halfway between the surfaces: no farther from either than half the separation, but where corners stay
          * corners */
         double slack = MANIFOLD_SNAP * fmin(radius_of(a), radius_of(b)) + 1e-12;
         double reach = 0.5 * fabs(m->separation[i]) + slack;
@@ -99,8 +99,8 @@ START_TEST(contact_starts_at_the_limit_and_never_ends_below_it)
         /* projection converges slowly where faces are nearly parallel: 1e-3 relative */
         ck_assert_double_eq_tol(least_separation(&m), distance, 1.1e-3 * distance);
         /* approach to deep overlap in steps of a hundredth of the limit's scale: never empty */
-        double gap = box_separation(&a, &b, axis);
-        for (int k = 0; k < 3; ++k) b.x[k] -= axis[k] * gap;
+        double separation = box_separation(&a, &b, axis);
+        for (int k = 0; k < 3; ++k) b.x[k] -= axis[k] * separation;
         for (int step = 0; step < 40; ++step) {
             struct world_manifold deep;
             for (int k = 0; k < 3; ++k) b.x[k] -= axis[k] * 0.1 * thinner(&a, &b) / 4;
@@ -314,8 +314,9 @@ START_TEST(crossing_ridges)
         ck_assert_double_lt(crossing, 1e-12); /* the ridges cross on the axis of the turn */
         if (degrees >= 10) ck_assert_int_eq(m.count, 1);
     }
-    /* Slightly crossed: the ridges meet in the middle, the gap at the ends of the stretch is what the turn opens. As
-     * long as the ends are as deep as the crossing they stand for the line; once they are not, all three count. */
+    /* Slightly crossed: the ridges meet in the middle, the separation at the ends of the stretch is what the turn
+     * opens. As long as the ends are as deep as the crossing they stand for the line; once they are not, all three
+     * count. */
     for (double angle = 2e-5; angle < 0.1; angle *= 1.5) {
         struct solid a = box_at(h, 0.1, h, 0, 0, 0), b = box_at(h, 0.1, h, 0, 0, 2 * r2 - 1e-7);
         turn(&a, 0, 1, 0, pi / 4);
@@ -379,8 +380,8 @@ START_TEST(a_corner_over_a_face_has_the_normal_of_the_face)
         uint32_t cache = 0;
         for (int step = 0; step < 6; ++step) {
             for (int k = 0; k < 3; ++k) b.x[k] += random_in(&r, -2e-3, 2e-3);
-            double gap = box_separation(&a, &b, axis);
-            for (int k = 0; k < 3; ++k) b.x[k] += axis[k] * (2e-4 - gap);
+            double separation = box_separation(&a, &b, axis);
+            for (int k = 0; k < 3; ++k) b.x[k] += axis[k] * (2e-4 - separation);
             struct world_manifold m = touch(&a, &b, 2e-3, cache);
             double best = box_separation(&a, &b, NULL);
             cache = m.count ? m.cache : 0;
@@ -424,17 +425,18 @@ START_TEST(corners_apart_meet_by_their_closest_points)
 {
     const double h = 0.05;
     struct solid a = box_at(h, h, h, 0, 0, 0);
-    const double gaps[][3] = {{1e-3, 2e-3, 3e-3}, {1e-3, 1e-3, 1e-3}, {5e-3, 1e-4, 1e-4}};
+    const double separations[][3] = {{1e-3, 2e-3, 3e-3}, {1e-3, 1e-3, 1e-3}, {5e-3, 1e-4, 1e-4}};
     for (size_t i = 0; i < 3; ++i) {
-        struct solid b = box_at(h, h, h, 2 * h + gaps[i][0], 2 * h + gaps[i][1], 2 * h + gaps[i][2]);
-        double distance = sqrt(dot3(gaps[i], gaps[i]));
+        struct solid b = box_at(h, h, h, 2 * h + separations[i][0], 2 * h + separations[i][1],
+                                2 * h + separations[i][2]);
+        double distance = sqrt(dot3(separations[i], separations[i]));
         struct world_manifold m = touch(&a, &b, distance * 1.0001, 0);
         ck_assert_int_eq(touch(&a, &b, distance * 0.9999, 0).count, 0);
         ck_assert_int_eq(m.count, 1);
         ck_assert_double_eq_tol(m.separation[0], distance, 1e-12);
         for (int k = 0; k < 3; ++k) {
-            ck_assert_double_eq_tol(m.normal[k], gaps[i][k] / distance, 1e-9);
-            ck_assert_double_eq_tol(m.position[0][k], h + gaps[i][k] / 2, 1e-12);
+            ck_assert_double_eq_tol(m.normal[k], separations[i][k] / distance, 1e-9);
+            ck_assert_double_eq_tol(m.position[0][k], h + separations[i][k] / 2, 1e-12);
         }
     }
     /* parallel edges apart: both ends */
@@ -854,14 +856,14 @@ START_TEST(a_ball_meets_face_edge_corner_and_inside_of_a_box)
     struct solid box = box_at(h, h, h, 0, 0, 0), ball = solid_at(SADMM_SHAPE_SPHERE, radius, 0, 0, 0, 0, 0);
     struct world_manifold m;
     for (int axes = 1; axes <= 3; ++axes) {
-        double gap = 1e-3, d = (radius + gap) / sqrt(axes);
+        double separation = 1e-3, d = (radius + separation) / sqrt(axes);
         for (int k = 0; k < 3; ++k) ball.x[k] = k < axes ? h + d : 0.01;
         m = touch(&box, &ball, 2e-3, 0);
         ck_assert_int_eq(m.count, 1);
-        ck_assert_double_eq_tol(m.separation[0], gap, 1e-12);
+        ck_assert_double_eq_tol(m.separation[0], separation, 1e-12);
         for (int k = 0; k < axes; ++k) {
             ck_assert_double_eq_tol(m.normal[k], 1 / sqrt(axes), 1e-12);
-            ck_assert_double_eq_tol(m.position[0][k], h + 0.5 * gap / sqrt(axes), 1e-12);
+            ck_assert_double_eq_tol(m.position[0][k], h + 0.5 * separation / sqrt(axes), 1e-12);
         }
         ck_assert_int_eq(touch(&box, &ball, 0.9e-3, 0).count, 0);
     }
@@ -955,15 +957,15 @@ END_TEST
 START_TEST(every_pair_of_types_is_listed)
 {
     const double size[3] = {0.5, 0.5, 0.5};
-    struct test_pool *pool = test_pool_new();
+    struct test_shape_data *shape_data = test_shape_data_new();
     struct test_hull cube;
     box_hull(size, &cube);
-    const uint32_t hull = test_pool_add(pool, &cube).hull;
+    const uint32_t hull = test_shape_data_add(shape_data, &cube).hull;
     struct soup *s = soup_ground(2, 2, 4, 0, 1, soup_flat);
     sadmm_mesh *mesh = soup_mesh(s);
-    const uint32_t ground = (uint32_t)pool->used;
-    ck_assert_uint_le(pool->used + mesh->doubles, TEST_POOL);
-    memcpy(pool->numbers + ground, mesh->block, mesh->doubles * sizeof *mesh->block);
+    const uint32_t ground = (uint32_t)shape_data->used;
+    ck_assert_uint_le(shape_data->used + mesh->doubles, TEST_SHAPE_DATA);
+    memcpy(shape_data->numbers + ground, mesh->block, mesh->doubles * sizeof *mesh->block);
     for (int low = -1; low <= 2 * SADMM_SHAPE_TYPE_COUNT; ++low)
         for (int high = low; high <= 2 * SADMM_SHAPE_TYPE_COUNT; ++high) {
             const bool known = low >= 0 && high < SADMM_SHAPE_TYPE_COUNT,
@@ -977,17 +979,17 @@ START_TEST(every_pair_of_types_is_listed)
             memset(&m, 0x55, sizeof m);
             a_is.hull = a == SADMM_SHAPE_MESH ? ground : hull;
             b_is.hull = b == SADMM_SHAPE_MESH ? ground : hull;
-            pair_manifold(&a_is, &b_is, pool->numbers, 0, &pose, 0, 0, &m);
+            pair_manifold(&a_is, &b_is, shape_data->numbers, 0, &pose, 0, 0, &m);
             if (b == SADMM_SHAPE_MESH) { /* by itself */
                 ck_assert_int_eq(m.count, 0);
-                if (listed) mesh_manifold(&a_is, &b_is, pool->numbers, 0, &pose, 0, 0, &m);
+                if (listed) mesh_manifold(&a_is, &b_is, shape_data->numbers, 0, &pose, 0, 0, &m);
             }
             ck_assert_msg((m.count > 0) == listed, "types %d and %d: %d points", a, b, m.count);
             ck_assert_msg(pair_is_listed(a, b) == listed && pair_is_listed(b, a) == listed, "types %d and %d", a, b);
         }
     sadmm_mesh_destroy(mesh);
     free(s);
-    free(pool);
+    free(shape_data);
 }
 END_TEST
 

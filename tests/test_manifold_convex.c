@@ -14,7 +14,7 @@ static void random_pair(struct random *r, struct pair_of *t, int a, int b, int w
     static const double tilts[] = {0, 0, 1e-12, 1e-9, 1e-6, 1e-3};
     const double scale = way == FAR_OUT_OF_SCALE ? pow(10, random_in(r, -3, 3)) : 1;
     double d[3];
-    t->pool->used = HULL_FIRST_OWN;
+    t->shape_data->used = HULL_FIRST_OWN;
     random_shape_of(r, t, 0, a, scale);
     random_shape_of(r, t, 1, b, way == FAR_OUT_OF_SCALE ? scale * pow(10, random_in(r, -2, 2)) : scale);
     for (int k = 0; k < 3; ++k) d[k] = random_in(r, -1, 1);
@@ -144,7 +144,7 @@ START_TEST(exchange_changes_nothing)
             ck_assert_double_eq_tol(p.separation, q.separation, CLOSE * size);
             const struct pair_pose pose_u = pair_of_pose(u);
             struct manifold m = pair_touch(t, 0.1 * size, 0), w = {.count = 0};
-            convex_manifold(&u->g[0], &u->g[1], u->pool->numbers, &pose_u, 0.1 * size, 0, &w);
+            convex_manifold(&u->g[0], &u->g[1], u->shape_data->numbers, &pose_u, 0.1 * size, 0, &w);
             double n[2][3], least[2] = {HUGE_VAL, HUGE_VAL}, sum[3];
             normal_in_world(t, m.normal, n[0]);
             normal_in_world(u, w.normal, n[1]);
@@ -282,13 +282,13 @@ static double normal_z(const struct pair_of *t, const struct manifold *m)
 }
 
 /* b stands on a's top, in the middle or moved along x, turned about its axis by `spin`. */
-static struct manifold stand(struct pair_of *t, double half, double bottom, double x, double spin, double gap,
+static struct manifold stand(struct pair_of *t, double half, double bottom, double x, double spin, double separation,
                              uint32_t cache)
 {
     rotation(t->R[0], 0, 0, 1, 0.3);
     rotation(t->R[1], 0, 0, 1, spin);
     t->x[1][0] = x;
-    t->x[1][2] = half + bottom + gap;
+    t->x[1][2] = half + bottom + separation;
     return pair_touch(t, 0.01, cache);
 }
 
@@ -422,7 +422,7 @@ START_TEST(planes_are_exact)
 {
     struct random r = {.state = 8000 + (uint64_t)_i};
     struct pair_of *t = new_pair();
-    const struct sadmm_geometry plane = {.type = SADMM_SHAPE_PLANE, .children = 1};
+    const struct sadmm_geometry plane = {.type = SADMM_SHAPE_PLANE, .subshapes = 1};
     for (int pose = 0; pose < 2000; ++pose) {
         static const double tilts[] = {0, 1e-9, 1e-4, 0.05, 0.13, 0.15};
         double turn[9], down[3], low, least = HUGE_VAL;
@@ -434,11 +434,11 @@ START_TEST(planes_are_exact)
         }
         for (int k = 0; k < 3; ++k) down[k] = -t->R[0][3 * k + 2];
         low = own_support(t, 1, down);
-        const double size = geometry_radius(&t->g[1]), gap = random_in(&r, -0.01, 0.01) * size;
-        for (int k = 0; k < 3; ++k) t->x[1][k] = t->x[0][k] - (low + gap) * down[k];
+        const double size = geometry_radius(&t->g[1]), separation = random_in(&r, -0.01, 0.01) * size;
+        for (int k = 0; k < 3; ++k) t->x[1][k] = t->x[0][k] - (low + separation) * down[k];
         const struct pair_pose at = pair_pose(true, t->R[0], t->x[0], t->R[1], t->x[1]);
         struct manifold m;
-        pair_manifold(&t->g[0], &t->g[1], t->pool->numbers, 0, &at, gap + 1e-9 * size, 0, &m);
+        pair_manifold(&t->g[0], &t->g[1], t->shape_data->numbers, 0, &at, separation + 1e-9 * size, 0, &m);
         ck_assert_int_gt(m.count, 0);
         for (int i = 0; i < m.count; ++i) {
             double world[3], d[3];
@@ -449,7 +449,7 @@ START_TEST(planes_are_exact)
             for (int k = 0; k < 3; ++k) world[k] -= m.points[i].separation / 2 * down[k];
             ck_assert_double_le(own_outside(t, 1, world), 1e-11 * size);
         }
-        ck_assert_double_eq_tol(least, gap, MANIFOLD_FLAT * geometry_thickness(&t->g[1]) + 1e-12 * size);
+        ck_assert_double_eq_tol(least, separation, MANIFOLD_FLAT * geometry_thickness(&t->g[1]) + 1e-12 * size);
         if (pose % 18 == 0) ck_assert_int_eq(m.count, type_of(_i) == SADMM_SHAPE_ELLIPSOID ? 1 : 8); /* flat on it */
     }
     free_pair(t);

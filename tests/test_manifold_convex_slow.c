@@ -37,14 +37,14 @@ static void far_shape(struct random *r, struct pair_of *t, int s, int type, doub
     const double flat = pow(10, needle ? random_in(r, -4, -1) : random_in(r, -1, 0));
     const int thin = (int)(3 * random_unit(r)),
               thin_too = needle && random_unit(r) < 0.5 ? (int)(3 * random_unit(r)) : thin;
-    struct sadmm_geometry g = {.type = type, .children = 1};
+    struct sadmm_geometry g = {.type = type, .subshapes = 1};
     for (int k = 0; k < 3; ++k)
         g.size[k] = in_range(scale * random_in(r, 0.3, 1) * (k == thin || k == thin_too ? flat : 1));
     if (type == SADMM_SHAPE_HULL) {
         if (random_unit(r) < 0.3) box_hull(g.size, &t->h[s]);
         else random_hull(&r->state, 5 + (int)(random_unit(r) * 12), g.size, &t->h[s]);
-        t->h[s].rounding = random_unit(r) < 0.3 ? 0.2 * scale * flat : 0;
-        g = test_pool_add(t->pool, &t->h[s]);
+        t->h[s].convex_radius = random_unit(r) < 0.3 ? 0.2 * scale * flat : 0;
+        g = test_shape_data_add(t->shape_data, &t->h[s]);
     }
     t->g[s] = g;
 }
@@ -56,7 +56,7 @@ static void far_pair(struct random *r, struct pair_of *t, const int type[2], int
                  ratio = way == FAR_APART_IN_SIZE ? pow(10, random_in(r, -4, 0)) : 1;
     const int smaller = random_unit(r) < 0.5;
     double d[3];
-    t->pool->used = HULL_FIRST_OWN;
+    t->shape_data->used = HULL_FIRST_OWN;
     for (int s = 0; s < 2; ++s) far_shape(r, t, s, type[s], s == smaller ? scale * ratio : scale, way == NEEDLES);
     for (int k = 0; k < 3; ++k) d[k] = random_in(r, -1, 1);
     for (int s = 0; s < 2; ++s) {
@@ -103,7 +103,7 @@ static struct convex_axis bare_axis(const struct pair_of *t)
     struct convex_axis axis;
     struct convex_active active;
     memset(&axis, 0, sizeof axis);
-    convex_pair_make(&t->g[0], &t->g[1], t->pool->numbers, &pose, &pair);
+    convex_pair_make(&t->g[0], &t->g[1], t->shape_data->numbers, &pose, &pair);
     convex_find(&pair, v3_norm2(pair.t) > 0 ? v3_neg(pair.t) : v3(0, 0, 1), false, 1e300, &axis, &active);
     convex_nearest(&pair, &active, &axis);
     return axis;
@@ -111,7 +111,7 @@ static struct convex_axis bare_axis(const struct pair_of *t)
 
 /* How far a point of smooth shape s is from where the shape points along n (world): from its one point there, or from
  * the line between the two of its discs. Of others 0. */
-static double off_facing(const struct pair_of *t, int s, const double n[3], const double world[3])
+static double off_feature(const struct pair_of *t, int s, const double n[3], const double world[3])
 {
     const double *size = t->g[s].size;
     double d[3], p[3], rel[3], line[3];
@@ -184,7 +184,7 @@ static void check_pair(const struct pair_of *t, struct pair_of *u, int depth, bo
     const double thin = pair_thin(t), size = pair_size(t);
     const struct convex_axis axis = bare_axis(t);
     const struct manifold m = pair_touch(t, 1e300, 0);
-    double n[3], own[3], back[3], pa[3], pb[3], gap[3], least = HUGE_VAL, outside = -HUGE_VAL;
+    double n[3], own[3], back[3], pa[3], pb[3], separation[3], least = HUGE_VAL, outside = -HUGE_VAL;
     HOLDS(m.count > 0 && fabs(v3_norm(m.normal) - 1) < 1e-12, "%s: %d points", what, m.count);
     normal_in_world(t, m.normal, n);
     normal_in_world(t, axis.n, own);
@@ -194,8 +194,8 @@ static void check_pair(const struct pair_of *t, struct pair_of *u, int depth, bo
     /* two points of the bodies bound the distance from above, the planes across n from below */
     point_in_world(t, axis.pa, pa);
     point_in_world(t, axis.pb, pb);
-    t_sub(pb, pa, gap);
-    double above = t_norm(gap) + fmax(0, own_outside(t, 0, pa)) + fmax(0, own_outside(t, 1, pb));
+    t_sub(pb, pa, separation);
+    double above = t_norm(separation) + fmax(0, own_outside(t, 0, pa)) + fmax(0, own_outside(t, 1, pb));
     for (int i = 0; i < m.count; ++i) {
         const double out = points_outside(t, m.normal, m.points[i].position, m.points[i].separation);
         if (m.points[i].separation <= apart + 0.1 * thin) outside = fmax(outside, out);
@@ -231,16 +231,16 @@ static void check_pair(const struct pair_of *t, struct pair_of *u, int depth, bo
                   thin);
     }
     if (depth <= TOUCHING)
-        HOLDS(off_facing(t, 0, own, pa) <= 1e-10 * size && off_facing(t, 1, back, pb) <= 1e-10 * size,
-              "%s: nearest points point elsewhere, by %g and %g, size %g", what, off_facing(t, 0, own, pa),
-              off_facing(t, 1, back, pb), size);
+        HOLDS(off_feature(t, 0, own, pa) <= 1e-10 * size && off_feature(t, 1, back, pb) <= 1e-10 * size,
+              "%s: nearest points point elsewhere, by %g and %g, size %g", what, off_feature(t, 0, own, pa),
+              off_feature(t, 1, back, pb), size);
 
     /* the same two the other way round */
     struct manifold w = {.count = 0};
     double other[3];
     exchange(t, u);
     const struct pair_pose pose = pair_of_pose(u);
-    convex_manifold(&u->g[0], &u->g[1], u->pool->numbers, &pose, 1e300, 0, &w);
+    convex_manifold(&u->g[0], &u->g[1], u->shape_data->numbers, &pose, 1e300, 0, &w);
     HOLDS(w.count > 0, "%s: nothing the other way round", what);
     normal_in_world(u, w.normal, other);
     const double there = apart_along(u, other);
@@ -287,17 +287,17 @@ START_TEST(planes_touch_the_lowest_point)
     for (int pose = 0; pose < poses; ++pose) {
         double down[3], least = HUGE_VAL;
         far_pair(&r, t, type, pose % WAYS);
-        t->g[0] = (struct sadmm_geometry){.type = SADMM_SHAPE_PLANE, .children = 1};
+        t->g[0] = (struct sadmm_geometry){.type = SADMM_SHAPE_PLANE, .subshapes = 1};
         for (int k = 0; k < 3; ++k) down[k] = -t->R[0][3 * k + 2];
         const double size = geometry_radius(&t->g[1]), thin = geometry_thickness(&t->g[1]),
-                     low = own_support(t, 1, down), gap = (pose % 3 - 1) * pow(10, random_in(&r, -12, 0)) * thin;
-        for (int k = 0; k < 3; ++k) t->x[1][k] = t->x[0][k] - (low + gap) * down[k];
+                     low = own_support(t, 1, down), separation = (pose % 3 - 1) * pow(10, random_in(&r, -12, 0)) * thin;
+        for (int k = 0; k < 3; ++k) t->x[1][k] = t->x[0][k] - (low + separation) * down[k];
         const struct pair_pose at = pair_pose(true, t->R[0], t->x[0], t->R[1], t->x[1]);
         /* the position itself is rounded */
         const double rounding = 1e-12 * size + 4e-16 * (t_norm(t->x[0]) + t_norm(t->x[1]));
         struct manifold m;
         memset(&m, 0x55, sizeof m);
-        pair_manifold(&t->g[0], &t->g[1], t->pool->numbers, 0, &at, gap + 1e-9 * size, 0, &m);
+        pair_manifold(&t->g[0], &t->g[1], t->shape_data->numbers, 0, &at, separation + 1e-9 * size, 0, &m);
         HOLDS(m.count > 0 && m.count <= SADMM_MANIFOLD_POINTS, "pose %d: %d points", pose, m.count);
         for (int i = 0; i < m.count; ++i) {
             double world[3], d[3];
@@ -310,8 +310,8 @@ START_TEST(planes_touch_the_lowest_point)
             HOLDS(own_outside(t, 1, world) <= 1e-11 * size + rounding, "pose %d: outside by %g, size %g", pose,
                   own_outside(t, 1, world), size);
         }
-        HOLDS(least >= gap - rounding && least <= gap + MANIFOLD_FLAT * thin + rounding,
-              "pose %d: at %.17g, should be %.17g", pose, least, gap);
+        HOLDS(least >= separation - rounding && least <= separation + MANIFOLD_FLAT * thin + rounding,
+              "pose %d: at %.17g, should be %.17g", pose, least, separation);
     }
     free_pair(t);
 }

@@ -23,8 +23,8 @@ static void compare(double thin, uint64_t seed, int pairs)
         double axis[3];
         for (int k = 0; k < 3; ++k) b.x[k] = d[k] * 0.2;
         for (int i = 0; i < 20; ++i) {
-            double gap = box_separation(&a, &b, axis),
-                   shift = i < 19 ? fmax(gap, 0) : gap + random_in(&r, -0.1, 0.25) * thickness;
+            double separation = box_separation(&a, &b, axis),
+                   shift = i < 19 ? fmax(separation, 0) : separation + random_in(&r, -0.1, 0.25) * thickness;
             for (int k = 0; k < 3; ++k) b.x[k] -= axis[k] * shift;
         }
         int theirs = fcl_boxes(a.size, a.R, a.x, b.size, b.R, b.x, &depth, normal);

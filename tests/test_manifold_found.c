@@ -1,5 +1,5 @@
 /* Pairs that the search of tests/fuzz found, each with a contact whose point was not between the surfaces, or with
- * none. Every point is midway between surface points of the two that are its separation apart, so that it lies no
+ * none. Every point is halfway between surface points of the two that are its separation apart, so that it lies no
  * farther outside of either than half of that.
  *
  * Tolerance: 64 roundings of a double at the size of the pair (poses, a square root, and the projections of the

@@ -31,12 +31,12 @@ START_TEST(exchange_changes_nothing)
     struct pair_of *t = calloc(1, sizeof *t), *u = calloc(1, sizeof *u);
     const double unit[3] = {1, 1, 1};
     int alike = 0;
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     for (int pose = 0; pose < 300; ++pose) {
-        t->pool->used = HULL_FIRST_OWN;
+        t->shape_data->used = HULL_FIRST_OWN;
         for (int s = 0; s < 2; ++s) {
             random_hull(&r.state, 6 + (int)(random_unit(&r) * 16), unit, &t->h[s]);
-            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+            t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
         }
         random_pose(&r, 2, t);
         put_together(t, random_in(&r, -0.05, 0.05));
@@ -81,7 +81,7 @@ START_TEST(exchange_changes_nothing)
         }
     }
     ck_assert_int_ge(alike, 294);
-    free(t->pool);
+    free(t->shape_data);
     free(t);
     free(u);
 }
@@ -93,14 +93,14 @@ START_TEST(boxes_are_hulls)
     static const double tilts[] = {0, 1e-9, 1e-7, 1e-5, 1e-3};
     struct random r = {.state = 4711 + (uint64_t)_i};
     struct pair_of *t = calloc(1, sizeof *t), *u = calloc(1, sizeof *u);
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     for (int pose = 0; pose < 200; ++pose) {
         double half[2][3], world[3];
-        t->pool->used = HULL_FIRST_OWN;
+        t->shape_data->used = HULL_FIRST_OWN;
         for (int s = 0; s < 2; ++s) {
             for (int k = 0; k < 3; ++k) half[s][k] = random_in(&r, 0.2, 1);
             box_hull(half[s], &t->h[s]);
-            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+            t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
             rotation(t->R[s], random_in(&r, -1, 1), random_in(&r, -1, 1), 1, tilts[_i]);
         }
         for (int k = 0; k < 3; ++k) t->x[0][k] = random_in(&r, -1, 1);
@@ -109,7 +109,7 @@ START_TEST(boxes_are_hulls)
         memcpy(t->x[1], world, sizeof world);
         *u = *t;
         for (int s = 0; s < 2; ++s) {
-            const struct sadmm_geometry box = {.type = SADMM_SHAPE_BOX, .children = 1,
+            const struct sadmm_geometry box = {.type = SADMM_SHAPE_BOX, .subshapes = 1,
                                                .size = {half[s][0], half[s][1], half[s][2]}};
             u->g[s] = box;
         }
@@ -121,21 +121,21 @@ START_TEST(boxes_are_hulls)
             const double best = reference(t);
             check_manifold(t, &hulls, best, 0.1, "box");
             for (int i = 0; i < boxes.count; ++i) {
-                double nearest2 = HUGE_VAL, gap = 0;
+                double nearest2 = HUGE_VAL, separation = 0;
                 for (int k = 0; k < hulls.count; ++k) {
                     const double d2 = v3_norm2(v3_sub(boxes.points[i].position, hulls.points[k].position));
                     if (d2 < nearest2) {
                         nearest2 = d2;
-                        gap = hulls.points[k].separation;
+                        separation = hulls.points[k].separation;
                     }
                 }
                 /* both round corners to sides by their own tolerance */
                 ck_assert_double_le(nearest2, 4e-6 + tilts[_i] * tilts[_i]);
-                ck_assert_double_eq_tol(gap, boxes.points[i].separation, 1e-12 + 4 * tilts[_i]);
+                ck_assert_double_eq_tol(separation, boxes.points[i].separation, 1e-12 + 4 * tilts[_i]);
             }
         }
     }
-    free(t->pool);
+    free(t->shape_data);
     free(t);
     free(u);
 }
@@ -149,15 +149,15 @@ START_TEST(memory_changes_little)
     struct pair_of *t = calloc(1, sizeof *t);
     const double unit[3] = {1, 1, 1};
     long same = 0, all = 0, remembered = 0;
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     for (int path = 0; path < fewer(12); ++path) {
         uint32_t cache = 0;
         double last = 0, spin[3], move[3];
-        t->pool->used = HULL_FIRST_OWN;
+        t->shape_data->used = HULL_FIRST_OWN;
         for (int s = 0; s < 2; ++s) {
             if (_i % 3 == 1) prism_hull(3 + (int)(random_unit(&r) * 8), random_in(&r, 0.2, 1), &t->h[s]);
             else random_hull(&r.state, 8 + (int)(random_unit(&r) * 24), unit, &t->h[s]);
-            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+            t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
         }
         const double thin = fmin(geometry_thickness(&t->g[0]), geometry_thickness(&t->g[1]));
         random_pose(&r, 1.9, t);
@@ -194,7 +194,7 @@ START_TEST(memory_changes_little)
     }
     ck_assert_int_gt(remembered, 0);
     if (all > 0) ck_assert_msg(same > 0.99 * (double)all, "%ld of %ld points go on", same, all);
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 END_TEST
@@ -206,11 +206,11 @@ START_TEST(sides_are_kept)
     const double plate[3] = {1, 1, 0.02}, unit[3] = {0.3, 0.3, 0.3};
     struct random r = {.state = 5 + (uint64_t)_i};
     uint32_t cache = 0;
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     random_hull(&r.state, 20, unit, &t->h[0]);
     box_hull(plate, &t->h[1]);
     for (int s = 0; s < 2; ++s) {
-        t->g[s] = test_pool_add(t->pool, &t->h[s]);
+        t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
         random_rotation(&r, t->R[s]);
     }
     double up[3];
@@ -226,7 +226,7 @@ START_TEST(sides_are_kept)
         beyond += height < 0;
     }
     ck_assert_int_gt(beyond, 20); /* there were some to be wrong */
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 END_TEST
@@ -240,11 +240,11 @@ START_TEST(rounded_boxes_roll_smoothly)
     const double axis[3] = {_i == 0 ? 0 : 0.8, 1, _i == 2 ? 0.4 : 0};
     vec3 last = v3(0, 0, 0);
     uint32_t cache = 0;
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     for (int s = 0; s < 2; ++s) {
         box_hull(half[s], &t->h[s]);
-        t->h[s].rounding = s ? 0.1 : 0.05;
-        t->g[s] = test_pool_add(t->pool, &t->h[s]);
+        t->h[s].convex_radius = s ? 0.1 : 0.05;
+        t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
         rotation(t->R[s], 0, 0, 1, s * 0.1);
     }
     for (int k = 0; k < 3200; ++k) {
@@ -271,7 +271,7 @@ START_TEST(rounded_boxes_roll_smoothly)
         cache = m.count > 0 ? m.cache : 0;
         turn_by(t->R[1], axis, step);
     }
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 END_TEST
@@ -281,10 +281,10 @@ START_TEST(a_capsule_lies_on_a_face)
 {
     struct pair_of *t = calloc(1, sizeof *t);
     const double half[3] = {1, 1, 0.5};
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     box_hull(half, &t->h[1]);
-    t->g[1] = test_pool_add(t->pool, &t->h[1]);
-    const struct sadmm_geometry capsule = {.type = SADMM_SHAPE_CAPSULE, .children = 1, .size = {0.1, 0.6, 0}};
+    t->g[1] = test_shape_data_add(t->shape_data, &t->h[1]);
+    const struct sadmm_geometry capsule = {.type = SADMM_SHAPE_CAPSULE, .subshapes = 1, .size = {0.1, 0.6, 0}};
     t->g[0] = capsule;
     rotation(t->R[1], 0, 0, 1, 0.3);
     rotation(t->R[0], 0, 1, 0, M_PI / 2 + (_i - 1) * 1e-4);
@@ -295,7 +295,7 @@ START_TEST(a_capsule_lies_on_a_face)
     ck_assert_double_eq_tol(m.normal.z, -1, 1e-8); /* beyond the edge: across it and the capsule */
     for (int i = 0; i < 2; ++i) ck_assert_double_eq_tol(m.points[i].separation, -1e-4, 1e-4);
     ck_assert_double_gt(v3_norm(v3_sub(m.points[0].position, m.points[1].position)), _i == 2 ? 0.7 : 1.1);
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 END_TEST
@@ -311,14 +311,14 @@ START_TEST(aligned_prisms_are_as_deep_as_they_are)
                  {12, 5, 0.3, 2, {0, 0.5, 0.25}}};
     const double turns[2][9] = {{0, 0, 1, 1, 0, 0, 0, 1, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     struct pair_of *t = calloc(1, sizeof *t);
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     for (size_t c = 0; c < sizeof cases / sizeof *cases; ++c)
         for (int turned = 0; turned < 2; ++turned) {
-            t->pool->used = HULL_FIRST_OWN;
+            t->shape_data->used = HULL_FIRST_OWN;
             prism_hull(cases[c].a, cases[c].half_a, &t->h[0]);
             prism_hull(cases[c].b, cases[c].half_b, &t->h[1]);
             for (int s = 0; s < 2; ++s) {
-                t->g[s] = test_pool_add(t->pool, &t->h[s]);
+                t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
                 memcpy(t->R[s], turns[s == 0 ? turned : 1], sizeof t->R[s]);
                 for (int k = 0; k < 3; ++k) t->x[s][k] = s == 0 ? cases[c].t[k] : 0;
             }
@@ -329,7 +329,7 @@ START_TEST(aligned_prisms_are_as_deep_as_they_are)
             const struct manifold m = touch_two(t, 0.01, 0);
             check_manifold(t, &m, best, 0.01, what);
         }
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 END_TEST
@@ -340,12 +340,12 @@ START_TEST(any_memory_will_do)
     struct random r = {.state = 1234 + (uint64_t)_i};
     struct pair_of *t = calloc(1, sizeof *t);
     const double unit[3] = {1, 0.7, 0.5};
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     for (int pose = 0; pose < 2000; ++pose) {
-        t->pool->used = HULL_FIRST_OWN;
+        t->shape_data->used = HULL_FIRST_OWN;
         for (int s = 0; s < 2; ++s) {
             random_hull(&r.state, 4 + (int)(random_unit(&r) * 12), unit, &t->h[s]);
-            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+            t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
         }
         random_pose(&r, random_in(&r, 0.5, 2), t);
         const uint32_t word = (uint32_t)(random_unit(&r) * 4294967296.0),
@@ -358,7 +358,7 @@ START_TEST(any_memory_will_do)
         }
         ck_assert_int_eq(m.count > 0, reference(t) <= 0.02);
     }
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 END_TEST
@@ -372,11 +372,11 @@ START_TEST(the_deepest_corner_is_there)
                                    {-.07769, .02698, .07224}, {-.01758, .00852, .0671}};
     struct pair_of *t = calloc(1, sizeof *t);
     double least = HUGE_VAL;
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     test_hull_of(_i ? b : a, 4, 0, &t->h[0]);
     test_hull_of(_i ? a : b, 4, 0, &t->h[1]);
     for (int s = 0; s < 2; ++s) {
-        t->g[s] = test_pool_add(t->pool, &t->h[s]);
+        t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
         rotation(t->R[s], 0, 0, 1, 0);
     }
     struct manifold m = touch_two(t, 1e-3, 0);
@@ -386,7 +386,7 @@ START_TEST(the_deepest_corner_is_there)
         ck_assert_double_eq_tol(least, -2.009e-3, 1e-6);
         m = touch_two(t, 1e-3, m.cache);
     }
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 END_TEST
@@ -398,10 +398,10 @@ START_TEST(a_knife_stands_on_its_edge)
     struct pair_of *t = calloc(1, sizeof *t);
     const double half[3] = {1, 1, 0.5}, d = thick[_i % 4];
     const double knife[6][3] = {{-0.6, 0, 0}, {0.6, 0, 0}, {-0.6, d, 1}, {0.6, d, 1}, {-0.6, -d, 1}, {0.6, -d, 1}};
-    t->pool = test_pool_new();
+    t->shape_data = test_shape_data_new();
     box_hull(half, &t->h[1]);
     test_hull_of(knife, 6, 1e-9, &t->h[0]);
-    for (int s = 0; s < 2; ++s) t->g[s] = test_pool_add(t->pool, &t->h[s]);
+    for (int s = 0; s < 2; ++s) t->g[s] = test_shape_data_add(t->shape_data, &t->h[s]);
     if (_i >= 4) { /* the knife as b */
         const struct test_hull h = t->h[0];
         const struct sadmm_geometry g = t->g[0];
@@ -417,7 +417,7 @@ START_TEST(a_knife_stands_on_its_edge)
     ck_assert_double_eq_tol(fabs(m.normal.z), 1, 1e-9);
     for (int i = 0; i < 2; ++i) ck_assert_double_eq_tol(m.points[i].separation, -1e-4, 1e-5);
     ck_assert_double_gt(v3_norm(v3_sub(m.points[0].position, m.points[1].position)), 1.1);
-    free(t->pool);
+    free(t->shape_data);
     free(t);
 }
 END_TEST
@@ -426,28 +426,28 @@ END_TEST
 START_TEST(planes_touch_corners)
 {
     struct random r = {.state = 63 + (uint64_t)_i};
-    struct test_pool *pool = test_pool_new();
+    struct test_shape_data *shape_data = test_shape_data_new();
     struct test_hull h;
     const double unit[3] = {1, 1, 1};
-    const struct sadmm_geometry plane = {.type = SADMM_SHAPE_PLANE, .children = 1};
+    const struct sadmm_geometry plane = {.type = SADMM_SHAPE_PLANE, .subshapes = 1};
     for (int pose = 0; pose < 200; ++pose) {
         double R[9], Rp[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, x[3] = {0, 0, 0}, xp[3] = {0, 0, 0}, lowest = HUGE_VAL;
         const double limit = 0.01;
         int within = 0;
-        pool->used = HULL_FIRST_OWN;
+        shape_data->used = HULL_FIRST_OWN;
         if (_i % 2 == 0) random_hull(&r.state, 20, unit, &h);
         else prism_hull(20, 0.4, &h);
-        h.rounding = _i < 2 ? 0 : 0.2;
-        const struct sadmm_geometry hull = test_pool_add(pool, &h);
+        h.convex_radius = _i < 2 ? 0 : 0.2;
+        const struct sadmm_geometry hull = test_shape_data_add(shape_data, &h);
         if (_i % 2 == 0) random_rotation(&r, R);
         else rotation(R, random_in(&r, -1, 1), random_in(&r, -1, 1), 0, pose % 2 ? 1e-3 : 0);
-        for (int v = 0; v < h.vertices; ++v) lowest = fmin(lowest, t_dot(R + 6, h.x[v]) - h.rounding);
+        for (int v = 0; v < h.vertices; ++v) lowest = fmin(lowest, t_dot(R + 6, h.x[v]) - h.convex_radius);
         x[2] = -lowest + random_in(&r, -0.05, 0.009);
         const struct pair_pose pose_b = pair_pose(true, Rp, xp, R, x);
         struct manifold m;
         memset(&m, 0x55, sizeof m);
-        pair_manifold(&plane, &hull, pool->numbers, 0, &pose_b, limit, 0, &m);
-        for (int v = 0; v < h.vertices; ++v) within += t_dot(R + 6, h.x[v]) - h.rounding + x[2] <= limit;
+        pair_manifold(&plane, &hull, shape_data->numbers, 0, &pose_b, limit, 0, &m);
+        for (int v = 0; v < h.vertices; ++v) within += t_dot(R + 6, h.x[v]) - h.convex_radius + x[2] <= limit;
         if (within <= SADMM_MANIFOLD_POINTS) ck_assert_int_eq(m.count, within);
         else ck_assert_int_ge(m.count, 4);
         double least = HUGE_VAL, reach = 0;
@@ -463,7 +463,7 @@ START_TEST(planes_touch_corners)
         ck_assert_double_eq_tol(least, lowest + x[2], 1e-12);
         if (_i % 2 == 1 && pose % 2 == 0) ck_assert_double_gt(reach, 0.99);
     }
-    free(pool);
+    free(shape_data);
 }
 END_TEST
 

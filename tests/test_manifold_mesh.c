@@ -4,14 +4,14 @@
 
 #include "collision/mesh_walk.h"
 #include "fewer.h"
-#include "hull_pool.h"
+#include "hull_shapes.h"
 #include "manifold_tools.h"
 #include "mesh_touches.h"
 #include "run_suite.h"
 
 /* A shape beside a mesh. */
 struct beside {
-    struct test_pool *pool;
+    struct test_shape_data *shape_data;
     struct test_hull core; /* the shape without its radius */
     struct sadmm_geometry shape, surface;
     struct mesh mesh;
@@ -24,12 +24,12 @@ static const double unturned[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, origin[3] = {0, 0
 
 static void take_mesh(struct beside *b, const sadmm_mesh *mesh)
 {
-    b->surface = (struct sadmm_geometry){.type = SADMM_SHAPE_MESH, .hull = (uint32_t)b->pool->used};
+    b->surface = (struct sadmm_geometry){.type = SADMM_SHAPE_MESH, .hull = (uint32_t)b->shape_data->used};
     memcpy(b->surface.size, mesh->half, sizeof mesh->half);
-    ck_assert_uint_le(b->pool->used + mesh->doubles, TEST_POOL);
-    memcpy(b->pool->numbers + b->pool->used, mesh->block, mesh->doubles * sizeof *mesh->block);
-    mesh_at(b->pool->numbers, b->surface.hull, &b->mesh);
-    b->pool->used += mesh->doubles;
+    ck_assert_uint_le(b->shape_data->used + mesh->doubles, TEST_SHAPE_DATA);
+    memcpy(b->shape_data->numbers + b->shape_data->used, mesh->block, mesh->doubles * sizeof *mesh->block);
+    mesh_at(b->shape_data->numbers, b->surface.hull, &b->mesh);
+    b->shape_data->used += mesh->doubles;
 }
 
 /* ---- shapes ------------------------------------------------------------------------------------------------------ */
@@ -41,11 +41,11 @@ static void take_shape(struct beside *b, int kind, double scale)
     uint64_t seed = 3;
     memset(&b->core, 0, sizeof b->core);
     if (kind == 0) {
-        b->shape = (struct sadmm_geometry){.type = SADMM_SHAPE_SPHERE, .children = 1, .size = {0.15 * scale}};
+        b->shape = (struct sadmm_geometry){.type = SADMM_SHAPE_SPHERE, .subshapes = 1, .size = {0.15 * scale}};
         b->core.vertices = 1;
     } else if (kind == 1) {
         b->shape =
-            (struct sadmm_geometry){.type = SADMM_SHAPE_CAPSULE, .children = 1, .size = {0.05 * scale, 0.2 * scale}};
+            (struct sadmm_geometry){.type = SADMM_SHAPE_CAPSULE, .subshapes = 1, .size = {0.05 * scale, 0.2 * scale}};
         b->core.vertices = 2;
         b->core.edges = 1;
         b->core.edge[0][1] = 1;
@@ -53,11 +53,12 @@ static void take_shape(struct beside *b, int kind, double scale)
         b->core.x[1][2] = 0.2 * scale;
     } else if (kind == 2 || kind == 3) {
         const double *size = kind == 2 ? half : thin;
-        b->shape = (struct sadmm_geometry){.type = SADMM_SHAPE_BOX, .children = 1, .size = {size[0], size[1], size[2]}};
+        b->shape = (struct sadmm_geometry){.type = SADMM_SHAPE_BOX, .subshapes = 1,
+                                           .size = {size[0], size[1], size[2]}};
         box_hull(size, &b->core);
     } else {
         random_hull(&seed, kind == 4 ? 6 : 24, half, &b->core);
-        b->shape = test_pool_add(b->pool, &b->core);
+        b->shape = test_shape_data_add(b->shape_data, &b->core);
     }
 }
 
@@ -125,8 +126,8 @@ static double distance_of(const struct beside *b, bool *at_end)
 
 /* ---- what the library finds -------------------------------------------------------------------------------------- */
 
-/* The least gap of all points, HUGE_VAL: none. memory: by triangle, NULL: none. */
-static double least_gap(const struct beside *b, double limit, uint32_t *memory, int *points)
+/* The least separation of all points, HUGE_VAL: none. memory: by triangle, NULL: none. */
+static double smallest_separation(const struct beside *b, double limit, uint32_t *memory, int *points)
 {
     double least = HUGE_VAL;
     const struct pair_pose pose = pair_pose(false, b->R, b->x, unturned, origin);
@@ -136,7 +137,8 @@ static double least_gap(const struct beside *b, double limit, uint32_t *memory, 
         memset(&m, 0x55, sizeof m);
         m.count = 0;
         m.cache = 0;
-        mesh_manifold(&b->shape, &b->surface, b->pool->numbers, (uint32_t)t, &pose, limit, memory ? memory[t] : 0, &m);
+        mesh_manifold(&b->shape, &b->surface, b->shape_data->numbers, (uint32_t)t, &pose, limit, memory ? memory[t] : 0,
+                      &m);
         ck_assert_int_ge(m.count, 0);
         ck_assert_int_le(m.count, SADMM_MANIFOLD_POINTS);
         if (memory) memory[t] = m.count > 0 ? m.cache : 0; /* what has no points is not remembered */
@@ -168,7 +170,7 @@ static void place_over(struct beside *b, struct random *r, double above)
 START_TEST(the_nearest_point_is_found)
 {
     sadmm_mesh *mesh = soup_some_mesh(_i / SHAPES);
-    struct beside b = {.pool = test_pool_new()};
+    struct beside b = {.shape_data = test_shape_data_new()};
     struct random r = {1000 + (uint64_t)_i};
     const double scale = _i % 2 ? 1 : 3, limit = 0.03;
     int points, within = 0, exact = 0;
@@ -180,20 +182,21 @@ START_TEST(the_nearest_point_is_found)
         bool at_end = false;
         const double d = distance_of(&b, &at_end);
         if (d < 1e-6 || at_end) continue; /* or it cuts the surface elsewhere */
-        const double gap = least_gap(&b, limit, NULL, &points);
-        /* A face within 8 degrees of the nearest points is preferred to them, and the gap is taken along it: their
-         * distance times the cosine, at least. A corner beside an edge may count as on it, where the gap is wrong by
-         * 1e-5 of the thickness (FACING_GAP); the nearest points are not added to others as near to 1e-4 of it
-         * (MANIFOLD_FLAT). */
+        const double separation = smallest_separation(&b, limit, NULL, &points);
+        /* A face within 8 degrees of the nearest points is preferred to them, and the separation is taken along it:
+         * their distance times the cosine, at least. A corner beside an edge may count as on it, where the separation
+         * is wrong by 1e-5 of the thickness (CLIP_SEPARATION); the nearest points are not added to others as near to
+         * 1e-4 of it (MANIFOLD_FLAT). */
         const double less = 0.01 * d + 1e-5 * thin + 1e-10, more = 1.1e-4 * thin + 1e-10;
-        if (d < limit - more) ck_assert_msg(gap <= d + more, "pose %d: found %.12g, distance %.12g", i, gap, d);
-        ck_assert_msg(gap >= d - less, "pose %d: found %.12g, distance %.12g", i, gap, d);
-        exact += fabs(gap - d) < 1e-10;
+        if (d < limit - more)
+            ck_assert_msg(separation <= d + more, "pose %d: found %.12g, distance %.12g", i, separation, d);
+        ck_assert_msg(separation >= d - less, "pose %d: found %.12g, distance %.12g", i, separation, d);
+        exact += fabs(separation - d) < 1e-10;
         within += d < limit;
     }
     ck_assert_int_gt(within, 3);
     ck_assert_int_gt(2 * exact, within);
-    free(b.pool);
+    free(b.shape_data);
     sadmm_mesh_destroy(mesh);
 }
 END_TEST
@@ -201,7 +204,7 @@ END_TEST
 /* A closed convex mesh is its hull: touching, apart and in each other. */
 START_TEST(a_convex_mesh_is_its_hull)
 {
-    struct beside b = {.pool = test_pool_new()};
+    struct beside b = {.shape_data = test_shape_data_new()};
     struct random r = {77 + (uint64_t)_i};
     struct test_hull convex;
     uint64_t seed = 5 + (uint64_t)_i;
@@ -214,30 +217,30 @@ START_TEST(a_convex_mesh_is_its_hull)
             soup_triangle(s, convex.corner[f][0], convex.corner[f][k], convex.corner[f][k + 1]);
     sadmm_mesh *mesh = soup_mesh(s);
     ck_assert_int_eq(sadmm_mesh_open_edges(mesh), 0);
-    const struct sadmm_geometry hull = test_pool_add(b.pool, &convex);
+    const struct sadmm_geometry hull = test_shape_data_add(b.shape_data, &convex);
     take_mesh(&b, mesh);
     take_shape(&b, _i % SHAPES, 1);
     const double thin = geometry_thickness(&b.shape);
     const double back[3] = {-mesh->middle[0], -mesh->middle[1], -mesh->middle[2]};
     for (int i = 0; i < fewer(100); ++i) {
-        static const double gaps[] = {-1e-3, -1e-5, -1e-8, 1e-8, 1e-5, 1e-3, 0.015};
+        static const double separations[] = {-1e-3, -1e-5, -1e-8, 1e-8, 1e-5, 1e-3, 0.015};
         struct manifold m;
         int points;
         place_over(&b, &r, 0.05);
         /* as far apart as wanted: along the normal of the nearest points, twice, since that turns a little */
         for (int again = 0; again < 6; ++again) {
             const struct pair_pose pose = pair_pose(false, b.R, b.x, unturned, back);
-            pair_manifold(&b.shape, &hull, b.pool->numbers, 0, &pose, SADMM_REAL_MAX, 0, &m);
+            pair_manifold(&b.shape, &hull, b.shape_data->numbers, 0, &pose, SADMM_REAL_MAX, 0, &m);
             ck_assert_int_gt(m.count, 0);
             double at = HUGE_VAL;
             for (int k = 0; k < m.count; ++k) at = fmin(at, m.points[k].separation);
-            v3_store(v3_madd(v3_load(b.x), at - gaps[i % 7], m.normal), b.x);
+            v3_store(v3_madd(v3_load(b.x), at - separations[i % 7], m.normal), b.x);
         }
         const struct pair_pose pose = pair_pose(false, b.R, b.x, unturned, back);
-        pair_manifold(&b.shape, &hull, b.pool->numbers, 0, &pose, limit, 0, &m);
+        pair_manifold(&b.shape, &hull, b.shape_data->numbers, 0, &pose, limit, 0, &m);
         double expected = HUGE_VAL;
         for (int k = 0; k < m.count; ++k) expected = fmin(expected, m.points[k].separation);
-        const double found = least_gap(&b, limit, NULL, &points);
+        const double found = smallest_separation(&b, limit, NULL, &points);
         /* both prefer faces within 8 degrees by 5 % of the depth and 0.5 % of the thickness (manifold_hull.h), of which
          * a triangle may have another choice */
         const double most = 0.06 * fabs(expected) + 0.006 * thin;
@@ -245,17 +248,17 @@ START_TEST(a_convex_mesh_is_its_hull)
                       expected);
     }
     free(s);
-    free(b.pool);
+    free(b.shape_data);
     sadmm_mesh_destroy(mesh);
 }
 END_TEST
 
-/* Along a path over the surface the least gap changes no faster than the shape moves, but for what the memory of an
- * axis may keep, 10 % of the depth and 0.5 % of the thickness (manifold.h), and a little for clipping. */
+/* Along a path over the surface the least separation changes no faster than the shape moves, but for what the memory of
+ * an axis may keep, 10 % of the depth and 0.5 % of the thickness (manifold.h), and a little for clipping. */
 START_TEST(nothing_jumps_along_a_path)
 {
     sadmm_mesh *mesh = soup_some_mesh(_i / SHAPES);
-    struct beside b = {.pool = test_pool_new()};
+    struct beside b = {.shape_data = test_shape_data_new()};
     struct random r = {5000 + (uint64_t)_i};
     take_mesh(&b, mesh);
     take_shape(&b, _i % SHAPES, 1);
@@ -277,19 +280,20 @@ START_TEST(nothing_jumps_along_a_path)
             multiply(turn_by, b.R, turned);
             memcpy(b.R, turned, sizeof b.R);
             for (int k = 0; k < 3; ++k) b.x[k] += way[k];
-            const double gap = least_gap(&b, limit, memory, &points), moved = t_norm(way) + angle * reach;
-            if (gap < -0.1 * thin) break; /* beyond what is shallow, the nearest way out may be another one */
-            if (gap < HUGE_VAL && last < HUGE_VAL)
-                ck_assert_msg(fabs(gap - last) <= 1.01 * moved + 0.12 * fmax(0, -gap) + 0.006 * thin,
-                              "path %d, step %d: from %g to %g, moved by %g", path, i, last, gap, moved);
-            else if (gap < HUGE_VAL || last < HUGE_VAL) /* comes or goes at the limit */
-                ck_assert_msg(fmin(gap, last) >= limit - 1.01 * moved - 1e-9 || i == 0,
-                              "path %d, step %d: from %g to %g, limit %g", path, i, last, gap, limit);
-            last = gap;
+            const double separation = smallest_separation(&b, limit, memory, &points),
+                         moved = t_norm(way) + angle * reach;
+            if (separation < -0.1 * thin) break; /* beyond what is shallow, the nearest way out may be another one */
+            if (separation < HUGE_VAL && last < HUGE_VAL)
+                ck_assert_msg(fabs(separation - last) <= 1.01 * moved + 0.12 * fmax(0, -separation) + 0.006 * thin,
+                              "path %d, step %d: from %g to %g, moved by %g", path, i, last, separation, moved);
+            else if (separation < HUGE_VAL || last < HUGE_VAL) /* comes or goes at the limit */
+                ck_assert_msg(fmin(separation, last) >= limit - 1.01 * moved - 1e-9 || i == 0,
+                              "path %d, step %d: from %g to %g, limit %g", path, i, last, separation, limit);
+            last = separation;
         }
     }
     free(memory);
-    free(b.pool);
+    free(b.shape_data);
     sadmm_mesh_destroy(mesh);
 }
 END_TEST

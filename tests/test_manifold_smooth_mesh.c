@@ -20,20 +20,20 @@ static struct beside *new_beside(sadmm_mesh *mesh)
     static const double unturned[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     struct beside *b = calloc(1, sizeof *b);
     ck_assert_ptr_nonnull(b);
-    b->t.pool = test_pool_new();
+    b->t.shape_data = test_shape_data_new();
     memcpy(b->t.R[1], unturned, sizeof unturned);
-    b->surface = (struct sadmm_geometry){.type = SADMM_SHAPE_MESH, .hull = (uint32_t)b->t.pool->used};
+    b->surface = (struct sadmm_geometry){.type = SADMM_SHAPE_MESH, .hull = (uint32_t)b->t.shape_data->used};
     memcpy(b->surface.size, mesh->half, sizeof mesh->half);
-    ck_assert_uint_le(b->t.pool->used + mesh->doubles, TEST_POOL);
-    memcpy(b->t.pool->numbers + b->t.pool->used, mesh->block, mesh->doubles * sizeof *mesh->block);
-    mesh_at(b->t.pool->numbers, b->surface.hull, &b->mesh);
-    b->t.pool->used += mesh->doubles;
+    ck_assert_uint_le(b->t.shape_data->used + mesh->doubles, TEST_SHAPE_DATA);
+    memcpy(b->t.shape_data->numbers + b->t.shape_data->used, mesh->block, mesh->doubles * sizeof *mesh->block);
+    mesh_at(b->t.shape_data->numbers, b->surface.hull, &b->mesh);
+    b->t.shape_data->used += mesh->doubles;
     return b;
 }
 
 static void free_beside(struct beside *b)
 {
-    free(b->t.pool);
+    free(b->t.shape_data);
     free(b);
 }
 
@@ -46,7 +46,7 @@ static void take_shape(struct beside *b, int kind, double scale)
     } shapes[SHAPES] = {{SADMM_SHAPE_CYLINDER, {0.15, 0.1, 0}}, {SADMM_SHAPE_CYLINDER, {0.2, 0.01, 0}},
                         {SADMM_SHAPE_CYLINDER, {0.04, 0.25, 0}}, {SADMM_SHAPE_CONE, {0.15, 0.12, 0}},
                         {SADMM_SHAPE_CONE, {0.03, 0.2, 0}}, {SADMM_SHAPE_ELLIPSOID, {0.2, 0.1, 0.13}}};
-    b->t.g[0] = (struct sadmm_geometry){.type = shapes[kind].type, .children = 1};
+    b->t.g[0] = (struct sadmm_geometry){.type = shapes[kind].type, .subshapes = 1};
     for (int k = 0; k < 3; ++k) b->t.g[0].size[k] = scale * shapes[kind].size[k];
 }
 
@@ -57,7 +57,7 @@ static struct manifold touch_triangle(const struct beside *b, int32_t triangle, 
     memset(&m, 0x55, sizeof m);
     m.count = 0;
     m.cache = 0;
-    triangle_manifold(&b->t.g[0], &b->surface, b->t.pool->numbers, (uint32_t)triangle, &pose, limit, cache, &m);
+    triangle_manifold(&b->t.g[0], &b->surface, b->t.shape_data->numbers, (uint32_t)triangle, &pose, limit, cache, &m);
     ck_assert_int_ge(m.count, 0);
     ck_assert_int_le(m.count, SADMM_MANIFOLD_POINTS);
     return m;
@@ -72,7 +72,7 @@ static struct manifold nearest_on_triangle(const struct beside *b, int32_t trian
     struct manifold m;
     uint32_t found;
     memset(&m, 0, sizeof m);
-    convex_triangle_make(&b->t.g[0], &b->surface, b->t.pool->numbers, (uint32_t)triangle, &pose, &p);
+    convex_triangle_make(&b->t.g[0], &b->surface, b->t.shape_data->numbers, (uint32_t)triangle, &pose, &p);
     ck_assert(convex_search(&p.pair, p.front.n, false, SADMM_REAL_MAX, &axis, &found));
     m.normal = axis.n;
     hull_add_nearest(p.pair.thin, axis.pa, axis.pb, polytope_feature(FEATURE_NEAREST, 0, 0), &m);
@@ -122,8 +122,8 @@ static double distance_of(struct beside *b, bool *at_end)
     return least;
 }
 
-/* The least gap of all points, HUGE_VAL: none. memory: by triangle, NULL: none. */
-static double least_gap(const struct beside *b, double limit, uint32_t *memory, int *points)
+/* The least separation of all points, HUGE_VAL: none. memory: by triangle, NULL: none. */
+static double smallest_separation(const struct beside *b, double limit, uint32_t *memory, int *points)
 {
     double least = HUGE_VAL;
     *points = 0;
@@ -163,13 +163,14 @@ START_TEST(the_nearest_point_is_found)
         bool at_end = false;
         const double d = distance_of(b, &at_end);
         if (d < 0 || at_end) continue; /* or it cuts the surface elsewhere */
-        const double gap = least_gap(b, limit, NULL, &points);
-        /* What is beside a side may count as on it, where the gap is wrong by 1e-5 of the thickness (FACING_GAP); the
-         * nearest points are not added to others as near to 1e-4 of it (MANIFOLD_FLAT). */
+        const double separation = smallest_separation(b, limit, NULL, &points);
+        /* What is beside a side may count as on it, where the separation is wrong by 1e-5 of the thickness
+         * (CLIP_SEPARATION); the nearest points are not added to others as near to 1e-4 of it (MANIFOLD_FLAT). */
         const double less = 1e-5 * thin + 1e-10, more = 1.1e-4 * thin + 1e-10;
-        if (d < limit - more) ck_assert_msg(gap <= d + more, "pose %d: found %.12g, distance %.12g", i, gap, d);
-        ck_assert_msg(gap >= d - less, "pose %d: found %.12g, distance %.12g", i, gap, d);
-        exact += fabs(gap - d) < 1e-10;
+        if (d < limit - more)
+            ck_assert_msg(separation <= d + more, "pose %d: found %.12g, distance %.12g", i, separation, d);
+        ck_assert_msg(separation >= d - less, "pose %d: found %.12g, distance %.12g", i, separation, d);
+        exact += fabs(separation - d) < 1e-10;
         within += d < limit;
     }
     ck_assert_int_gt(within, 3);
@@ -179,8 +180,8 @@ START_TEST(the_nearest_point_is_found)
 }
 END_TEST
 
-/* Along a path over the surface the least gap changes no faster than the shape moves, but for what the memory of an
- * axis may keep, 10 % of the depth and 0.5 % of the thickness (manifold.h), and a little for clipping. */
+/* Along a path over the surface the least separation changes no faster than the shape moves, but for what the memory of
+ * an axis may keep, 10 % of the depth and 0.5 % of the thickness (manifold.h), and a little for clipping. */
 START_TEST(nothing_jumps_along_a_path)
 {
     sadmm_mesh *mesh = soup_some_mesh(_i / SHAPES);
@@ -206,15 +207,16 @@ START_TEST(nothing_jumps_along_a_path)
             multiply(turn_by, b->t.R[0], turned);
             memcpy(b->t.R[0], turned, sizeof turned);
             for (int k = 0; k < 3; ++k) b->t.x[0][k] += way[k];
-            const double gap = least_gap(b, limit, memory, &points), moved = t_norm(way) + angle * reach;
-            if (gap < -MESH_SHALLOW * thin) break; /* deeper, the nearest way out may be another one */
-            if (gap < HUGE_VAL && last < HUGE_VAL)
-                ck_assert_msg(fabs(gap - last) <= 1.01 * moved + 0.12 * fmax(0, -gap) + 0.006 * thin,
-                              "path %d, step %d: from %g to %g, moved by %g", path, i, last, gap, moved);
-            else if (gap < HUGE_VAL || last < HUGE_VAL) /* comes or goes at the limit */
-                ck_assert_msg(fmin(gap, last) >= limit - 1.01 * moved - 1e-9 || i == 0,
-                              "path %d, step %d: from %g to %g, limit %g", path, i, last, gap, limit);
-            last = gap;
+            const double separation = smallest_separation(b, limit, memory, &points),
+                         moved = t_norm(way) + angle * reach;
+            if (separation < -MESH_SHALLOW * thin) break; /* deeper, the nearest way out may be another one */
+            if (separation < HUGE_VAL && last < HUGE_VAL)
+                ck_assert_msg(fabs(separation - last) <= 1.01 * moved + 0.12 * fmax(0, -separation) + 0.006 * thin,
+                              "path %d, step %d: from %g to %g, moved by %g", path, i, last, separation, moved);
+            else if (separation < HUGE_VAL || last < HUGE_VAL) /* comes or goes at the limit */
+                ck_assert_msg(fmin(separation, last) >= limit - 1.01 * moved - 1e-9 || i == 0,
+                              "path %d, step %d: from %g to %g, limit %g", path, i, last, separation, limit);
+            last = separation;
             ++steps;
         }
     }
@@ -240,16 +242,16 @@ START_TEST(a_convex_mesh_is_its_hull)
             soup_triangle(s, convex.corner[f][0], convex.corner[f][k], convex.corner[f][k + 1]);
     sadmm_mesh *mesh = soup_mesh(s);
     struct beside *b = new_beside(mesh);
-    struct pair_of u = {.pool = b->t.pool};
+    struct pair_of u = {.shape_data = b->t.shape_data};
     take_shape(b, _i % SHAPES, 1);
     u.h[0] = convex;
-    u.g[0] = test_pool_add(u.pool, &convex);
+    u.g[0] = test_shape_data_add(u.shape_data, &convex);
     u.g[1] = b->t.g[0];
     memcpy(u.R[0], b->t.R[1], sizeof u.R[0]);
     for (int k = 0; k < 3; ++k) u.x[0][k] = -mesh->middle[k];
     const double thin = geometry_thickness(&b->t.g[0]);
     for (int i = 0; i < fewer(100); ++i) {
-        static const double gaps[] = {-1e-3, -1e-5, -1e-8, 1e-8, 1e-5, 1e-3, 0.015};
+        static const double separations[] = {-1e-3, -1e-5, -1e-8, 1e-8, 1e-5, 1e-3, 0.015};
         struct manifold m;
         int points;
         place_over(b, &r, 0.05);
@@ -264,10 +266,10 @@ START_TEST(a_convex_mesh_is_its_hull)
             expected = HUGE_VAL;
             for (int k = 0; k < m.count; ++k) expected = fmin(expected, m.points[k].separation);
             if (again < 5)
-                for (int k = 0; k < 3; ++k) u.x[1][k] -= (expected - gaps[i % 7]) * n[k];
+                for (int k = 0; k < 3; ++k) u.x[1][k] -= (expected - separations[i % 7]) * n[k];
         }
         memcpy(b->t.x[0], u.x[1], sizeof u.x[1]);
-        const double found = least_gap(b, limit, NULL, &points);
+        const double found = smallest_separation(b, limit, NULL, &points);
         /* what is kept, or preferred, while they overlap may be deeper by 10 % and 0.5 % of the thickness
          * (manifold.h) */
         const double most = MANIFOLD_KEEP_DEPTH * fabs(expected) + 0.006 * thin;
@@ -296,11 +298,11 @@ static bool has_like(const struct manifold *m, int count, const struct manifold_
 START_TEST(flat_ground_is_a_plane)
 {
     static const double tilts[] = {0, 1e-14, 1e-10, 1e-7, 1e-5, 1e-3, 0.02, 0.1, 0.3},
-                        gaps[] = {-2e-4, -1e-6, -1e-13, 0, 1e-13, 1e-6, 1e-3};
+                        separations[] = {-2e-4, -1e-6, -1e-13, 0, 1e-13, 1e-6, 1e-3};
     sadmm_mesh *mesh = soup_some_mesh(3);
     struct beside *b = new_beside(mesh);
     struct random r = {900 + (uint64_t)_i};
-    const struct sadmm_geometry plane = {.type = SADMM_SHAPE_PLANE, .children = 1};
+    const struct sadmm_geometry plane = {.type = SADMM_SHAPE_PLANE, .subshapes = 1};
     enum { MOST = 128 };
     ck_assert_int_le(b->mesh.triangles, MOST);
     for (int i = 0; i < fewer(600); ++i) {
@@ -316,12 +318,13 @@ START_TEST(flat_ground_is_a_plane)
         rotation(tilt, sin(3 * about), cos(3 * about), 0, tilts[i / 2 % 9]);
         multiply(tilt, b->t.R[0], turn);
         memcpy(b->t.R[0], turn, sizeof turn);
-        const double gap = gaps[(int)(7 * random_unit(&r))], low = own_support(&b->t, 0, down);
+        const double separation = separations[(int)(7 * random_unit(&r))], low = own_support(&b->t, 0, down);
         /* now and then over the middle of a line or a corner of the mesh */
         for (int k = 0; k < 2; ++k) b->t.x[0][k] = random_in(&r, -0.8, 0.8);
         if (i % 7 == 0) v3_store(mesh_vertex(&b->mesh, 40), b->t.x[0]);
-        b->t.x[0][2] = low + gap;
-        const double radius = geometry_radius(&b->t.g[0]), thin = geometry_thickness(&b->t.g[0]), limit = gap + 0.004;
+        b->t.x[0][2] = low + separation;
+        const double radius = geometry_radius(&b->t.g[0]), thin = geometry_thickness(&b->t.g[0]),
+                     limit = separation + 0.004;
         double least = HUGE_VAL;
         int points = 0;
         for (int32_t k = 0; k < b->mesh.triangles; ++k) {
@@ -339,14 +342,15 @@ START_TEST(flat_ground_is_a_plane)
             }
         }
         /* the deepest point is there, but for one that is as deep */
-        ck_assert_msg(fabs(least - gap) <= MANIFOLD_FLAT * thin + 1e-12 * radius, "pose %d: %g for %g", i, least, gap);
+        ck_assert_msg(fabs(least - separation) <= MANIFOLD_FLAT * thin + 1e-12 * radius, "pose %d: %g for %g", i, least,
+                      separation);
         if (lies && b->t.g[0].type != SADMM_SHAPE_ELLIPSOID) {
             if (tilts[i / 2 % 9] < 1e-4) ck_assert_msg(points >= 2, "pose %d: %d points", i, points);
             continue;
         }
         struct pair_pose pose = pair_pose(true, b->t.R[1], b->t.x[1], b->t.R[0], b->t.x[0]);
         memset(&on_plane, 0, sizeof on_plane);
-        pair_manifold(&plane, &b->t.g[0], b->t.pool->numbers, 0, &pose, limit, 0, &on_plane);
+        pair_manifold(&plane, &b->t.g[0], b->t.shape_data->numbers, 0, &pose, limit, 0, &on_plane);
         if (tilts[i / 2 % 9] > 0.13) continue; /* on a rim: the plane has the lowest point of the upper cap as well */
         for (int k = 0; k < on_plane.count; ++k) {
             struct manifold_point p = on_plane.points[k];
@@ -355,7 +359,7 @@ START_TEST(flat_ground_is_a_plane)
             to_world(b->t.R[0], own, world);
             for (int q = 0; q < 3; ++q) world[q] += b->t.x[0][q];
             p.position = v3_load(world);
-            ck_assert_msg(has_like(m, b->mesh.triangles, &p, 1e-9), "pose %d: no %g %g %g, gap %g", i, world[0],
+            ck_assert_msg(has_like(m, b->mesh.triangles, &p, 1e-9), "pose %d: no %g %g %g, separation %g", i, world[0],
                           world[1], world[2], p.separation);
         }
     }

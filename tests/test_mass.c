@@ -141,13 +141,13 @@ START_TEST(needles_and_cards)
 }
 END_TEST
 
-static sadmm_mass round_mass(const struct cloud *c, double rounding)
+static sadmm_mass round_mass(const struct cloud *c, double convex_radius)
 {
     sadmm_hull *hull = NULL;
     sadmm_mass mass;
-    EXPECT_OK(try_round_hull(c, 1e-6, rounding, &hull));
+    EXPECT_OK(try_round_hull(c, 1e-6, convex_radius, &hull));
     EXPECT_OK(sadmm_hull_mass(hull, 1, &mass));
-    ck_assert_double_eq(sadmm_hull_rounding(hull), rounding);
+    ck_assert_double_eq(sadmm_hull_convex_radius(hull), convex_radius);
     sadmm_hull_destroy(hull);
     expect_accepted(&mass);
     return mass;

@@ -37,7 +37,7 @@ static void make_dense(struct dense_problem *p, int contacts, int rows, int free
         }
         p->lambda[i] = 0;
     }
-    /* u at no impulse: that of a motion, and so that gaps close by it: there are solutions. */
+    /* u at no impulse: that of a motion, and so that separations close by it: there are solutions. */
     for (int i = 0; i < n; ++i) p->u[i] = 0;
     for (int k = 0; k < freedoms; ++k) {
         const double motion = uniform(&random);

@@ -319,7 +319,7 @@ static void on_steps(void)
     REFUSES("world", sadmm_world_contacts(NULL, 0, 1, &contact));
     ck_assert_int_gt(sadmm_world_contact_count(world), 0);
     REFUSES("contacts", sadmm_world_contacts(world, 0, 1, NULL));
-    REFUSES("world", sadmm_world_contact_errors(NULL, 0, 1, &contact.gap));
+    REFUSES("world", sadmm_world_contact_errors(NULL, 0, 1, &contact.separation));
     REFUSES("errors", sadmm_world_contact_errors(world, 0, 1, NULL));
     REFUSES("world", sadmm_world_state_hash(NULL, &hash));
     REFUSES("hash", sadmm_world_state_hash(world, NULL));
@@ -405,7 +405,7 @@ static void on_hulls(void)
     ck_assert_int_eq(sadmm_hull_edge_count(NULL), 0);
     ck_assert_int_eq(sadmm_hull_face_count(NULL), 0);
     ck_assert_ptr_null(sadmm_hull_vertices(NULL));
-    ck_assert_double_eq(sadmm_hull_rounding(NULL), 0);
+    ck_assert_double_eq(sadmm_hull_convex_radius(NULL), 0);
     ck_assert_double_eq(sadmm_hull_merge(NULL), 0);
     REFUSES("hull", sadmm_hull_face_at(NULL, 0, &face));
     REFUSES("hull", sadmm_hull_mass(NULL, 1, &mass));
@@ -531,7 +531,7 @@ static const struct {
       P(get_solution), P(set_solution), P(certify)}},
     {on_hulls,
      {"sadmm_hull_create", "sadmm_hull_destroy", "sadmm_hull_vertex_count", "sadmm_hull_edge_count",
-      "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_rounding", "sadmm_hull_merge",
+      "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_convex_radius", "sadmm_hull_merge",
       "sadmm_hull_face_at", "sadmm_hull_mass"}},
     {on_meshes,
      {"sadmm_mesh_create", "sadmm_heightfield_create", "sadmm_mesh_destroy", "sadmm_mesh_triangle_count",

@@ -256,7 +256,7 @@ static int brute_force(sadmm_world *world, const sadmm_ray *ray, sadmm_ray_hit *
         MUST(world, sadmm_world_shape_at(world, i, &id));
         const struct sadmm_shape *shape = &world->shapes[id.slot - 1];
         const struct sadmm_rigid *rigid = &world->bodies[shape->body].rigid;
-        struct sadmm_placed p = {.geometry = world->geometries[shape->geometry], .blocks = world->block_pool.blocks};
+        struct sadmm_placed p = {.geometry = world->geometries[shape->geometry], .blocks = world->shape_data.blocks};
         struct sadmm_ray_find find;
         placed_pose(shape->position, shape->orientation, rigid->position, rigid->orientation, &p);
         if (!sadmm_ray_cast(&line, &p, line.length, &find)) continue;

@@ -32,7 +32,7 @@ static void at(const struct sadmm_ray_line *ray, double t, double x[3])
 /* Shape 0 of a pair. */
 static struct sadmm_placed placed_of(const struct pair_of *t)
 {
-    struct sadmm_placed p = {.geometry = t->g[0], .blocks = t->pool->numbers};
+    struct sadmm_placed p = {.geometry = t->g[0], .blocks = t->shape_data->numbers};
     memcpy(p.R, t->R[0], sizeof p.R);
     memcpy(p.x, t->x[0], sizeof p.x);
     return p;
@@ -131,7 +131,7 @@ START_TEST(enters_solids)
     struct random r = {(uint64_t)_i * 7919 + 11};
     struct tally tally = {0, 0, 0};
     for (int n = 0; n < shapes; ++n) {
-        struct pair_of t = {.pool = test_pool_new()};
+        struct pair_of t = {.shape_data = test_shape_data_new()};
         const double scale = pow(10, random_in(&r, -3, 3));
         random_shape_of(&r, &t, 0, type, scale);
         if (n % 4 == 3 && type != SADMM_SHAPE_HULL) t.g[0].size[n / 4 % geometry_sizes(type)] *= 1e-3; /* a needle */
@@ -157,7 +157,7 @@ START_TEST(enters_solids)
             t_sub(from, to, d);
             check_ray(&t, &line, t_norm(d), &tally);
         }
-        free(t.pool);
+        free(t.shape_data);
     }
     ck_assert_int_gt(tally.hits, 15 * shapes);
     ck_assert_int_gt(tally.misses, shapes);

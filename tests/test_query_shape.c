@@ -78,13 +78,13 @@ static int32_t brute_force(sadmm_world *world, const struct sadmm_placed *shape,
     int32_t count = 0;
     for (uint32_t slot = 0; slot < world->shape_slots; ++slot) {
         struct sadmm_placed other;
-        struct sadmm_gap gap;
+        struct sadmm_separation separation;
         struct sadmm_box3 own;
         if (!world->shapes[slot].alive) continue;
         sadmm_world_place_shape(world, slot, &other);
         if (shape) {
-            ck_assert(sadmm_closest(shape, &other, HUGE_VAL, &gap));
-            if (gap.distance > 0) continue;
+            ck_assert(sadmm_closest(shape, &other, HUGE_VAL, &separation));
+            if (separation.distance > 0) continue;
         } else if (other.geometry.type == SADMM_SHAPE_PLANE) {
             if (box->lo[2] > other.x[2]) continue; /* it is level */
         } else {

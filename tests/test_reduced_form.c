@@ -242,10 +242,10 @@ START_TEST(literal_invariants)
                                         small * (gain + compliance * stiffest) + 1e-14 * fabs(compliance * e[i]));
             }
             if (constraint->cone) {
-                double gap = z[0] + e[0], tangent = 0, slip = 0, dot = 0;
+                double separation = z[0] + e[0], tangent = 0, slip = 0, dot = 0;
                 ck_assert(l[0] >= 0);
-                ck_assert_double_ge(gap, -small);
-                ck_assert_double_le(l[0] * gap, small * (l[0] + stiffest));
+                ck_assert_double_ge(separation, -small);
+                ck_assert_double_le(l[0] * separation, small * (l[0] + stiffest));
                 if (constraint->rows == 1) continue;
                 for (int i = 1; i < 3; ++i) {
                     double x = z[i] + e[i];

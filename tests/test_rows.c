@@ -213,7 +213,7 @@ START_TEST(other_islands_keep_every_bit)
                     if (i == JOINED || i == JOINED + 1) moved = moved || !same;
                     else ck_assert_msg(same, "method %d, warm %d, %d threads: body %d", m, warm, threads, i);
                 }
-                ck_assert(moved); /* the block is felt */
+                ck_assert(moved); /* the block acts */
                 for (size_t k = 0; k < without->contacts.pair_count; ++k) {
                     const struct sadmm_contact_pair *pair = &without->contacts.pairs[k];
                     if (pair->body_b == JOINED || pair->body_b == JOINED + 1) continue;

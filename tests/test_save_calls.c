@@ -73,7 +73,7 @@ static sadmm_hull *make_hull(struct draw *d)
     sadmm_hull_def def = sadmm_hull_def_default();
     sadmm_hull *hull;
     def.points = corners[0], def.point_count = (size_t)(5 + below(d, 2));
-    def.rounding = below(d, 2) ? 0.02 : 0;
+    def.convex_radius = below(d, 2) ? 0.02 : 0;
     sadmm_test_fail_allocations_after(-1); /* that is for worlds */
     return sadmm_hull_create(&def, &hull) == SADMM_OK ? hull : NULL;
 }

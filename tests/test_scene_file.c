@@ -185,7 +185,7 @@ static void add_hulls(sadmm_world *world, sadmm_body_id body, uint64_t *state)
         sadmm_shape_def shape = sadmm_shape_def_default();
         sadmm_hull *hull;
         def.merge = k ? 1e-2 : 0;
-        def.rounding = k ? 0 : 0.03;
+        def.convex_radius = k ? 0 : 0.03;
         const sadmm_status status = sadmm_hull_create(&def, &hull);
         if (status == SADMM_ERROR_UNAVAILABLE) return;
         ck_assert_int_eq(status, SADMM_OK);

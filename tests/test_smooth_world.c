@@ -142,7 +142,7 @@ START_TEST(standing_still)
                     egg = shape_of(SADMM_SHAPE_ELLIPSOID, 0.4, 0.3, 0.2);
     const double corners[24] = {-.2, -.2, -.1, .2, -.2, -.1, -.2, .2, -.1, .2, .2, -.1,
                                 -.2, -.2, .1,  .2, -.2, .1,  -.2, .2, .1,  .2, .2, .1};
-    const sadmm_hull_def points = {.points = corners, .point_count = 8, .rounding = 0.05};
+    const sadmm_hull_def points = {.points = corners, .point_count = 8, .convex_radius = 0.05};
     sadmm_body_id ids[6];
     double position[6][3], start[6][3];
     sadmm_mass mass;
@@ -265,8 +265,8 @@ START_TEST(an_ellipsoid_rocks)
 }
 END_TEST
 
-/* Shapes that need no more than the pool's first blocks come and go with hulls, and without. */
-START_TEST(the_pool_stays_as_long_as_it_is_needed)
+/* Shapes that need only the first blocks of the shape data come and go with hulls, and without. */
+START_TEST(shape_data_stays_as_long_as_it_is_needed)
 {
     sadmm_world *world = make_world(0.005, 0, BOX);
     const sadmm_shape_def shape = shape_of(SADMM_SHAPE_CYLINDER, 0.2, 0.3, 0);
@@ -336,7 +336,7 @@ int main(void)
     tcase_add_loop_test(cases, a_tilted_cone, 0, 2 * GROUNDS);
     tcase_add_loop_test(cases, a_cone_rolls_around_its_apex, 0, GROUNDS);
     tcase_add_loop_test(cases, an_ellipsoid_rocks, 0, GROUNDS);
-    tcase_add_test(cases, the_pool_stays_as_long_as_it_is_needed);
+    tcase_add_test(cases, shape_data_stays_as_long_as_it_is_needed);
     tcase_add_test(cases, definitions);
     suite_add_tcase(suite, cases);
     return run_suite(suite);

@@ -491,7 +491,7 @@ START_TEST(the_broad_phase_runs_once_a_step)
 {
     enum { BODIES = 40, SUBSTEPS = 4 };
     struct sadmm_broad_phase_kind kind = sadmm_broad_phase_sweep;
-    struct sadmm_geometry ball = {.type = SADMM_SHAPE_SPHERE, .children = 1, .size = {0.1, 0, 0}};
+    struct sadmm_geometry ball = {.type = SADMM_SHAPE_SPHERE, .subshapes = 1, .size = {0.1, 0, 0}};
     struct sadmm_shape shapes[BODIES];
     struct sadmm_collision_body bodies[BODIES];
     struct sadmm_contact_set contacts = {0};

@@ -10,7 +10,7 @@
 START_TEST(points)
 {
     static const struct {
-        double gap, push, speed, correction[2];
+        double separation, push, speed, correction[2];
         int island, body[2];
         uint32_t migrates;
     } cases[] = {
@@ -46,8 +46,9 @@ START_TEST(points)
     static const double gravity[3] = {0, 0, -20}, force[3] = {0, 0, 8}; /* 1 kg: 0.01 x 2 m/s a step by itself */
     const double at_rest = trapezoid_rest_speed(gravity, 0.5, force, 1, 0.01), rest[2] = {at_rest, at_rest};
     const double moves[2] = {0.0019, 0.0021};
-    const struct trapezoid_gap gap = {cases[_i].gap, cases[_i].speed, {arm[0], arm[1]}, cases[_i].migrates};
-    trapezoid_add_point(&touch, gap, cases[_i].push, cases[_i].correction, size, moves, rest, 0.01, 1e-5);
+    const struct trapezoid_separation separation = {cases[_i].separation, cases[_i].speed, {arm[0], arm[1]},
+                                                    cases[_i].migrates};
+    trapezoid_add_point(&touch, separation, cases[_i].push, cases[_i].correction, size, moves, rest, 0.01, 1e-5);
     ck_assert_int_eq(touch.island, cases[_i].island);
     for (int s = 0; s < 2; ++s) {
         ck_assert_int_eq(touch.body[s] & TOUCH_SUPPORTED, cases[_i].body[s]);

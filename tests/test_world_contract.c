@@ -500,7 +500,8 @@ START_TEST(settings_are_compared_by_their_members)
     BOTH(penalty_mass_factor), BOTH(penalty_offset), BOTH(penalty_ratio_limit), BOTH(penalty_update_warm),
         BOTH(warm_start), BOTH(ncp_points);
     BOTH(residual_tolerance), BOTH(certificate_tolerance), BOTH(certificate_momentum_tolerance), BOTH(check_period);
-    BOTH(measure_residuals), BOTH(certify), BOTH(recover_wrenches), BOTH(baumgarte), BOTH(slop), BOTH(correction_speed);
+    BOTH(measure_residuals), BOTH(certify), BOTH(recover_wrenches), BOTH(correction_factor), BOTH(slop),
+        BOTH(correction_speed);
     BOTH(restitution_threshold), BOTH(hits), BOTH(threads);
     ck_assert(memcmp(&a, &b, sizeof a) != 0); /* there is padding */
     ck_assert(sadmm_settings_equal(&a, &b));

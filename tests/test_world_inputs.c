@@ -131,8 +131,8 @@ static const struct bad_number bad_settings[] = {
     SETTING(penalty_ratio_limit, 0), SETTING(penalty_ratio_limit, NAN, 0.99, 1.01e6),
     SETTING(residual_tolerance, NAN, INFINITY, -1), SETTING(certificate_tolerance, NAN, INFINITY, -1),
     SETTING(certificate_momentum_tolerance, 0), SETTING(certificate_momentum_tolerance, NAN, -1),
-    SETTING(baumgarte, NAN, -0.1, 1.01), SETTING(slop, NAN, -1, 1.01), SETTING(correction_speed, NAN, -1, 1.01e3),
-    SETTING(restitution_threshold, NAN, INFINITY, -1),
+    SETTING(correction_factor, NAN, -0.1, 1.01), SETTING(slop, NAN, -1, 1.01),
+    SETTING(correction_speed, NAN, -1, 1.01e3), SETTING(restitution_threshold, NAN, INFINITY, -1),
 };
 #undef SETTING
 
@@ -217,7 +217,7 @@ START_TEST(limits_are_inclusive)
     sadmm_settings settings = sadmm_world_settings(w.world);
     settings.dt = 1;
     settings.penalty_offset = 0;
-    settings.baumgarte = settings.slop = 0;
+    settings.correction_factor = settings.slop = 0;
     MUST(w.world, sadmm_world_set_settings(w.world, &settings));
     sadmm_world_destroy(w.world);
 }

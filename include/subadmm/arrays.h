@@ -1,9 +1,8 @@
-/* World level: many numbers in one call, for learning loops, viewers and bindings of other languages.
+/* World level: states of many objects in one call, for learning loops, viewers and bindings.
  *
  * An array has a row for each body, joint or coupling, in the order of sadmm_world_body_at (joint_at, coupling_at), and
- * a fixed number of columns; all are doubles, row after row. Rows and ids: sadmm_world_body_at, and back
- * sadmm_world_body_index. Row numbers stay as they are until something is added or removed. Contacts have structs
- * (sadmm_world_contacts).
+ * a fixed number of columns; doubles, row-major. sadmm_world_body_at gives the id of a row, sadmm_world_body_index the
+ * row of an id. Rows stay the same until something is added or removed. For contacts see sadmm_world_contacts.
  *
  * Threads and errors: as world.h says.
  */
@@ -21,8 +20,8 @@ extern "C" {
 typedef enum sadmm_array {
     /* A row a body. */
     SADMM_ARRAY_BODY_STATE = 0,     /* 13 columns: position (m), orientation (w x y z), linear velocity (m/s), angular
-                                       velocity (rad/s), as in sadmm_body_state. Set: as sadmm_world_set_body_state does;
-                                       rows of static bodies that are as they were cost nothing */
+                                       velocity (rad/s), as in sadmm_body_state. Set: as sadmm_world_set_body_state;
+                                       unchanged rows of static bodies cost nothing */
     SADMM_ARRAY_BODY_WRENCH,        /* 6: external force (N) and torque (N m), world; 0 of bodies that are not dynamic.
                                        Set: as sadmm_world_set_body_wrench */
     SADMM_ARRAY_BODY_CONTACT_WRENCH, /* 6: as sadmm_world_body_contact_wrench; 0 of static bodies, and before the first
@@ -34,21 +33,22 @@ typedef enum sadmm_array {
     SADMM_ARRAY_JOINT_SPEED,        /* 6: sadmm_joint_state.speed */
     SADMM_ARRAY_JOINT_DRIVE_FORCE,  /* 6: sadmm_joint_state.drive_force */
     SADMM_ARRAY_JOINT_WRENCH,       /* 6: sadmm_joint_state.wrench_b, world */
-    SADMM_ARRAY_JOINT_TARGET_POSITION, /* 6: target_position of the drives, 0 of locked coordinates, which may only be
-                                       set to that. Set: as sadmm_world_set_joint_coordinate */
-    SADMM_ARRAY_JOINT_TARGET_SPEED, /* 6: the same of target_speed */
+    SADMM_ARRAY_JOINT_TARGET_POSITION, /* 6: target_position of the drives; 0 for locked coordinates, and must be 0
+                                          there. Set: as sadmm_world_set_joint_coordinate */
+    SADMM_ARRAY_JOINT_TARGET_SPEED, /* 6: likewise target_speed */
     /* A row a coupling. */
     SADMM_ARRAY_COUPLING_TARGET,    /* 13: target's position, orientation, velocity (linear, angular), in the units of
                                        SADMM_ARRAY_BODY_STATE. Set: as sadmm_world_set_coupling_target */
-    SADMM_ARRAY_COUPLING_FELT,      /* 6: felt_force (N), felt_torque (N m) of sadmm_coupling_state. Read only */
+    SADMM_ARRAY_COUPLING_REACTION,  /* 6: reaction_force (N), reaction_torque (N m) of sadmm_coupling_state. Read
+                                       only */
     SADMM_ARRAY_COUNT
 } sadmm_array;
 
-/* Columns of an array; 0 where `array` is none. Thread-safe. */
+/* Columns of an array; 0 for an unknown one. Thread-safe. */
 SADMM_API int32_t sadmm_array_columns(sadmm_array array);
-/* May it be set? Thread-safe. */
+/* Whether the array can be set. Thread-safe. */
 SADMM_API bool sadmm_array_is_settable(sadmm_array array);
-/* Rows of an array: the number of bodies, joints, couplings; 0 where `array` is none, and of a NULL world. */
+/* Rows of an array: the number of bodies, joints or couplings; 0 for an unknown array or a NULL world. */
 SADMM_API int32_t sadmm_world_array_rows(const sadmm_world *world, sadmm_array array);
 
 /* Rows [first, first + count) into `values` (count x columns). Errors: INVALID_ARGUMENT (array, range; values may be
@@ -61,8 +61,7 @@ SADMM_API sadmm_status sadmm_world_get_array(sadmm_world *world, sadmm_array arr
 SADMM_API sadmm_status sadmm_world_set_array(sadmm_world *world, sadmm_array array, int32_t first, int32_t count,
                                              const double *values);
 
-/* The index that sadmm_world_body_at (shape_at, joint_at, coupling_at) has the id under. They take a time that grows
- * with the number of objects. Errors: STALE_ID. */
+/* The inverse of sadmm_world_body_at (shape_at, joint_at, coupling_at). Takes linear time. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_body_index(sadmm_world *world, sadmm_body_id id, int32_t *index);
 SADMM_API sadmm_status sadmm_world_shape_index(sadmm_world *world, sadmm_shape_id id, int32_t *index);
 SADMM_API sadmm_status sadmm_world_joint_index(sadmm_world *world, sadmm_joint_id id, int32_t *index);
@@ -70,25 +69,25 @@ SADMM_API sadmm_status sadmm_world_coupling_index(sadmm_world *world, sadmm_coup
 
 /* ---- in a device's memory ------------------------------------------------------------------------------------ */
 
-/* An array where the backend has it: in the memory of a device. Not to be written to. */
+/* An array in the memory of the device. Read only. */
 typedef struct sadmm_device_array {
-    const double *values; /* of the device: row r's column k is values[r * stride + k] */
+    const double *values; /* device pointer: column k of row r is values[r * stride + k] */
     int64_t rows, columns; /* a row a dynamic body: sadmm_world_dynamic_bodies says which */
     int64_t stride;       /* doubles from row to row */
     int device;           /* its index, as in sadmm_world_def */
-    void *stream;         /* CUDA: the stream (cudaStream_t) that steps run on. The values are there for what is enqueued
-                             on it, and for everything else at once, because the call waits for steps begun */
+    void *stream;         /* CUDA: the stream (cudaStream_t) of the steps. The values are valid at once on every stream,
+                             because the call waits for steps begun */
 } sadmm_device_array;
 
-/* BODY_STATE, or BODY_CONTACT_WRENCH, of the dynamic bodies after the steps begun so far, without a copy. Valid until
- * the next call on the world that is not a read-out. Let what reads it end, or run on `stream`, before the next step.
- * Errors: INVALID_ARGUMENT (another array), UNAVAILABLE (the backend has no memory of its own; the world is not there:
- * before its first steps, after a change that is no state or wrench, worlds that the host steps; a state was set that no
- * step has taken along yet; BODY_CONTACT_WRENCH: as above), DEVICE. */
+/* BODY_STATE or BODY_CONTACT_WRENCH of the dynamic bodies after the steps begun so far, without a copy. Valid until the
+ * next call on the world that changes something. What reads it must end before the next step, or run on `stream`.
+ * Errors: INVALID_ARGUMENT (another array), UNAVAILABLE (the backend has no device memory; the world is not on the
+ * device: before its first steps, after a change other than of states or wrenches, or if the host does its steps; a
+ * state was set since the last step; BODY_CONTACT_WRENCH: as above), DEVICE. */
 SADMM_API sadmm_status sadmm_world_device_array(sadmm_world *world, sadmm_array array, sadmm_device_array *out);
-/* Of each dynamic body its index (sadmm_world_body_at), ascending, into `indices`, which has room for `capacity`; *count:
- * how many there are. Errors: INVALID_ARGUMENT (capacity less than that; indices may be NULL where it is 0, to ask for
- * *count alone). */
+/* Write the index (sadmm_world_body_at) of every dynamic body, ascending, to `indices`, which has room for `capacity`;
+ * *count: their number. Errors: INVALID_ARGUMENT (capacity less than that; indices may be NULL where it is 0, to ask
+ * for *count alone). */
 SADMM_API sadmm_status sadmm_world_dynamic_bodies(sadmm_world *world, int32_t *indices, int32_t capacity,
                                                   int32_t *count);
 

@@ -1,21 +1,21 @@
-/* World level: virtual couplings, what ties a body to a pose that the caller gives: a tracked hand, a haptic device, a
+/* World level: virtual couplings, which pull a body to a pose that the caller sets: a tracked hand, a haptic device, a
  * recorded motion.
  *
  * A coupling is a frame on a body and a target: a pose in the world with a velocity. A spring and a damper with six
- * degrees of freedom draw the frame to the target: with d from the target's origin to the frame's, phi the rotation
+ * degrees of freedom pull the frame to the target: with d from the target's origin to the frame's, phi the rotation
  * vector from the target's axes to the frame's, and v, w the velocity of the frame's origin and its angular velocity,
  * less the target's,
  *
  *     force = -linear_stiffness d - linear_damping v          torque = -angular_stiffness phi - angular_damping w
  *
- * They are part of the step's solve, implicit and together with all contacts and joints, so that any gains are stable
- * with any mass at any time step; and bounded, exactly. Method: docs/internals/algorithm.md, "Gears and couplings".
+ * They are solved implicitly together with all contacts and joints, so any gains are stable with any mass and time
+ * step; their bounds hold exactly. Method: docs/internals/algorithm.md, "Gears and couplings".
  *
- * The target's pose is that at the present time of the world; it moves on by its velocity in every (sub-)step, until
- * it is set anew. The caller feels what the target transmits, sadmm_coupling_state.felt_*. On CUDA targets go along
- * with the next step, which is not waited for.
+ * The pose of the target is that at the current time of the world; it moves with its velocity in every (sub-)step until
+ * it is set again. The reaction on the user is sadmm_coupling_state.reaction_*. On CUDA targets are sent with the next
+ * step, without waiting.
  *
- * A coupling is no joint: joints' counts and ids do not have it. Threads and errors: as world.h says. Ids are values
+ * Couplings are not joints: they have counts and ids of their own. Threads and errors: as world.h says. Ids are values
  * with a generation, as bodies' are. */
 #ifndef SUBADMM_COUPLING_H
 #define SUBADMM_COUPLING_H
@@ -40,10 +40,10 @@ typedef struct sadmm_coupling_def {
     double linear_damping;       /* N s/m, in [0, 1e15]; default 0 */
     double angular_stiffness;    /* N m/rad, in [0, 1e15]; default 0 */
     double angular_damping;      /* N m s/rad, in [0, 1e15]; default 0 */
-    double max_force;            /* N, >= 0, may be infinite: most that it gives along each axis of the target (at the
-                                    middle of the step), so at most sqrt(3) times that in all; default infinite */
+    double max_force;            /* N, >= 0, may be infinite: largest force along each axis of the target (at the
+                                    midpoint of the step), so at most sqrt(3) times that in total; default infinite */
     double max_torque;           /* N m, likewise */
-    bool enabled;                /* default true. One that is not does nothing, but its target moves on */
+    bool enabled;                /* default true. If false, no force acts, but the target moves on */
 } sadmm_coupling_def;
 
 /* The defaults named above. Thread-safe. */
@@ -62,10 +62,9 @@ SADMM_API sadmm_status sadmm_world_coupling_at(sadmm_world *world, int32_t index
 /* Read back the definition as it is now. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *def);
 
-/* The target at the present time of the world, from the next step on: position (m, world), orientation (target to
- * world, w x y z, unit within 1e-6), velocity (linear, angular, world; NULL: 0). Meant to be called before every step:
- * it takes some ten nanoseconds. Any jump is allowed. Errors: STALE_ID, INVALID_ARGUMENT (range; nothing changes),
- * DEVICE. */
+/* Set the target at the current time of the world, from the next step on: position (m, world), orientation (target to
+ * world, w x y z, unit within 1e-6), velocity (linear, angular, world; NULL: 0). May be called before every step (some
+ * ten nanoseconds). Jumps are allowed. Errors: STALE_ID, INVALID_ARGUMENT (range; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_id id,
                                                        const double position[3], const double orientation[4],
                                                        const double velocity[6] /* may be NULL */);
@@ -74,19 +73,18 @@ SADMM_API sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm
 SADMM_API sadmm_status sadmm_world_set_coupling_gains(sadmm_world *world, sadmm_coupling_id id, double linear_stiffness,
                                                       double linear_damping, double angular_stiffness,
                                                       double angular_damping);
-/* The same of max_force and max_torque. */
+/* The same for max_force and max_torque. */
 SADMM_API sadmm_status sadmm_world_set_coupling_limits(sadmm_world *world, sadmm_coupling_id id, double max_force,
                                                        double max_torque);
 /* From the next step on. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_coupling_enabled(sadmm_world *world, sadmm_coupling_id id, bool enabled);
 
-/* Errors are those of the present poses. Forces are means over the last step (with sub-steps: over all of them), at
- * the geometry of its middle: all 0 before the first one, and where the coupling did not take part. All in the world
- * frame. */
+/* Errors are at the current poses. Forces are means over the last step, all sub-steps included, at the geometry of its
+ * midpoint; 0 before the first step and where the coupling did not take part. All in the world frame. */
 typedef struct sadmm_coupling_state {
-    double felt_force[3], felt_torque[3]; /* what the user feels, the reaction to what the body gets: N, and N m about
-                                             the target's origin */
-    double body_force[3], body_torque[3]; /* on the body: N, and N m about its centre of mass */
+    double reaction_force[3], reaction_torque[3]; /* on the user, the reaction to the force on the body: N, and N m
+                                                     about the target's origin */
+    double body_force[3], body_torque[3];         /* on the body: N, and N m about its centre of mass */
     double position_error[3];    /* from the frame's origin to the target's, m */
     double rotation_error[3];    /* rotation vector that turns the frame's axes to the target's, rad, of at most pi */
 } sadmm_coupling_state;

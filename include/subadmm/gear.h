@@ -1,4 +1,4 @@
-/* World level: gears, what ties one free coordinate of a joint to one of another, exactly:
+/* World level: gears, which couple one free coordinate of a joint to one of another exactly:
  *
  *     q_1 + ratio q_2 = offset
  *
@@ -6,15 +6,14 @@
  * 0), a rack on a pinion (a translation 1, a rotation 2; ratio = -radius, m/rad), a pulley (two translations), a screw
  * (the translation and the rotation of one cylindrical joint; ratio = -pitch / 2 pi).
  *
- * A gear gives force along q_1 and ratio force along q_2, each as the joint's own laws do: between the joint's two
- * bodies. Where three of these are dynamic, one must be of both joints: the carrier of two wheels, as a hand is of two
- * fingers, or the middle one of a chain. There the gear's force acts between the outer two, as that of teeth does, and
- * the joints' own forces bear the carrier. That needs axes of which a force between the outer two can turn both: not one
- * that is common to both joints, nor two translations in the same direction; such a gear is refused, and one that comes
- * to be so rests until it is no more. (Two slides that face each other, on a hand that moves, take a wheel in between: a
- * body on a hinge, with two gears.) Angles count on beyond full turns, and errors of the
- * ratio do not add up: they are fed back as those of locked coordinates. Method: docs/internals/algorithm.md, "Gears
- * and couplings".
+ * A gear applies a force along q_1 and ratio x force along q_2, each between the two bodies of the joint, like a drive.
+ * If three of these bodies are dynamic, one must be in both joints: the carrier of two wheels, the hand of two fingers,
+ * or the middle body of a chain. The force of the gear then acts between the outer two bodies, as that of teeth does,
+ * and the joints bear the carrier. This needs axes about which a force between the outer two bodies turns both: not one
+ * common axis of both joints, nor two translations in the same direction. Such a gear is refused; if the axes become so
+ * later, the gear is inactive until they no longer are. (Two opposing slides on a moving hand need a wheel in between:
+ * a body on a hinge, with two gears.) Full turns are counted, and errors of the ratio do not accumulate: they are
+ * corrected like those of locked coordinates. Method: docs/internals/algorithm.md, "Gears and couplings".
  *
  * Threads and errors: as world.h says. Ids are values with a generation, as bodies' are. */
 #ifndef SUBADMM_GEAR_H
@@ -33,18 +32,18 @@ typedef struct sadmm_gear_def {
     int32_t coordinate_1, coordinate_2; /* free ones, in [0, 6): any translation or distance; rotations that are the
                                            only free one or one of two. No default */
     double ratio;                /* |ratio| in [1e-9, 1e9], unit of coordinate 1 over that of 2; default 1 */
-    double offset;               /* |offset| <= 1e9, unit of coordinate 1, or NaN: as it is when the gear is added, in
-                                    the same range (what is read back); default NaN */
-    bool enabled;                /* default true. One that is not does nothing, nor does one with a joint that is not */
+    double offset;               /* |offset| <= 1e9, unit of coordinate 1, or NaN: the value when the gear is added (in
+                                    the same range, and read back); default NaN */
+    bool enabled;                /* default true. Inactive if false, or if one of its joints is disabled */
 } sadmm_gear_def;
 
 /* The defaults named above. Thread-safe. */
 SADMM_API sadmm_gear_def sadmm_gear_def_default(void);
 
-/* *id: the new gear, until it, or one of its joints or their bodies, is removed. An offset that does not fit is drawn
- * in by at most settings.correction_speed of coordinate 1. Errors: STALE_ID, INVALID_ARGUMENT (range; a coordinate that
- * is not free, twice the same one, other dynamic bodies or axes than named above; nothing changes), LIMIT (2^24
- * gears), OUT_OF_MEMORY, DEVICE. */
+/* *id: the new gear, until it, or one of its joints or their bodies, is removed. An error of the offset is corrected by
+ * at most settings.correction_speed of coordinate 1. Errors: STALE_ID, INVALID_ARGUMENT (range; a coordinate that is
+ * not free, twice the same one, other dynamic bodies or axes than named above; nothing changes), LIMIT (2^24 gears),
+ * OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *def,
                                             sadmm_gear_id *id /* may be NULL */);
 /* Errors: STALE_ID, DEVICE. */
@@ -58,10 +57,10 @@ SADMM_API sadmm_status sadmm_world_gear_def(sadmm_world *world, sadmm_gear_id id
 SADMM_API sadmm_status sadmm_world_set_gear_enabled(sadmm_world *world, sadmm_gear_id id, bool enabled);
 
 typedef struct sadmm_gear_state {
-    double error;                /* q_1 + ratio q_2 - offset of the present poses, unit of coordinate 1 */
+    double error;                /* q_1 + ratio q_2 - offset at the current poses, unit of coordinate 1 */
     double force_1, force_2;     /* along the coordinates, N or N m; force_2 = ratio force_1. Mean over the last
-                                    (sub-)step; 0 before the first one and where the gear did not take part. They are
-                                    not in the joints' own wrenches */
+                                    (sub-)step; 0 before the first step and where the gear did not take part. Not
+                                    included in the wrenches of the joints */
 } sadmm_gear_state;
 
 /* Errors: STALE_ID, DEVICE. */

@@ -1,14 +1,13 @@
-/* Triangle meshes and heightfields: ground, and whatever else does not move or is moved by the caller
- * (SADMM_SHAPE_MESH, world.h).
+/* Triangle meshes and heightfields: ground, and other static or kinematic geometry (SADMM_SHAPE_MESH, world.h).
  *
  * A mesh is a surface, solid behind: a triangle's corners run counter-clockwise seen from the side where bodies are.
  * Neighbouring triangles know each other. Where bodies slide from one to the next, the edges and corners between them
  * push in no direction that the surface does not (docs/internals/contact-geometry.md, "Meshes and heightfields"), so
  * that flat ground is flat however it is divided.
  *
- * A mesh is made once and never changes. Any number of worlds and threads may use it at the same time; it lives until
- * its maker and every world with shapes of it have let go of it. Every world keeps a copy of its data beside its other
- * shapes (sadmm_mesh_bytes), and a device one more.
+ * A mesh is made once and never changes. Any number of worlds and threads may use it at the same time; it is freed when
+ * its creator and every world with shapes of it have released it. Every world has a copy of its data
+ * (sadmm_mesh_bytes), and a device another one.
  *
  * Errors are returned as a status; the message is sadmm_last_message.
  */
@@ -27,24 +26,24 @@ extern "C" {
 typedef struct sadmm_mesh sadmm_mesh;
 
 typedef struct sadmm_mesh_def {
-    const double *vertices;   /* 3 numbers each, m, in [-1e6, 1e6]; those of equal numbers are one vertex. Only read while
-                                 the mesh is made, as are the triangles. No default */
+    const double *vertices;   /* 3 numbers each, m, in [-1e6, 1e6]; equal ones are merged. Vertices and triangles are
+                                 only read while the mesh is made. No default */
     size_t vertex_count;      /* in [3, 2^26]; no default */
-    const int32_t *triangles; /* 3 vertices each, in [0, vertex_count), counter-clockwise seen from outside. Triangles
-                                 with two vertices in one place, or whose corners lie within 1e-9 of their longest edge
-                                 of a line, are left out (sadmm_mesh_left_out). No default */
+    const int32_t *triangles; /* 3 vertices each, in [0, vertex_count), counter-clockwise seen from outside. Degenerate
+                                 triangles (two equal vertices, or a height below 1e-9 of the longest edge) are left out
+                                 (sadmm_mesh_left_out). No default */
     size_t triangle_count;    /* in [1, 2^26]; no default */
 } sadmm_mesh_def;
 
-/* Nothing given yet. Thread-safe. */
+/* All zero. Thread-safe. */
 SADMM_API sadmm_mesh_def sadmm_mesh_def_default(void);
 
 /* *out: the mesh, which belongs to the caller until sadmm_mesh_destroy; NULL after an error. Thread-safe. Errors:
  * INVALID_ARGUMENT (range; no triangle is left), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_mesh_create(const sadmm_mesh_def *def, sadmm_mesh **out);
 
-/* Heights over a regular grid of the x-y plane, whose middle is the origin; bodies are above. Every cell is two
- * triangles, parted by the diagonal from its lowest x and y to its highest. */
+/* Heights over a regular grid in the x-y plane, centred at the origin; bodies are above. Every cell is two triangles,
+ * split by the diagonal from its lowest x and y to its highest. */
 typedef struct sadmm_heightfield_def {
     const double *heights;    /* m, in [-1e6, 1e6], columns x rows of them: x runs fastest. Only read while the mesh is
                                  made. No default */
@@ -53,45 +52,45 @@ typedef struct sadmm_heightfield_def {
     double spacing[2];        /* between two of them along x, and along y, m, in [1e-6, 1e6]; no default */
 } sadmm_heightfield_def;
 
-/* Nothing given yet. Thread-safe. */
+/* All zero. Thread-safe. */
 SADMM_API sadmm_heightfield_def sadmm_heightfield_def_default(void);
-/* As sadmm_mesh_create; it takes a tenth of the memory of a mesh of the same surface. The frame of a
- * SADMM_SHAPE_MESH of it is that of the grid. */
+/* As sadmm_mesh_create; takes a tenth of the memory of a mesh of the same surface. The shape's frame is that of the
+ * grid. */
 SADMM_API sadmm_status sadmm_heightfield_create(const sadmm_heightfield_def *def, sadmm_mesh **out);
 
-/* Give up the caller's hold of the mesh; NULL is fine. Worlds that have shapes of it keep it. Thread-safe, once. */
+/* Release the caller's reference; NULL is fine. Worlds with shapes of the mesh keep it. Thread-safe; call once. */
 SADMM_API void sadmm_mesh_destroy(sadmm_mesh *mesh);
 
 /* All of the following only read the mesh, and may run on any number of threads at once. Of NULL: 0. */
 
-/* Triangles that bodies meet: without those left out. */
+/* Number of triangles without those left out. */
 SADMM_API int64_t sadmm_mesh_triangle_count(const sadmm_mesh *mesh);
-/* Triangles of the definition that are none: see sadmm_mesh_def. */
+/* Degenerate triangles of the definition that were left out (sadmm_mesh_def). */
 SADMM_API int64_t sadmm_mesh_left_out(const sadmm_mesh *mesh);
-/* Edges of one triangle only, or of more than two: there the surface ends. 0 of a closed one. */
+/* Edges of one triangle only, or of more than two: boundaries of the surface. 0 for a closed surface. */
 SADMM_API int64_t sadmm_mesh_open_edges(const sadmm_mesh *mesh);
-/* Memory that a world needs for it, and a device, in bytes. */
+/* Bytes that a world, and a device, need for it. */
 SADMM_API size_t sadmm_mesh_bytes(const sadmm_mesh *mesh);
 
 /* The smallest box around it, in the frame of the vertices (or of the grid), m. Errors: INVALID_ARGUMENT (NULL). */
 SADMM_API sadmm_status sadmm_mesh_bounds(const sadmm_mesh *mesh, double lowest[3], double highest[3]);
 
-/* What the definition was, so that the same mesh can be made again, bit for bit. (Contact finding has coordinates from
- * the middle of the box around the mesh; where these do not add up to the definition's again, a mesh keeps both.) */
+/* The definition, so that the same mesh can be made again, bit for bit. (Collision detection uses coordinates relative
+ * to the middle of the bounding box; where these do not give the definition's again, a mesh keeps both.) */
 
-/* Vertices: those of the definition that triangles have, in its order, of several in one place the first; of a
- * heightfield all, row by row. Of NULL: 0. */
+/* Vertices of the definition that triangles use, in its order, the first of equal ones; of a heightfield all, row by
+ * row. 0 for NULL. */
 SADMM_API int64_t sadmm_mesh_vertex_count(const sadmm_mesh *mesh);
-/* Where a vertex is, in the frame of the definition, m; `vertex` in [0, vertex_count). Errors: INVALID_ARGUMENT (range,
- * NULL). */
+/* Position of a vertex in the frame of the definition, m; `vertex` in [0, vertex_count). Errors: INVALID_ARGUMENT
+ * (range, NULL). */
 SADMM_API sadmm_status sadmm_mesh_vertex_at(const sadmm_mesh *mesh, int64_t vertex, double position[3]);
 /* The vertices of a triangle, counter-clockwise seen from outside, and its number as contacts have it
- * (sadmm_contact.triangle); `triangle` in [0, triangle_count), in an order of the library's own. Errors:
- * INVALID_ARGUMENT (range, NULL). */
+ * (sadmm_contact.triangle); `triangle` in [0, triangle_count), in the library's order. Errors: INVALID_ARGUMENT (range,
+ * NULL). */
 SADMM_API sadmm_status sadmm_mesh_triangle_at(const sadmm_mesh *mesh, int64_t triangle, int32_t vertices[3],
                                               int32_t *number);
-/* The grid of a heightfield, as in its definition; of a mesh of triangles columns and rows are 0, and spacing 0 m.
- * Errors: INVALID_ARGUMENT (NULL). */
+/* The grid of a heightfield, as in its definition; for a triangle mesh columns, rows and spacing are 0. Errors:
+ * INVALID_ARGUMENT (NULL). */
 SADMM_API sadmm_status sadmm_mesh_grid(const sadmm_mesh *mesh, int32_t *columns, int32_t *rows, double spacing[2]);
 
 #ifdef __cplusplus

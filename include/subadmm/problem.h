@@ -7,12 +7,12 @@
  * s). A body index of -1 means the static world. lambda acts with +J_b^T on body b and with J_a^T on body a (for
  * contacts J_a = -[I, -[r_a]x]): a positive normal impulse pushes b along the normal and a against it.
  *
- * Threads: a problem is used by one thread at a time; calls that take a const one only read it, and may run on several
+ * Threads: use a problem from one thread at a time; calls that take a const problem only read, and may run on several
  * threads at once while no other call is made on it. Different problems are independent.
  *
- * Numbers of bodies and constraints must be finite and within +-1e60, which leaves room for the products of a
- * certificate; starts and solutions must be finite. Errors, of every call besides its own: INVALID_ARGUMENT where a
- * pointer is NULL that may not be.
+ * Data of bodies and constraints must be finite and within +-1e60, so that the certificate does not overflow; initial
+ * values and solutions must be finite. Errors that every call has besides its own: INVALID_ARGUMENT where a pointer is
+ * NULL that must not be.
  */
 #ifndef SUBADMM_PROBLEM_H
 #define SUBADMM_PROBLEM_H
@@ -26,17 +26,18 @@ extern "C" {
 
 typedef struct sadmm_problem sadmm_problem;
 
-/* A contact point given by geometry. Contacts of one pair of bodies that share normal and friction are
- * solved together; give them one after another for speed (the solution does not depend on it). */
+/* A contact point given by geometry. Contacts of a pair of bodies with the same normal and friction are solved
+ * together; pass them consecutively for speed (the solution does not depend on it). */
 typedef struct sadmm_problem_contact {
     int32_t body_a, body_b; /* in [-1, body count), not both -1, not equal */
     double normal[3];       /* unit vector from a to b, world frame */
     double arm_a[3];        /* contact point relative to a's centre of mass, m, world frame; ignored when a is -1 */
     double arm_b[3];        /* the same for b */
-    double error;           /* e of eq. (5) along the normal, m/s: gap/dt, or the stabilised penetration (negative) */
+    double error;           /* e of eq. (5) along the normal, m/s: separation/dt, or the stabilised penetration
+                               (negative) */
     double friction;        /* mu, in [0, 1e60] */
-    double velocity[3];     /* what a static side that moves adds to the velocity of b's point relative to a's, m/s,
-                               world frame: x of eq. (5) is J_a v_a + J_b v_b + velocity; 0 where a and b are bodies */
+    double velocity[3];     /* surface velocity of a static side that moves, m/s, world frame: x of eq. (5) is J_a v_a +
+                               J_b v_b + velocity; 0 where a and b are bodies */
 } sadmm_problem_contact;
 
 /* A constraint given by its Jacobian rows. */
@@ -111,19 +112,19 @@ SADMM_API sadmm_status sadmm_problem_get_bodies(const sadmm_problem *problem, do
 SADMM_API sadmm_status sadmm_problem_get_contact(sadmm_problem *problem, int32_t index, sadmm_problem_contact *contact);
 SADMM_API sadmm_status sadmm_problem_get_block(sadmm_problem *problem, int32_t index, sadmm_problem_block *block);
 
-/* The accelerator later solves run on where they run on one, index >= 0; default 0. What is kept on another is given
- * up. Errors: INVALID_ARGUMENT (negative; an index that the machine lacks is refused by sadmm_problem_solve). */
+/* The accelerator for later solves, index >= 0; default 0. Memory on another one is released. Errors: INVALID_ARGUMENT
+ * (negative; sadmm_problem_solve refuses an index that the machine lacks). */
 SADMM_API sadmm_status sadmm_problem_set_device(sadmm_problem *problem, int device);
 
 /* Threads of the host to work on solves (tasks.h); NULL or all zero: OpenMP's, the default. Errors: INVALID_ARGUMENT
  * (nothing changes), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_problem_set_tasks(sadmm_problem *problem, const sadmm_tasks *tasks);
 
-/* Solve. The solution replaces the initial values, so that solving again continues from there (when
- * settings->warm_start). gravity, dt (but for the unit of penalty_offset) and stabilisation are not used: they are in
- * A, b and e already. report may be NULL. Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY, NON_FINITE (the
- * solution, or the certificate that a report asks for; the problem keeps its previous values), DEVICE.
- * report->converged is false where the report's residual is not finite. */
+/* Solve. The solution replaces the initial values, so solving again continues from there (with settings->warm_start).
+ * gravity, dt (except for the unit of penalty_offset) and stabilisation are not used: A, b and e contain them. report
+ * may be NULL. Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY, NON_FINITE (the solution, or the certificate that
+ * a report asks for; the problem keeps its previous values), DEVICE. report->converged is false where the report's
+ * residual is not finite. */
 SADMM_API sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, sadmm_precision precision,
                                            const sadmm_settings *settings, sadmm_solve_report *report);
 
@@ -132,13 +133,13 @@ SADMM_API sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend
 SADMM_API sadmm_status sadmm_problem_get_solution(const sadmm_problem *problem, double *velocities, double *impulses,
                                                   double *block_lambda);
 
-/* Set (v, lambda) by hand, e.g. to certify another solver's answer. Shapes as above; NULL leaves a part alone.
+/* Set (v, lambda), e.g. to certify the result of another solver. Array shapes as above; NULL leaves a part unchanged.
  * Errors: INVALID_ARGUMENT (a number that is not finite; nothing changes). */
 SADMM_API sadmm_status sadmm_problem_set_solution(sadmm_problem *problem, const double *velocities,
                                                   const double *impulses, const double *block_lambda);
 
-/* The error of the current (v, lambda), in double from raw data; no solve. Errors: NON_FINITE where a product overflows
- * (then *certificate is unchanged), OUT_OF_MEMORY. */
+/* The error of the current (v, lambda), computed in double from the raw data, without a solve. Errors: NON_FINITE where
+ * a product overflows (then *certificate is unchanged), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_problem_certify(sadmm_problem *problem, sadmm_certificate *certificate);
 
 #ifdef __cplusplus

@@ -57,9 +57,9 @@ enum { SADMM_MOST_HITS = 64 };
  * Symbols are the paper's (Sec. III-D). "kg/s^2" values are the paper's time-scaled units; the solver works
  * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/internals/algorithm.md). */
 typedef struct sadmm_settings {
-    double dt;                   /* time step, s, in [1e-6, 1]; default 0.005. It may change from step to step.
-                                    Joints lose energy where they turn by more than 0.1 rad in one
-                                    (docs/internals/algorithm.md, "Large turns") */
+    double dt;                   /* time step, s, in [1e-6, 1]; default 0.005. It may change from step to step. Joints
+                                    that turn by more than 0.1 rad in a step lose energy (docs/internals/algorithm.md,
+                                    "Large turns") */
     int substeps;                /* of a world's step, in [1, SADMM_MOST_SUBSTEPS = 64], dt / substeps >= 1e-6 s;
                                     default 1. A step is made of so many sub-steps of dt / substeps with a share of
                                     `iterations` each, so that bodies in motion overlap less (docs/guide/choose.md).
@@ -73,11 +73,10 @@ typedef struct sadmm_settings {
                                     (docs/internals/accuracy.md). PAPER is the paper's own iteration, to compare with;
                                     it needs more iterations, below, and takes the penalty_* settings */
     int iterations;              /* iterations a step, in [1, 1000000]; sub-steps do iterations / substeps each, rounded
-                                    up; default 20: enough for FAST in a world, where a
-                                    step goes on from the one before. Bodies that meet in many places at once need more
-                                    (the step report's `limited` says so), and so does a problem that is solved once:
-                                    some 100 to 1000, or a tolerance below with a large number here.
-                                    PAPER: 100 to 300 */
+                                    up; default 20: enough for FAST in a world, where every step is warm started. Bodies
+                                    that collide in many places at once need more (the step report's `limited` says so),
+                                    and so does a problem that is solved once: some 100 to 1000, or a tolerance (below)
+                                    with a large number here. PAPER: 100 to 300 */
     double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8
                                     (docs/internals/algorithm.md, "Method fast") */
     int penalty_period;          /* PAPER, as all of penalty_*. m of eq. (15): iterations between penalty updates,
@@ -106,15 +105,15 @@ typedef struct sadmm_settings {
     double certificate_tolerance;/* stop when the natural map (m/s) is <= this and the momentum error, relative,
                                     is <= certificate_momentum_tolerance; 0 = never; default 0 */
     double certificate_momentum_tolerance; /* dimensionless, > 0; default 1e-6. In single precision rounding alone may
-                                              be a few 1e-6: ask for 1e-5 there */
+                                              be a few 1e-6: use 1e-5 there */
     int check_period; /* iterations between convergence checks (of the tolerances above), in [1, 1000000]; default 10 */
 
     bool measure_residuals;      /* report the residuals of the last iteration; default false */
     bool certify;                /* report the certificate of every step (of its last sub-step); default false */
     bool recover_wrenches;       /* compute the contact wrench of every body; default true */
 
-    double baumgarte;            /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2. Bodies
-                                    are moved by it and get no velocity that stays (docs/internals/algorithm.md,
+    double correction_factor;    /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2.
+                                    Bodies are moved by it and get no velocity that stays (docs/internals/algorithm.md,
                                     "Pushes"), but in islands with joints, and on CUDA in worlds of more than 8,192
                                     dynamic bodies or with kinematic ones */
     double slop;                 /* penetration left alone, m, in [0, 1]; default 1e-5 */
@@ -131,10 +130,10 @@ typedef struct sadmm_settings {
                                     many). In
                                     [0, SADMM_MOST_HITS = 64]; 0: all is; default 16 */
 
-    int threads;                 /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have
-                                    enough to do, no more than there are processors (0: than OMP_NUM_THREADS, where that
-                                    is set) or threads of a pool of the host's (tasks.h), and no more than the process
-                                    can make; reports say how many that were. Results do not depend on it */
+    int threads;                 /* largest number of CPU threads, in [0, 1024]; 0 = no bound; default 0. The number
+                                    used also depends on the size of the work, the number of processors (with 0:
+                                    OMP_NUM_THREADS, if set), the host's thread pool (tasks.h) and what the process can
+                                    create; reports have it. Results do not depend on it */
 } sadmm_settings;
 
 /* The defaults named above. Thread-safe. */
@@ -155,10 +154,10 @@ typedef struct sadmm_certificate {
     double momentum_max;     /* |A v - b - J^T lambda| of the worst body over the largest |b|, |A v|, |J^T lambda|
                                 of any body (infinity norms), dimensionless */
     int64_t momentum_worst;  /* index of that body among the dynamic ones; -1: none */
-    double siconos;          /* siconos' global measure for friction contact (gfc3d_compute_error), dimensionless;
-                                -1 when the problem holds soft constraints, which that measure does not know */
-    int64_t islands_above;   /* islands with an error above the settings' certificate tolerances: what a stop rule still
-                                waited for; -1: there is no certificate_tolerance */
+    double siconos;          /* Siconos' global error measure for frictional contact (gfc3d_compute_error),
+                                dimensionless; -1 if the problem has soft constraints, for which it is not defined */
+    int64_t islands_above;   /* islands with an error above the certificate tolerances of the settings; -1: there is no
+                                certificate_tolerance */
 } sadmm_certificate;
 
 #ifdef __cplusplus

@@ -15,7 +15,7 @@ static constexpr std::pair<const char *, sadmm_array> array_names[] = {
     {"joint_target_position", SADMM_ARRAY_JOINT_TARGET_POSITION},
     {"joint_target_speed", SADMM_ARRAY_JOINT_TARGET_SPEED},
     {"coupling_target", SADMM_ARRAY_COUPLING_TARGET},
-    {"coupling_felt", SADMM_ARRAY_COUPLING_FELT},
+    {"coupling_reaction", SADMM_ARRAY_COUPLING_REACTION},
 };
 
 using matrix = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
@@ -142,7 +142,7 @@ static nb::list contact_members()
     MEMBER(shape_b, "u4", 2);
     MEMBER(position, "f8", 3);
     MEMBER(normal, "f8", 3);
-    MEMBER(gap, "f8", 1);
+    MEMBER(separation, "f8", 1);
     MEMBER(friction, "f8", 1);
     MEMBER(impulse, "f8", 3);
     MEMBER(force, "f8", 3);
@@ -164,13 +164,13 @@ void bind_arrays(nb::module_ &m, nb::class_<world> &w)
           "in C order without gaps, which is returned then. Rows are bodies (World.bodies), joints or couplings.\n\n"
           "body_state (13 columns: position m, orientation w x y z, linear velocity m/s, angular velocity rad/s), body_wrench (6: N, N m),\n"
           "body_contact_wrench (6), body_inertia (4: kg, kg m^2), joint_position, joint_speed, joint_drive_force, joint_wrench,\n"
-          "joint_target_position, joint_target_speed (6 each: coordinates), coupling_target (13, as body_state), coupling_felt (6).");
+          "joint_target_position, joint_target_speed (6 each: coordinates), coupling_target (13, as body_state), coupling_reaction (6).");
     w.def("set", &set, "array"_a, "values"_a, "first"_a = 0,
           "Set rows of an array that can be set: body_state, body_wrench, body_inertia, joint_target_position, joint_target_speed,\n"
-          "coupling_target. All of them, or, where one is refused, none.");
+          "coupling_target. If a row is refused, nothing is set.");
     w.def("device_array", &device_array, "array"_a,
-          "body_state or body_contact_wrench of the dynamic bodies where the CUDA backend has them, without a copy: an object for\n"
-          "torch.from_dlpack and the like. Valid until the next step or change; not to be written to. Rows: World.dynamic_bodies().");
+          "body_state or body_contact_wrench of the dynamic bodies on the device (CUDA), without a copy: an object for\n"
+          "torch.from_dlpack and the like. Valid until the next step or change; read only. Rows: World.dynamic_bodies().");
     w.def("device_stream", [](world &w) {
         sadmm_device_array a;
         call(w, [&](sadmm_world *h) { return sadmm_world_device_array(h, SADMM_ARRAY_BODY_STATE, &a); });
@@ -190,5 +190,5 @@ void bind_arrays(nb::module_ &m, nb::class_<world> &w)
     }, "Index of each dynamic body, ascending.");
     w.def("_contacts", &contacts);
     w.def("contact_errors", &contact_errors,
-          "Natural map of each of contacts(), m/s: how far it is from its law. Unavailable where settings.certify is off.");
+          "Natural map of each of contacts(), m/s: how far it is from satisfying its law. Needs settings.certify.");
 }

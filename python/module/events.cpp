@@ -59,10 +59,10 @@ void bind_events(nb::module_ &m, nb::class_<world> &w)
     w.def("record_events", [](world &w, whole capacity) {
         const int most = capacity.as_int("capacity");
         call(w, [&](sadmm_world *h) { return sadmm_world_record_events(h, most); });
-    }, "capacity"_a = 65536, "Record from the next step on which contacts begin and end, and what sensors see; up to `capacity` events "
-                             "are kept until they are taken, and the oldest dropped. 0: no more.");
+    }, "capacity"_a = 65536, "Record the begin and end of contacts and sensor overlaps from the next step on; up to `capacity` events "
+                             "are kept until they are taken, the oldest are dropped. 0: stop.");
     w.def_prop_ro("event_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_event_count(h); }); },
-                  "Events that wait to be taken.");
+                  "Number of events that can be taken.");
     w.def("_take_events", &take);
     w.def("sensor_overlaps", [](nb::handle_t<world> self, const shape &sensor) {
         world &w = nb::cast<world &>(self);
@@ -85,12 +85,12 @@ void bind_events(nb::module_ &m, nb::class_<world> &w)
         sadmm_shape_def def;
         call(w, [&](sadmm_world *h) { return sadmm_world_shape_def(h, out.id, &def, nullptr); });
         return out;
-    }, "id"_a, "The shape that an array names by (slot, generation), as events and contacts do. StaleId: it is there no more.");
+    }, "id"_a, "The shape with the id (slot, generation) of an event or contact. StaleId: it was removed.");
     w.def("find_body", [](nb::handle_t<world> self, nb::object id) {
         world &w = nb::cast<world &>(self);
         body out{nb::borrow(self), &w, read_id<sadmm_body_id>(id)};
         int32_t index;
         call(w, [&](sadmm_world *h) { return sadmm_world_body_index(h, out.id, &index); });
         return out;
-    }, "id"_a, "The body that an array names by (slot, generation).");
+    }, "id"_a, "The body with the id (slot, generation).");
 }

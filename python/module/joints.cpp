@@ -31,7 +31,7 @@ static void bind_coordinate(nb::module_ &m)
         .def_rw("target_speed", &C::target_speed)
         .def_rw("drive_stiffness", &C::drive_stiffness)
         .def_rw("drive_damping", &C::drive_damping)
-        .def_rw("drive_force", &C::drive_force, "The most that the drive gives.")
+        .def_rw("drive_force", &C::drive_force, "Largest force of the drive.")
         .def_rw("friction", &C::friction)
         .def_rw("spring_stiffness", &C::spring_stiffness)
         .def_rw("spring_damping", &C::spring_damping)
@@ -110,7 +110,7 @@ static void bind_joint(nb::module_ &m)
         .def_prop_ro("frame_b", [](const joint &j) { const auto d = def_of(j); return std::make_pair(array_of<3>(d.position_b), array_of<4>(d.orientation_b)); })
         .def_prop_rw("enabled", [](const joint &j) { return def_of(j).enabled; },
                      [](const joint &j, bool on) { call(j.in(), [&](sadmm_world *h) { return sadmm_world_set_joint_enabled(h, j.id, on); }); })
-        .def("coordinate", [](const joint &j, whole index) { return def_of(j).coordinates[index_of(index)]; }, "index"_a, "What acts along it, as it is now.")
+        .def("coordinate", [](const joint &j, whole index) { return def_of(j).coordinates[index_of(index)]; }, "index"_a, "What acts along the coordinate.")
         .def("set_coordinate", [](const joint &j, whole index, const C &given) {
             const int k = index_of(index);
             const C value = given; // another thread may change it
@@ -126,15 +126,15 @@ static void bind_joint(nb::module_ &m)
                 if (v) def.coordinates[k].target_speed = *v;
                 return sadmm_world_set_joint_coordinate(h, j.id, k, &def.coordinates[k]);
             });
-        }, "index"_a, "position"_a = nb::none(), "speed"_a = nb::none(), "Of the coordinate's drive.")
+        }, "index"_a, "position"_a = nb::none(), "speed"_a = nb::none(), "Set the target of the coordinate's drive.")
         .def("set_spring_table", [](const joint &j, whole index, const std::vector<double> &x, const std::vector<double> &f) {
             const int k = index_of(index);
             if (x.size() != f.size()) throw nb::value_error("forces: must be as many as positions");
             call(j.in(), [&](sadmm_world *h) { return sadmm_world_set_joint_spring_table(h, j.id, k, x.data(), f.data(), (int32_t)x.size()); });
-        }, "index"_a, "positions"_a, "forces"_a, "A spring with a characteristic of its own; empty lists: none.")
+        }, "index"_a, "positions"_a, "forces"_a, "A nonlinear spring: loads at positions; empty lists: none.")
         .def("remove", [](const joint &j) { call(j.in(), [&](sadmm_world *h) { return sadmm_world_remove_joint(h, j.id); }); });
 #define OF_STATE(name, doc) .def_prop_ro(#name, [](const joint &j) { return array_of<6>(state_of(j).name); }, doc)
-    c OF_STATE(position, "Coordinates, m and rad; of locked ones what they are off by.")
+    c OF_STATE(position, "Coordinates, m and rad; of locked ones the error.")
         OF_STATE(speed, "m/s and rad/s.")
         OF_STATE(wrench_a, "On a: force (N), torque about the joint's point (N m), world.")
         OF_STATE(wrench_b, "On b.")
@@ -199,7 +199,7 @@ static sadmm_coupling_def def_of(const coupling &c)
 
 static void bind_coupling(nb::module_ &m)
 {
-    nb::class_<coupling>(m, "Coupling", collected<sadmm_coupling_id>(), "A spring and damper that ties a body to a target pose.")
+    nb::class_<coupling>(m, "Coupling", collected<sadmm_coupling_id>(), "A spring and damper that pulls a body to a target pose.")
         .def("__eq__", [](const coupling &a, const coupling &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_coupling_id>)
         .def_prop_ro("world", [](const coupling &c) { return c.owner; })
@@ -219,7 +219,7 @@ static void bind_coupling(nb::module_ &m)
             const quat q = orientation.as("orientation");
             const std::optional<vec6> v = velocity ? std::optional(velocity->as("velocity")) : std::nullopt;
             call(c.in(), [&](sadmm_world *h) { return sadmm_world_set_coupling_target(h, c.id, x.data(), q.data(), v ? v->data() : nullptr); });
-        }, "position"_a, "orientation"_a = quat{1, 0, 0, 0}, "velocity"_a = nb::none(), "The target at the present time, world frame; velocity: linear, angular.")
+        }, "position"_a, "orientation"_a = quat{1, 0, 0, 0}, "velocity"_a = nb::none(), "Set the target at the current time, world frame; velocity: linear, angular.")
         .def("set_gains", [](const coupling &c, double k, double d, double ka, double da) {
             call(c.in(), [&](sadmm_world *h) { return sadmm_world_set_coupling_gains(h, c.id, k, d, ka, da); });
         }, "linear_stiffness"_a, "linear_damping"_a, "angular_stiffness"_a, "angular_damping"_a)
@@ -227,8 +227,10 @@ static void bind_coupling(nb::module_ &m)
             call(c.in(), [&](sadmm_world *h) { return sadmm_world_set_coupling_limits(h, c.id, f, t); });
         }, "max_force"_a, "max_torque"_a)
         .def("set_enabled", [](const coupling &c, bool on) { call(c.in(), [&](sadmm_world *h) { return sadmm_world_set_coupling_enabled(h, c.id, on); }); }, "enabled"_a)
-        .def_prop_ro("felt_force", [](const coupling &c) { return array_of<3>(state_of(c).felt_force); }, "What the user feels, N.")
-        .def_prop_ro("felt_torque", [](const coupling &c) { return array_of<3>(state_of(c).felt_torque); }, "About the target's origin, N m.")
+        .def_prop_ro("reaction_force", [](const coupling &c) { return array_of<3>(state_of(c).reaction_force); },
+                     "Reaction on the user, N.")
+        .def_prop_ro("reaction_torque", [](const coupling &c) { return array_of<3>(state_of(c).reaction_torque); },
+                     "About the target's origin, N m.")
         .def_prop_ro("position_error", [](const coupling &c) { return array_of<3>(state_of(c).position_error); }, "m.")
         .def_prop_ro("rotation_error", [](const coupling &c) { return array_of<3>(state_of(c).rotation_error); }, "Rotation vector, rad.")
         .def("remove", [](const coupling &c) { call(c.in(), [&](sadmm_world *h) { return sadmm_world_remove_coupling(h, c.id); }); });
@@ -255,10 +257,10 @@ void bind_joints(nb::module_ &m, nb::class_<world> &w)
           "break_force"_a = infinite, "break_torque"_a = infinite, "coordinates"_a = nb::dict(),
           "A joint between body a and body b (None: the static world). kind: 'fixed', 'revolute' (about z), 'prismatic' (along z),\n"
           "'cylindrical', 'spherical', 'universal', 'planar', 'cartesian', 'custom' (locks: bits), 'distance', 'spring', 'link'.\n"
-          "Its frames: `position` and `orientation` in the world, as the bodies are now, or position_a ... in the bodies' frames.\n"
+          "Frames: `position` and `orientation` in the world at the current poses, or position_a ... in the bodies' frames.\n"
           "coordinates: {5: Coordinate(drive='speed', target_speed=2)}, what acts along free ones.");
     w.def("add_gear", &add_gear, "joint_1"_a, "coordinate_1"_a, "joint_2"_a, "coordinate_2"_a, "ratio"_a = 1.0, "offset"_a = nb::none(),
-          "enabled"_a = true, "q_1 + ratio q_2 = offset; None: as it is now.");
+          "enabled"_a = true, "q_1 + ratio q_2 = offset; None: the current value.");
     w.def("add_coupling", &add_coupling, "body"_a, nb::kw_only(), "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0},
           "target_position"_a = nb::none(), "target_orientation"_a = nb::none(), "linear_stiffness"_a = 0.0, "linear_damping"_a = 0.0,
           "angular_stiffness"_a = 0.0, "angular_damping"_a = 0.0, "max_force"_a = infinite, "max_torque"_a = infinite, "enabled"_a = true,

@@ -40,8 +40,8 @@ NB_MODULE(_core, m)
     exceptions[SADMM_ERROR_STALE_ID] = make_exception(m, "StaleId", with(PyExc_LookupError), "The object was removed.");
     exceptions[SADMM_ERROR_UNAVAILABLE] = make_exception(m, "Unavailable", base, "Not in this build, on this machine, or not now.");
     exceptions[SADMM_ERROR_OUT_OF_MEMORY] = make_exception(m, "OutOfMemory", with(PyExc_MemoryError), "Memory ran out.");
-    exceptions[SADMM_ERROR_NON_FINITE] = make_exception(m, "NonFinite", with(PyExc_ArithmeticError), "A step made a number that is not finite.");
-    exceptions[SADMM_ERROR_UNSUPPORTED] = make_exception(m, "Unsupported", base, "What the library does not do.");
+    exceptions[SADMM_ERROR_NON_FINITE] = make_exception(m, "NonFinite", with(PyExc_ArithmeticError), "A step produced a number that is not finite.");
+    exceptions[SADMM_ERROR_UNSUPPORTED] = make_exception(m, "Unsupported", base, "Not supported by the library.");
     exceptions[SADMM_ERROR_IO] = make_exception(m, "FileError", with(PyExc_OSError), "A file could not be read or written.");
     exceptions[SADMM_ERROR_DEVICE] = make_exception(m, "DeviceError", base, "A device failed.");
     exceptions[SADMM_ERROR_LIMIT] = make_exception(m, "LimitExceeded", base, "More than the library can hold.");
@@ -52,7 +52,7 @@ NB_MODULE(_core, m)
     m.def("_set_members", &set_members, "object"_a, "values"_a);
     m.def("version", &sadmm_version, "The library's version.");
     m.def("build_commit", &sadmm_build_commit, "The commit that the library was built from.");
-    m.def("build_compiler", &sadmm_build_compiler, "The compiler that it was built by.");
+    m.def("build_compiler", &sadmm_build_compiler, "The compiler that it was built with.");
     m.def("backends", []() {
         nb::list out;
         for (int k = SADMM_BACKEND_REF; k < SADMM_BACKEND_COUNT; ++k) {
@@ -73,8 +73,8 @@ NB_MODULE(_core, m)
     bind_shapes(m);
     nb::class_<world> w(m, "World",
         "Bodies with shapes, joints and forces, stepped through time. SI units; the world's frame for positions, "
-        "orientations (unit quaternions w x y z, body to world) and velocities. Calls on one world wait for each other; "
-        "different worlds run at the same time. The interpreter's lock is free while a world works.");
+        "orientations (unit quaternions w x y z, body to world) and velocities. Calls on one world are serialised; "
+        "different worlds run in parallel. The GIL is released while a world works.");
     bind_world(m, w);
     bind_arrays(m, w);
     bind_joints(m, w);

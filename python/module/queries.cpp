@@ -92,7 +92,7 @@ void bind_queries(nb::class_<world> &w)
         return overlaps(self, [&](sadmm_world *h, int32_t capacity, sadmm_shape_id *ids, int32_t *count) {
             return sadmm_world_overlap_box(h, lowest.data(), highest.data(), nullptr, capacity, ids, count);
         });
-    }, "lowest"_a, "highest"_a, "Shapes whose boxes meet the box from lowest to highest (m, world).");
+    }, "lowest"_a, "highest"_a, "Shapes whose bounding boxes overlap the box from lowest to highest (m, world).");
     w.def("overlap", [](nb::handle_t<world> self, const shape_def &shape, numbers<3> position, numbers<4> orientation) {
         const sadmm_shape_def def = shape.def; // another thread may change it
         const vec3 x = position.as("position");
@@ -106,7 +106,7 @@ void bind_queries(nb::class_<world> &w)
         sadmm_closest_points c;
         call(w, [&](sadmm_world *h) { return sadmm_world_closest_points(h, first, second, &c); });
         return dict_of(c);
-    }, "a"_a, "b"_a, "How far two shapes are apart: a dict with distance (m; negative: the depth), normal from a to b, points a and b, "
+    }, "a"_a, "b"_a, "Distance of two shapes: a dict with distance (m; negative: penetration), normal from a to b, points a and b, "
                      "triangle.");
     w.def("closest_to", [](world &w, const shape_def &shape_, const shape &other, numbers<3> position, numbers<4> orientation) {
         const sadmm_shape_def def = shape_.def; // another thread may change it
@@ -116,5 +116,5 @@ void bind_queries(nb::class_<world> &w)
         sadmm_closest_points c;
         call(w, [&](sadmm_world *h) { return sadmm_world_closest_to_shape(h, &def, x.data(), q.data(), id, &c); });
         return dict_of(c);
-    }, "shape"_a, "other"_a, "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0}, "The same of a definition at a pose and a shape.");
+    }, "shape"_a, "other"_a, "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0}, "The same for a shape definition at a pose and a shape.");
 }

@@ -120,16 +120,16 @@ void bind_scenes(nb::module_ &m, nb::class_<world> &w)
           "device"_a = 0, "settings"_a = nb::none());
     w.def("_to_json", &to_json, "name"_a.none(), "description"_a.none(), "duration"_a.none());
     w.def_prop_ro("has_script", [](world &w) { return w.scripted && ask(w, [&](sadmm_world *) { return sadmm_scene_has_script(&w.scene); }); },
-                  "Of a scene: does it have scripted inputs, which come with steps and are in no scene file?");
+                  "Whether the scene has a script: inputs that steps apply and that scene files do not contain.");
     w.def_prop_ro("duration", [](world &w) -> nb::object {
         return w.scripted ? nb::cast(ask(w, [&](sadmm_world *) { return w.scene.duration; })) : nb::none();
-    }, "Of a scene: how long it is meant to be run for, s; None of other worlds.");
+    }, "Duration of the scene, s; None for other worlds.");
     w.def_prop_rw("script", [](world &w) { return w.scripted && ask(w, [&](sadmm_world *) { return w.script_on; }); },
                   [](world &w, bool on) {
                       if (on && !w.scripted) throw nb::value_error("script: the world has none; only a scene's world can have one");
                       ask(w, [&](sadmm_world *) { return w.script_on = on; });
                   },
-                  "Does a scene's script act: the motions that come with its steps, and what it measures? Switched off, joints' and\n"
-                  "couplings' targets are the caller's; on again, it goes on at the time that has come by then.");
-    w.def_prop_ro("tasks", &result, "Of a scene: what it measures of its own success, after steps that were waited for.");
+                  "Whether the scene's script runs: its motions and measurements. While it is off, the caller sets the targets of joints\n"
+                  "and couplings; switched on again, it continues at the current time.");
+    w.def_prop_ro("tasks", &result, "What the scene measures of its task, after steps that were waited for.");
 }

@@ -32,8 +32,8 @@ static void bind_METHOD(settings_class &c, const char *name, sadmm_method S::*at
 
 void bind_settings(nb::module_ &m)
 {
-    settings_class c(m, "Settings", "Settings of steps. Settings(dt=0.002, iterations=50): the defaults, with changes. A "
-                                    "world checks them when they are given to it.");
+    settings_class c(m, "Settings", "Settings of steps. Settings(dt=0.002, iterations=50): the defaults, with changes. "
+                                    "Checked when they are set in a world.");
     c.def("__init__", [](nb::pointer_and_handle<S> self, nb::kwargs values) {
         new (self.p) S(sadmm_settings_default());
         nb::inst_mark_ready(self.h);
@@ -50,7 +50,7 @@ void bind_settings(nb::module_ &m)
         .def_ro("momentum_max", &C::momentum_max, "Momentum error of the worst body, relative.")
         .def_ro("momentum_worst", &C::momentum_worst, "Index of that body among the dynamic ones; -1: none.")
         .def_ro("siconos", &C::siconos, "siconos' measure, or -1.")
-        .def_ro("islands_above", &C::islands_above, "Islands above the certificate tolerances; -1: there are none set.");
+        .def_ro("islands_above", &C::islands_above, "Islands above the certificate tolerances; -1: no tolerance is set.");
 
     using R = sadmm_step_report;
     nb::class_<R>(m, "Report", "What the last step did.")
@@ -68,10 +68,10 @@ void bind_settings(nb::module_ &m)
         .def_ro("iterations_mean", &R::iterations_mean, "Mean over islands.")
         .def_ro("converged", &R::converged, "A stop rule was met, by every island.")
         .def_ro("limited", &R::limited, "Islands that had more energy than contacts can leave them with.")
-        .def_ro("repeated", &R::repeated, "Steps that a backend running ahead repeated, since creation.")
+        .def_ro("repeated", &R::repeated, "Steps that an asynchronous backend repeated since creation.")
         .def_ro("penetration_max", &R::penetration_max, "Deepest overlap at the start of the step, m.")
         .def_ro("joint_drift", &R::joint_drift,
-                "Largest error of a locked translation of a joint after the step, m; 0: there are none.")
+                "Largest error of a locked translation of a joint after the step, m; 0 without joints.")
         .def_prop_ro("ms", [](const R &r) {
             nb::dict d;
             d["total"] = r.ms.total, d["collide"] = r.ms.collide, d["assemble"] = r.ms.assemble, d["solve"] = r.ms.solve,
@@ -80,5 +80,5 @@ void bind_settings(nb::module_ &m)
         }, "Times, ms: total, collide, assemble, solve, finish; certify.")
         .def_prop_ro("residual_primal", [](const R &r) { return r.residual.primal; }, "m/s; -1: not measured.")
         .def_prop_ro("residual_dual", [](const R &r) { return r.residual.dual; }, "N s; -1: not measured.")
-        .def_ro("certificate", &R::certificate, "True error, where settings ask for it.");
+        .def_ro("certificate", &R::certificate, "True error, if settings.certify is on.");
 }

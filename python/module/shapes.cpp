@@ -42,13 +42,13 @@ void hold_parts(shape_def &shape)
     }
 }
 
-static shape_def make_hull(points at, double merge, double rounding)
+static shape_def make_hull(points at, double merge, double convex_radius)
 {
     shape_def out;
     sadmm_hull_def def = sadmm_hull_def_default();
     def.points = at.data(), def.point_count = at.shape(0);
     if (merge >= 0) def.merge = merge;
-    def.rounding = rounding;
+    def.convex_radius = convex_radius;
     out.def.type = SADMM_SHAPE_HULL;
     out.hull = std::make_shared<hull_holder>();
     sadmm_status status;
@@ -162,16 +162,16 @@ void bind_shapes(nb::module_ &m)
                      [](S &s, numbers<4> q) { put(q.as("orientation"), s.def.orientation); }, "To the body's frame, w x y z.")
         .def_prop_rw("friction", [](const S &s) { return s.def.friction; }, [](S &s, double x) { s.def.friction = x; }, "mu, in [0, 1e6].")
         .def_prop_rw("restitution", [](const S &s) { return s.def.restitution; }, [](S &s, double x) { s.def.restitution = x; }, "In [0, 1].")
-        .def_prop_rw("category", [](const S &s) { return s.def.category; }, [](S &s, whole x) { s.def.category = x.as_bits("category"); }, "Bits of what it is.")
-        .def_prop_rw("mask", [](const S &s) { return s.def.mask; }, [](S &s, whole x) { s.def.mask = x.as_bits("mask"); }, "Categories that it meets.")
+        .def_prop_rw("category", [](const S &s) { return s.def.category; }, [](S &s, whole x) { s.def.category = x.as_bits("category"); }, "Bits of its own categories.")
+        .def_prop_rw("mask", [](const S &s) { return s.def.mask; }, [](S &s, whole x) { s.def.mask = x.as_bits("mask"); }, "Categories that it collides with.")
         .def_prop_rw("sensor", [](const S &s) { return s.def.sensor; }, [](S &s, bool x) { s.def.sensor = x; },
-                     "Touches nothing and reports what overlaps it: World.record_events, World.sensor_overlaps.")
-        .def("copy", [](const S &s) { return S(s); }, "Another definition of the same shape; hulls and meshes are shared.")
+                     "A sensor has no contacts and reports overlaps: World.record_events, World.sensor_overlaps.")
+        .def("copy", [](const S &s) { return S(s); }, "A copy of the definition; hulls and meshes are shared.")
         .def("geometry", &geometry_of, "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.")
-        .def_prop_ro("rounding", [](const S &s) { return sadmm_hull_rounding(s.def.hull); },
-                     "Radius of the ball around every point of a hull, m; what geometry() gives is the polyhedron inside. 0 of other types.");
+        .def_prop_ro("convex_radius", [](const S &s) { return sadmm_hull_convex_radius(s.def.hull); },
+                     "Convex radius of a hull, m; geometry() is the polyhedron without it. 0 for other types.");
 
-    m.def("_hull", &make_hull, "points"_a.noconvert(), "merge"_a, "rounding"_a);
+    m.def("_hull", &make_hull, "points"_a.noconvert(), "merge"_a, "convex_radius"_a);
     m.def("_mesh", &make_mesh, "vertices"_a.noconvert(), "triangles"_a.noconvert());
     m.def("_heightfield", &make_heightfield, "heights"_a.noconvert(), "spacing"_a);
 
@@ -186,13 +186,13 @@ void bind_shapes(nb::module_ &m)
             quat q = orientation.as("orientation");
             check(sadmm_mass_pose_in_body(&a, x.data(), q.data()));
             return std::make_pair(x, q);
-        }, "position"_a, "orientation"_a, "A pose in the frame of the layout, in that of the body.")
+        }, "position"_a, "orientation"_a, "Convert a pose from the frame of the layout to that of the body.")
         .def("pose_of_body", [](const M &a, numbers<3> position, numbers<4> orientation) {
             vec3 x = position.as("position");
             quat q = orientation.as("orientation");
             check(sadmm_mass_pose_of_body(&a, x.data(), q.data()));
             return std::make_pair(x, q);
-        }, "position"_a, "orientation"_a, "The body's pose in the world, where the frame of the layout has this one.");
+        }, "position"_a, "orientation"_a, "The body's pose in the world for a pose of the layout's frame.");
     m.def("mass_of", [](nb::object given, double density) {
         const std::vector<S> shapes = read_shapes("shapes", given);
         std::vector<M> parts(shapes.size());
@@ -200,5 +200,5 @@ void bind_shapes(nb::module_ &m)
         for (size_t k = 0; k < shapes.size(); ++k) check(sadmm_shape_mass(&shapes[k].def, density, &parts[k]));
         check(sadmm_mass_sum(parts.data(), parts.size(), &sum));
         return sum;
-    }, "shapes"_a, "density"_a, "Mass of solid shapes of one density (kg/m^3) as one body; where they overlap both count.");
+    }, "shapes"_a, "density"_a, "Mass of solid shapes of uniform density (kg/m^3) as one body; overlaps count twice.");
 }

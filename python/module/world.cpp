@@ -182,7 +182,7 @@ static void bind_body(nb::module_ &m)
             call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_index(h, b.id, &index); });
             return index;
         }, "Row of the world's arrays.")
-        .def_prop_ro("name", [](const body &b) { return name_of(b); }, "As it was given, up to 63 bytes of UTF-8.")
+        .def_prop_ro("name", [](const body &b) { return name_of(b); }, "The name, up to 63 bytes of UTF-8.")
         .def_prop_ro("type", [](const body &b) { return name_of(def_of(b).type, body_type_names); }, "'dynamic', 'static' or 'kinematic'.")
         .def_prop_ro("mass", [](const body &b) { return def_of(b).mass; }, "kg.")
         .def_prop_ro("inertia", [](const body &b) { return array_of<3>(def_of(b).inertia); }, "Principal moments, kg m^2.")
@@ -199,7 +199,7 @@ static void bind_body(nb::module_ &m)
             const vec3 x = position.as("position");
             const quat q = orientation.as("orientation");
             call(b.in(), [&](sadmm_world *h) { return sadmm_world_move_body(h, b.id, x.data(), q.data()); });
-        }, "position"_a, "orientation"_a, "Let a kinematic body go to a pose within the next step.")
+        }, "position"_a, "orientation"_a, "Move a kinematic body to a pose within the next step.")
         .def("set_wrench", [](const body &b, numbers<3> force, numbers<3> torque) {
             const vec3 f = force.as("force"), t = torque.as("torque");
             call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_wrench(h, b.id, f.data(), t.data()); });
@@ -228,7 +228,7 @@ static void bind_body(nb::module_ &m)
             call(a.in(), [&](sadmm_world *h) { return sadmm_world_set_body_pair_contact(h, a.id, other, !off); });
         }, "other"_a, "off"_a = true, "Turn contact with another body off, or on again.")
         .def("remove", [](const body &b) { call(b.in(), [&](sadmm_world *h) { return sadmm_world_remove_body(h, b.id); }); },
-             "With its shapes, joints and couplings.");
+             "Remove the body with its shapes, joints and couplings.");
 
     nb::class_<shape>(m, "BodyShape", collected<sadmm_shape_id>(), "A shape on a body.")
         .def("__eq__", [](const shape &a, const shape &b) { return same_id(a, b); }, nb::is_operator())
@@ -260,7 +260,7 @@ static void bind_body(nb::module_ &m)
         .def("set_pair_friction", [](const shape &a, const shape &b, double mu) {
             const sadmm_shape_id other = id_in(a.in(), b, "other");
             call(a.in(), [&](sadmm_world *h) { return sadmm_world_set_pair_friction(h, a.id, other, mu); });
-        }, "other"_a, "friction"_a, "Of the two shapes; -1: the geometric mean again.")
+        }, "other"_a, "friction"_a, "Friction of the two shapes; -1: the geometric mean again.")
         .def("remove", [](const shape &s) { call(s.in(), [&](sadmm_world *h) { return sadmm_world_remove_shape(h, s.id); }); });
 }
 
@@ -276,7 +276,7 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
                       const sadmm_settings s = read_settings(given);
                       call(w, [&](sadmm_world *h) { return sadmm_world_set_settings(h, &s); });
                   },
-                  "A copy: change it and set it again. From the next step on.");
+                  "A copy: change it and assign it. From the next step on.");
     w.def("set_backend", [](world &w, const std::string &backend, const std::string &precision, whole which) {
         const int device = which.as_int("device");
         const auto b = named("backend", backend, backend_names);
@@ -286,12 +286,12 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
             if (status == SADMM_OK) w.def.precision = p;
             return status;
         });
-    }, "backend"_a, "precision"_a = "f64", "device"_a = 0, "Who makes the steps from the next one on.");
+    }, "backend"_a, "precision"_a = "f64", "device"_a = 0, "Change the backend from the next step on.");
     w.def("add_body", &add_body, nb::kw_only(), "type"_a = "dynamic", "mass"_a = 0.0, "inertia"_a = vec3{}, "position"_a = vec3{},
           "orientation"_a = quat{1, 0, 0, 0}, "linear_velocity"_a = vec3{}, "angular_velocity"_a = vec3{},
           "environment"_a = 0, "name"_a = "", "gravity_scale"_a = 1.0, "linear_damping"_a = 0.0, "angular_damping"_a = 0.0, "shapes"_a = nb::tuple(),
-          "A body. SI units; `inertia`: principal moments; `shapes`: Shapes to put on it, none by default. Where one of them is\n"
-          "refused there is no body. World.add_solid computes masses.");
+          "A body. SI units; `inertia`: principal moments; `shapes`: Shapes to put on it, none by default. If one of them is\n"
+          "refused, no body is added. World.add_solid computes masses.");
     w.def_prop_ro("body_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_body_count(h); }); });
     w.def_prop_ro("shape_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_shape_count(h); }); });
     w.def_prop_ro("bodies", [](nb::handle_t<world> self) {
@@ -301,10 +301,10 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
         return all_of<shape>(self, &sadmm_world_shape_count, &sadmm_world_shape_at);
     }, "All shapes.");
     w.def("step", [](world &w, whole n) { step(w, n, true); }, "n"_a = 1,
-          "Make n steps. A scene's scripted inputs come with them.");
+          "Make n steps. Scenes also run their script.");
     w.def("step_async", [](world &w, whole n) { step(w, n, false); }, "n"_a = 1,
-          "Begin n steps without waiting for them, where the backend can.");
-    w.def("wait", [](world &w) { call(w, [](sadmm_world *h) { return sadmm_world_wait(h); }); }, "Until all steps begun are done.");
+          "Begin n steps without waiting for them, if the backend can.");
+    w.def("wait", [](world &w) { call(w, [](sadmm_world *h) { return sadmm_world_wait(h); }); }, "Wait until all steps begun are done.");
     w.def_prop_ro("report", [](world &w) {
         sadmm_step_report r;
         call(w, [&](sadmm_world *h) { return sadmm_world_report(h, &r); });
@@ -335,7 +335,7 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
             return status;
         });
         return nb::bytes(bytes.data(), bytes.size());
-    }, "The whole state as bytes, for restore() in this build, here or in another process.");
+    }, "The whole state as bytes, for restore() with the same build, in this process or another.");
     w.def("restore", [](world &w, nb::bytes bytes) {
         call(w, [&](sadmm_world *h) {
             sadmm_status status = sadmm_world_restore(h, bytes.data(), bytes.size());
@@ -344,5 +344,5 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
             if (status == SADMM_OK) w.steps = report.step; // where a scene's script goes on
             return status;
         });
-    }, "bytes"_a, "Become what was saved, to the last bit. What save() did not write is refused, and nothing changes.");
+    }, "bytes"_a, "Replace the state by a saved one, to the last bit. Invalid bytes are refused, and nothing changes.");
 }

@@ -82,7 +82,7 @@ def _with(shape, options):
 
 def plane(**options):
     """Half-space z <= 0 of the shape's frame, for static bodies. Options of this and all shapes: position and orientation in
-    the body's frame, friction (0.5), restitution (0), category, mask, sensor (False: touches nothing, reports what overlaps it)."""
+    the body's frame, friction (0.5), restitution (0), category, mask, sensor (False; a sensor has no contacts and reports overlaps)."""
     return _with(Shape("plane"), options)
 
 
@@ -92,7 +92,7 @@ def sphere(radius, **options):
 
 
 def capsule(radius, half_length, **options):
-    """All within `radius` of a segment of the shape's z axis; m."""
+    """Radius and half length of the segment along the shape's z axis, m."""
     return _with(Shape("capsule", [radius, half_length]), options)
 
 
@@ -116,10 +116,10 @@ def ellipsoid(x, y, z, **options):
     return _with(Shape("ellipsoid", [x, y, z]), options)
 
 
-def hull(points, merge=None, rounding=0.0, **options):
-    """The convex hull of points (n x 3, m). merge: faces that are flat to within this share of the extent become one;
-    rounding: radius of a ball around every point of it, m."""
-    return _with(_core._hull(numbers("points", points, 3), -1.0 if merge is None else merge, rounding), options)
+def hull(points, merge=None, convex_radius=0.0, **options):
+    """The convex hull of points (n x 3, m). merge: faces that are flat to within this share of the extent become
+    one; convex_radius: the shape is the Minkowski sum with a ball of this radius, m."""
+    return _with(_core._hull(numbers("points", points, 3), -1.0 if merge is None else merge, convex_radius), options)
 
 
 def mesh(vertices, triangles, **options):
@@ -130,7 +130,7 @@ def mesh(vertices, triangles, **options):
 
 
 def heightfield(heights, spacing, **options):
-    """Heights (rows along y x columns along x, m) over a grid whose middle is the origin; spacing: (x, y), m. For static and
+    """Heights (rows along y x columns along x, m) over a grid centred at the origin; spacing: (x, y), m. For static and
     kinematic bodies."""
     return _with(_core._heightfield(numbers("heights", heights), spacing), options)
 
@@ -139,15 +139,15 @@ def heightfield(heights, spacing, **options):
 
 
 def scene(spec, *, backend="auto", precision=None, method=None, device=0, settings=None):
-    """A world of a scene by name ("pile:300"), or of a scene file ("my.json": what ends so, or has a slash in it), as the
-    subadmm command builds and steps it: a scene's scripted inputs come with World.step. `settings`: a dict of changes to the
-    scene's own, as {"dt": 0.002}; `method`, "fast" or "paper", brings the scene's iterations for it."""
+    """The world of a scene by name ("pile:300"), or of a scene file (a path that ends in .json or has a slash), as the subadmm
+    command makes it; World.step also runs the scene's script. `settings`: a dict of changes to the scene's settings, like
+    {"dt": 0.002}; `method`, "fast" or "paper", also sets the scene's number of iterations for it."""
     return _core._scene(str(spec), False, backend=backend, precision=precision, method=method, device=device,
                         settings=settings)
 
 
 def scene_from_json(text, *, backend="auto", precision=None, method=None, device=0, settings=None):
-    """The same of a scene file's text."""
+    """The same from the text of a scene file."""
     return _core._scene(text, True, backend=backend, precision=precision, method=method, device=device, settings=settings)
 
 
@@ -155,7 +155,7 @@ def scene_from_json(text, *, backend="auto", precision=None, method=None, device
 
 
 def _add_ground(self, friction=0.5, height=0.0):
-    """A static plane z = height that bodies of all environments meet."""
+    """A static plane z = height that bodies of all environments collide with."""
     return self.add_body(
         type="static", environment=-1, position=(0, 0, height), name="ground", shapes=[plane(friction=friction)]
     )
@@ -163,12 +163,11 @@ def _add_ground(self, friction=0.5, height=0.0):
 
 def _add_solid(self, shapes, density=None, mass=None, *, position=(0, 0, 0), orientation=(1, 0, 0, 0), type="dynamic",
                **options):
-    """A body of one shape or several, solid, of one density (kg/m^3) or total mass (kg).
+    """A solid body of one or several shapes, with a uniform density (kg/m^3) or a total mass (kg).
 
-    `position` and `orientation` are those of the frame that the shapes are placed in (the layout); the body itself has its
-    origin at the centre of mass and its axes along the principal ones. Of static and kinematic bodies both frames are the
-    same, and neither density nor mass is needed. Sensors have no mass. Other options: as of add_body. After an error there
-    is no body.
+    `position` and `orientation` are those of the frame in which the shapes are placed (the layout); the origin of the body is
+    its centre of mass, its axes are the principal axes. For static and kinematic bodies both frames are the same, and neither
+    density nor mass is needed. Sensors have no mass. Other options: as add_body. After an error no body is added.
     """
     if isinstance(shapes, Shape):
         shapes = [shapes]
@@ -209,7 +208,8 @@ def _struct_dtype(members, size):
     })
 
 
-#: Members of World.contacts(): ids are (slot, generation); position, normal (from a to b) and gap in m, impulse on b in N s,
+#: Members of World.contacts(): ids are (slot, generation); position, normal (from a to b) and
+#: separation (< 0: penetration) in m, impulse on b in N s,
 #: force on b in N; triangle: of a mesh, else -1.
 contact_dtype = _struct_dtype(_core._contact_members, _core._contact_size)
 
@@ -219,15 +219,15 @@ def _contacts(self):
     return np.frombuffer(self._contacts(), dtype=contact_dtype)
 
 
-#: Members of World.events(): step that it came with; type, one of CONTACT_BEGUN, CONTACT_ENDED, SENSOR_BEGUN, SENSOR_ENDED; ids
-#: are (slot, generation), a is the sensor of these. Of CONTACT_BEGUN: position (m), normal from a to b, closing speed (m/s) and
+#: Members of World.events(): step; type, one of CONTACT_BEGUN, CONTACT_ENDED, SENSOR_BEGUN, SENSOR_ENDED; ids
+#: are (slot, generation), a is the sensor. Of CONTACT_BEGUN: position (m), normal from a to b, closing speed (m/s) and
 #: the pair's impulse on b (N s).
 event_dtype = _struct_dtype(_core._event_members, _core._event_size)
 
 
 def _events(self):
-    """Take what has begun and ended since the last call, in steps recorded (record_events): an array of `event_dtype`, the oldest
-    first. Where more came than are kept, the oldest are gone, and a warning says how many."""
+    """Take the events since the last call (record_events): an array of `event_dtype`, the oldest first. If there were more than
+    the capacity, the oldest are lost, and a warning says how many."""
     data, dropped = self._take_events()
     if dropped:
         warnings.warn(f"{dropped} events were lost: take them more often, or keep more (record_events)", stacklevel=2)
@@ -246,9 +246,9 @@ def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(
                from_behind=False, sensors=False):
     """What rays hit: origins (n x 3, m, world), directions (n x 3, of any length), how far to search (m). A dict of arrays: shape
     (n; index in World.shapes, -1: nothing), distance (n, m; infinite: nothing), point and normal (n x 3, world), triangle (n;
-    of a mesh, else -1). ignore: a Body; types: of bodies, as ("dynamic",); category, mask: only what would meet a shape with
-    these; from_inside: what the origin is inside of counts, at distance 0; from_behind: triangles count from behind too;
-    sensors: sensor shapes count too."""
+    of a mesh, else -1). ignore: a Body; types: of bodies, like ("dynamic",); category, mask: only shapes that would collide
+    with a shape with these; from_inside: also shapes that contain the origin, at distance 0; from_behind: also the back of
+    mesh triangles; sensors: also sensors."""
     return self._cast_rays(numbers("origins", origins, 3), numbers("directions", directions, 3), length, ignore, list(types),
                            category, mask, from_inside, from_behind, sensors)
 

@@ -56,7 +56,7 @@ def outs(rows, columns):
 
 
 @pytest.mark.parametrize("array", ["body_state", "body_wrench", "body_contact_wrench", "body_inertia", "joint_position",
-                                   "joint_target_speed", "coupling_target", "coupling_felt"])
+                                   "joint_target_speed", "coupling_target", "coupling_reaction"])
 def test_out_is_filled_or_refused(array):
     world = hinged()[0]
     wanted = world.get(array)

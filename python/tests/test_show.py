@@ -18,7 +18,7 @@ from subadmm.show.session import Session
 
 try:
     TETRAHEDRON = subadmm.hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
-    ROUNDED = subadmm.hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], rounding=0.1)
+    ROUNDED = subadmm.hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], convex_radius=0.1)
 except subadmm.Unavailable:
     TETRAHEDRON = ROUNDED = None
 

@@ -81,15 +81,15 @@ def test_a_target_goes_to_where_the_user_wants_it_without_jumps():
     session.steering.start()
     lead, = session.steering.leads
     lead.position, lead.orientation = np.array([0.2, 0, 0]), np.array([np.cos(0.5), 0, 0, np.sin(0.5)])
-    felt = []
+    reactions = []
     for _ in range(400):
         session.step()
-        felt.append(lead.felt()[0][0])
+        reactions.append(lead.reaction()[0][0])
     body = session.world.bodies[0]
     assert body.position == pytest.approx((0.2, 0, 0), abs=1e-4)
     assert abs(np.dot(body.orientation, lead.orientation)) == pytest.approx(1, abs=1e-6)
-    # A jump of 0.2 m would be felt as 200 N and more at once.
-    assert max(np.abs(np.diff(felt))) < 60 and max(np.abs(felt)) < 130
+    # A jump of 0.2 m would be a reaction of 200 N and more at once.
+    assert max(np.abs(np.diff(reactions))) < 60 and max(np.abs(reactions)) < 130
 
 
 def test_a_led_hand_lifts_a_cube_and_feels_its_weight():
@@ -104,14 +104,14 @@ def test_a_led_hand_lifts_a_cube_and_feels_its_weight():
     assert lead.name == "palm" and len(hand.fingers) == 5 and hand.apart == pytest.approx(0.122, abs=1e-4)
     start = lead.position.copy()
     session.step(50)
-    alone = lead.felt()[0][2]                      # its own weight
+    alone = lead.reaction()[0][2]                      # its own weight
     for position, opening, steps in (((0, 0, -0.117), 0, 250), ((0, 0, -0.117), -0.053, 150), ((0, 0, 0.03), -0.053, 300)):
         lead.position = start + position
         steering.close(hand, opening=opening)
         session.step(steps)
     assert cube.position[2] > 0.15
     # 1 kg; 2 %: of what it swings.
-    assert alone - lead.felt()[0][2] == pytest.approx(9.81, rel=0.02)
+    assert alone - lead.reaction()[0][2] == pytest.approx(9.81, rel=0.02)
     steering.stop()
     assert world.script
     session.step(100)                             # the script goes on, where it is by then: it has the cube too

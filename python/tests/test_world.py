@@ -181,7 +181,7 @@ def test_joints_motors_and_couplings():
     world.step(400)
     # it hangs by its weight over the stiffness below the target
     assert hand.position_error[2] == pytest.approx(0.1 * 9.81 / 100, rel=1e-6)
-    assert hand.felt_force[2] == pytest.approx(-0.1 * 9.81, rel=1e-6)
+    assert hand.reaction_force[2] == pytest.approx(-0.1 * 9.81, rel=1e-6)
     assert world.couplings == [hand] and world.joints == [hinge]
     with pytest.raises(subadmm.InvalidArgument, match="must be a free coordinate"):
         hinge.set_coordinate(0, subadmm.Coordinate(friction=1))

@@ -169,14 +169,14 @@ static void assemble_errors(struct sadmm_context *c, const struct pair_block *bl
         count[l] = pair ? pair->count : 0;
         for (int k = 0; k < count[l]; ++k) {
             const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
-            errors[k][l] = c->system->errors_given ? point->error : point->gap;
+            errors[k][l] = c->system->errors_given ? point->error : point->separation;
             held[k][l] = point->error;
         }
         for (int k = count[l]; k < block->slots; ++k) errors[k][l] = held[k][l] = 0;
     }
     for (int k = 0; k < block->slots && !c->system->errors_given; ++k)
         for (int l = 0; l < LANES; ++l)
-            errors[k][l] = contact_error(errors[k][l], settings.dt, settings.baumgarte, settings.slop,
+            errors[k][l] = contact_error(errors[k][l], settings.dt, settings.correction_factor, settings.slop,
                                          settings.correction_speed) +
                            held[k][l];
     for (int l = 0; l < LANES; ++l)

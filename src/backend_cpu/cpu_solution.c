@@ -115,8 +115,9 @@ static struct trapezoid_touch touch_of(const struct sadmm_context *c, const stru
         const double corrections[2] = {-trapezoid_along(at.normal, a->correction, at.arm_a),
                                        trapezoid_along(at.normal, b->correction, at.arm_b)};
         const double speed = trapezoid_along(at.normal, v_b, at.arm_b) - trapezoid_along(at.normal, v_a, at.arm_a);
-        const struct trapezoid_gap gap = {point->gap, speed, {size3(arm_a), size3(arm_b)}, point->migrates};
-        trapezoid_add_way(&touch, gap, corrections, size, dt, slop);
+        const struct trapezoid_separation separation = {point->separation, speed, {size3(arm_a), size3(arm_b)},
+                                                        point->migrates};
+        trapezoid_add_way(&touch, separation, corrections, size, dt, slop);
     }
     return touch;
 }

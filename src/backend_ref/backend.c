@@ -92,9 +92,9 @@ static void touch_point(struct sadmm_context *c, const struct sadmm_contact_pair
         touch.island |= forces_touch(rigid);
     }
     const struct sadmm_contact_point *point = &contacts->points[k];
-    const struct trapezoid_gap gap = {
-        point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
-    trapezoid_add_point(&touch, gap,
+    const struct trapezoid_separation separation = {
+        point->separation, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
+    trapezoid_add_point(&touch, separation,
                         constraint->lambda[0], correction, size, moves, rest,
                         c->settings->dt, c->settings->slop);
     for (int s = 0; s < 2; ++s) {

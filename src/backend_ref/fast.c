@@ -294,8 +294,8 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
     if (c->weight_updates == 0 && c->plan->warm && c->plan->rigid)
         for (size_t k = 0; k < points; ++k) {
             struct ref_constraint *contact = &c->constraints[k];
-            double share = weight_gap_share(island_of(c, contact)->weights.stack_depth, c->settings->iterations);
-            contact->e[0] = weight_gap_error(contact->e[0], share, c->settings->slop / c->settings->dt);
+            double share = weight_separation_share(island_of(c, contact)->weights.stack_depth, c->settings->iterations);
+            contact->e[0] = weight_separation_error(contact->e[0], share, c->settings->slop / c->settings->dt);
         }
     for (size_t k = points; k < c->constraint_count; ++k) weigh_constraint(c, &c->constraints[k]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {

@@ -36,10 +36,11 @@ SADMM_INLINE bool is_own_ball(const struct sadmm_proxy *p)
 /* How far turning moves a shape's surface within the step, m. */
 SADMM_INLINE double surface_spin(const struct sadmm_proxy *p) { return is_own_ball(p) ? 0 : p->spin; }
 
-/* Is the pair one of these? ahead: proxy_ahead. */
-SADMM_INLINE bool advance_needed(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead, double dt)
+/* Is the pair one of these? time_offset: proxy_time_offset. */
+SADMM_INLINE bool advance_needed(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double time_offset,
+                                 double dt)
 {
-    return ahead < 0.5 * dt ||
+    return time_offset < 0.5 * dt ||
            surface_spin(a) + surface_spin(b) > ADVANCE_SPIN * (a->thin < b->thin ? a->thin : b->thin);
 }
 
@@ -84,9 +85,9 @@ SADMM_INLINE vec3 round_normal(const struct sadmm_geometry *shape_a, const struc
     return m.normal;
 }
 
-/* a and b, or the triangle `child` of a mesh b, as hulls of pieces. */
+/* a and b, or the triangle `subshape` of a mesh b, as hulls of pieces. */
 SADMM_INLINE void advance_pair_make(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
-                                    uint32_t child, const struct pair_pose *pose, struct mesh_triangle *triangle,
+                                    uint32_t subshape, const struct pair_pose *pose, struct mesh_triangle *triangle,
                                     struct convex_pair *pair)
 {
     struct mesh_place place;
@@ -96,7 +97,7 @@ SADMM_INLINE void advance_pair_make(const struct sadmm_geometry *a, const struct
         return;
     }
     mesh_at(hulls, b->hull, &mesh);
-    mesh_triangle_of(&mesh, (int32_t)child, triangle);
+    mesh_triangle_of(&mesh, (int32_t)subshape, triangle);
     convex_of(a, hulls, &pair->a);
     pair->b.form = CONVEX_POLYTOPE;
     pair->b.size = v3(0, 0, 0);
@@ -111,14 +112,14 @@ SADMM_INLINE void advance_pair_make(const struct sadmm_geometry *a, const struct
 
 /* By the walk of gjk.h: from where it ends, how far its direction parts the two. */
 SADMM_RARE real pieces_apart(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
-                             uint32_t child, const struct pair_pose *pose, vec3 *normal)
+                             uint32_t subshape, const struct pair_pose *pose, vec3 *normal)
 {
     struct mesh_triangle triangle;
     struct convex_pair pair;
     struct gjk_simplex simplex;
     vec3 v;
     real length;
-    advance_pair_make(a, b, hulls, child, pose, &triangle, &pair);
+    advance_pair_make(a, b, hulls, subshape, pose, &triangle, &pair);
     *normal = v3_neg(pair.t);
     if (!(v3_norm2(*normal) > 0)) *normal = v3(0, 0, 1);
     if (convex_distance(&pair, *normal, SADMM_REAL_MAX, &simplex, &v) != GJK_APART) return 0;
@@ -130,7 +131,7 @@ SADMM_RARE real pieces_apart(const struct sadmm_geometry *a, const struct sadmm_
 
 /* Of a ball and a triangle, in the frame of the mesh: between nearest points. */
 SADMM_INLINE real ball_from_triangle(real radius, vec3 centre, const double *hulls, const struct sadmm_geometry *b,
-                                     uint32_t child, vec3 *normal)
+                                     uint32_t subshape, vec3 *normal)
 {
     struct gjk_simplex simplex;
     struct mesh mesh;
@@ -139,7 +140,7 @@ SADMM_INLINE real ball_from_triangle(real radius, vec3 centre, const double *hul
     real length;
     int k;
     mesh_at(hulls, b->hull, &mesh);
-    mesh_corners(&mesh, (int32_t)child, corner, opposite);
+    mesh_corners(&mesh, (int32_t)subshape, corner, opposite);
     simplex.count = 3;
     for (k = 0; k < 3; ++k) simplex.p[k].w = v3_sub(mesh_vertex(&mesh, corner[k]), centre);
     v = closest_on_triangle(&simplex);
@@ -148,17 +149,18 @@ SADMM_INLINE real ball_from_triangle(real radius, vec3 centre, const double *hul
     return length - radius;
 }
 
-/* No less than this are the two shapes apart, along the normal (from a to b, in the frame of b). child: of a mesh b. */
+/* No less than this are the two shapes apart, along the normal (from a to b, in the frame of b). subshape: of a mesh
+ * b. */
 SADMM_INLINE real shapes_apart(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
-                               uint32_t child, const struct pair_pose *pose, vec3 *normal)
+                               uint32_t subshape, const struct pair_pose *pose, vec3 *normal)
 {
     const vec3 t = r3_vec3(pose->t);
     mat3 R;
     int k;
     if (hulls && a->type == SADMM_SHAPE_SPHERE && b->type == SADMM_SHAPE_MESH)
-        return ball_from_triangle((real)a->size[0], t, hulls, b, child, normal);
+        return ball_from_triangle((real)a->size[0], t, hulls, b, subshape, normal);
     if (hulls && a->type != SADMM_SHAPE_PLANE && b->type > SADMM_SHAPE_BOX)
-        return pieces_apart(a, b, hulls, child, pose, normal);
+        return pieces_apart(a, b, hulls, subshape, pose, normal);
     if (a->type == SADMM_SHAPE_BOX) {
         struct box_pair boxes;
         box_pair_make(v3_load(b->size), v3_load(a->size), pose, SADMM_REAL_MAX, &boxes);
@@ -199,18 +201,18 @@ SADMM_INLINE double turning_speed(const struct sadmm_proxy *p, const double norm
     return lever * sqrt(x * x + y * y + z * z);
 }
 
-/* Pose of a in b's frame, `ahead` seconds into the step, and where b is then (pair_manifold.h). */
-SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
+/* Pose of a in b's frame, `time_offset` seconds into the step, and where b is then (pair_manifold.h). */
+SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double time_offset,
                                            double dt, struct proxy_place *of_b);
 
 struct first_touch {
-    double ahead; /* s: when it touches, or up to when it was inspected */
-    bool missed;  /* nothing touches before the end of the step */
+    double time_offset; /* s: when it touches, or up to when it was inspected */
+    bool missed;        /* nothing touches before the end of the step */
 };
 
-/* child: of a mesh b. from: when they do not touch yet, s. */
+/* subshape: of a mesh b. from: when they do not touch yet, s. */
 SADMM_INLINE struct first_touch first_touch_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                               const double *hulls, uint32_t child, double from, double gravity,
+                                               const double *hulls, uint32_t subshape, double from, double gravity,
                                                double dt)
 {
     const double touch = ADVANCE_TOUCH * smaller_of(a->thin, b->thin),
@@ -221,31 +223,31 @@ SADMM_INLINE struct first_touch first_touch_of(const struct sadmm_proxy *a, cons
     double normal[3];
     int move, k;
     for (move = 0; move < ADVANCE_MOVES; ++move) {
-        const struct pair_pose pose = proxies_pose(a, b, first.ahead, dt, &of_b);
+        const struct pair_pose pose = proxies_pose(a, b, first.time_offset, dt, &of_b);
         vec3 n;
         /* accelerations add their part to the whole step's velocity, from its start on */
         const double distance =
-            (double)shapes_apart(&a->geometry, &b->geometry, hulls, child, &pose, &n) - falls * first.ahead;
+            (double)shapes_apart(&a->geometry, &b->geometry, hulls, subshape, &pose, &n) - falls * first.time_offset;
         double closing = falls, next;
         if (!(distance > touch)) return first;
         rotate_to_world(of_b.R, n, normal);
         for (k = 0; k < 3; ++k) closing -= normal[k] * (b->velocity[k] - a->velocity[k]);
         closing += turning_speed(a, normal, lever_a) + turning_speed(b, normal, lever_b);
-        next = first.ahead + distance / closing;
+        next = first.time_offset + distance / closing;
         if (!(closing > 0 && next < dt)) { /* nor with velocities that have no difference */
             first.missed = true;
             return first;
         }
-        first.ahead = next;
+        first.time_offset = next;
     }
     return first;
 }
 
-SADMM_RARE struct first_touch first_touch_pooled(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                                 const double *hulls, uint32_t child, double from, double gravity,
-                                                 double dt)
+SADMM_RARE struct first_touch first_touch_with_hulls(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                                     const double *hulls, uint32_t subshape, double from,
+                                                     double gravity, double dt)
 {
-    return first_touch_of(a, b, hulls, child, from, gravity, dt);
+    return first_touch_of(a, b, hulls, subshape, from, gravity, dt);
 }
 SADMM_RARE struct first_touch first_touch_plain(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double from,
                                                 double gravity, double dt)
@@ -253,12 +255,12 @@ SADMM_RARE struct first_touch first_touch_plain(const struct sadmm_proxy *a, con
     return first_touch_of(a, b, NULL, 0, from, gravity, dt);
 }
 
-/* hulls: NULL where a compiler is to leave out what needs the pool. */
+/* hulls: NULL where a compiler is to leave out what needs shape data. */
 SADMM_INLINE struct first_touch pair_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                                 const double *hulls, uint32_t child, double from, double gravity,
+                                                 const double *hulls, uint32_t subshape, double from, double gravity,
                                                  double dt)
 {
-    return hulls ? first_touch_pooled(a, b, hulls, child, from, gravity, dt)
+    return hulls ? first_touch_with_hulls(a, b, hulls, subshape, from, gravity, dt)
                  : first_touch_plain(a, b, from, gravity, dt);
 }
 

@@ -51,16 +51,16 @@ static vec3 support(const struct sadmm_placed *b, vec3 d)
 }
 
 static bool plane_closest(const struct sadmm_placed *a, const struct sadmm_placed *b, double limit,
-                          struct sadmm_gap *gap)
+                          struct sadmm_separation *separation)
 {
     const vec3 up = v3(a->R[2], a->R[5], a->R[8]), n = placed_own(b, up);
     const double height = v3_dot(up, v3_sub(v3_load(b->x), v3_load(a->x)));
-    gap->normal = n;
-    gap->b = support(b, v3_neg(n));
-    gap->distance = height + v3_dot(n, gap->b);
-    gap->a = v3_madd(gap->b, -gap->distance, n);
-    gap->triangle = -1;
-    return gap->distance <= limit;
+    separation->normal = n;
+    separation->b = support(b, v3_neg(n));
+    separation->distance = height + v3_dot(n, separation->b);
+    separation->a = v3_madd(separation->b, -separation->distance, n);
+    separation->triangle = -1;
+    return separation->distance <= limit;
 }
 
 /* ---- spheres and capsules ---------------------------------------------------------------------------------------- */
@@ -68,7 +68,7 @@ static bool plane_closest(const struct sadmm_placed *a, const struct sadmm_place
 static double half_length(const struct sadmm_geometry *g) { return g->type == SADMM_SHAPE_CAPSULE ? g->size[1] : 0; }
 
 static bool rounds_closest(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
-                           const struct closest_pose *pose, double limit, struct sadmm_gap *gap)
+                           const struct closest_pose *pose, double limit, struct sadmm_separation *separation)
 {
     const double ha = half_length(a), hb = half_length(b), ra = a->size[0], rb = b->size[0];
     const vec3 u = v3(pose->R.r[0].z, pose->R.r[1].z, pose->R.r[2].z), w = v3(0, 0, 1);
@@ -87,14 +87,14 @@ static bool rounds_closest(const struct sadmm_geometry *a, const struct sadmm_ge
         n = hb > 0 ? v3(1, 0, 0) : v3(0, 0, 1);
     }
     const double length = direction_or(d, ra + rb + ha + hb, n, &n);
-    closest_put(n, length - ra - rb, v3_madd(pa, ra, n), v3_madd(pb, -rb, n), gap);
-    return gap->distance <= limit;
+    closest_put(n, length - ra - rb, v3_madd(pa, ra, n), v3_madd(pb, -rb, n), separation);
+    return separation->distance <= limit;
 }
 
 /* ---- convex ------------------------------------------------------------------------------------------------------ */
 
 static bool convex_closest(const struct sadmm_placed *a, const struct sadmm_placed *b, const struct closest_pose *pose,
-                           double limit, struct sadmm_gap *gap)
+                           double limit, struct sadmm_separation *separation)
 {
     const struct sadmm_geometry *ga = &a->geometry, *gb = &b->geometry;
     const double thin = smaller_of(geometry_thickness(ga), geometry_thickness(gb)),
@@ -105,44 +105,45 @@ static bool convex_closest(const struct sadmm_placed *a, const struct sadmm_plac
             .R = pose->R, .t = pose->t, .thin = thin, .size = size, .slack = 8 * SADMM_EPSILON * size};
         polytope_of(ga, a->blocks, &pair.a);
         polytope_of(gb, b->blocks, &pair.b);
-        return closest_of_polytopes(&pair, start, limit, gap);
+        return closest_of_polytopes(&pair, start, limit, separation);
     }
     struct convex_pair pair = {.R = pose->R, .t = pose->t, .thin = thin, .size = size};
     convex_of(ga, a->blocks, &pair.a);
     convex_of(gb, b->blocks, &pair.b);
     convex_pair_finish(&pair);
-    return closest_of_convex(&pair, start, limit, gap);
+    return closest_of_convex(&pair, start, limit, separation);
 }
 
 static bool is_round(int type) { return type == SADMM_SHAPE_SPHERE || type == SADMM_SHAPE_CAPSULE; }
 
 /* In order of rank (geometry.h); in the frame of b. */
 static bool closest_in_order(const struct sadmm_placed *a, const struct sadmm_placed *b, double limit,
-                             struct sadmm_gap *gap)
+                             struct sadmm_separation *separation)
 {
-    if (a->geometry.type == SADMM_SHAPE_PLANE) return plane_closest(a, b, limit, gap);
+    if (a->geometry.type == SADMM_SHAPE_PLANE) return plane_closest(a, b, limit, separation);
     const struct closest_pose pose = pose_of(a, b);
-    if (b->geometry.type == SADMM_SHAPE_MESH) return sadmm_closest_on_mesh(a, b, &pose, limit, gap);
-    if (is_round(b->geometry.type)) return rounds_closest(&a->geometry, &b->geometry, &pose, limit, gap);
-    return convex_closest(a, b, &pose, limit, gap);
+    if (b->geometry.type == SADMM_SHAPE_MESH) return sadmm_closest_on_mesh(a, b, &pose, limit, separation);
+    if (is_round(b->geometry.type)) return rounds_closest(&a->geometry, &b->geometry, &pose, limit, separation);
+    return convex_closest(a, b, &pose, limit, separation);
 }
 
 static vec3 point_in_world(const struct sadmm_placed *p, vec3 x) { return v3_add(placed_world(p, x), v3_load(p->x)); }
 
-bool sadmm_closest(const struct sadmm_placed *a, const struct sadmm_placed *b, double limit, struct sadmm_gap *gap)
+bool sadmm_closest(const struct sadmm_placed *a, const struct sadmm_placed *b, double limit,
+                   struct sadmm_separation *separation)
 {
     const bool swapped = geometry_rank(a->geometry.type) > geometry_rank(b->geometry.type);
     const struct sadmm_placed *first = swapped ? b : a, *second = swapped ? a : b;
-    if (!closest_in_order(first, second, limit, gap)) return false;
-    gap->normal = placed_world(second, gap->normal);
-    gap->normal = v3_scale(gap->normal, 1 / v3_norm(gap->normal));
-    gap->a = point_in_world(second, gap->a);
-    gap->b = point_in_world(second, gap->b);
+    if (!closest_in_order(first, second, limit, separation)) return false;
+    separation->normal = placed_world(second, separation->normal);
+    separation->normal = v3_scale(separation->normal, 1 / v3_norm(separation->normal));
+    separation->a = point_in_world(second, separation->a);
+    separation->b = point_in_world(second, separation->b);
     if (swapped) {
-        const vec3 swap = gap->a;
-        gap->a = gap->b;
-        gap->b = swap;
-        gap->normal = v3_neg(gap->normal);
+        const vec3 swap = separation->a;
+        separation->a = separation->b;
+        separation->b = swap;
+        separation->normal = v3_neg(separation->normal);
     }
     return true;
 }

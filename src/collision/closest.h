@@ -12,7 +12,7 @@
 #include "placed.h"
 
 /* In the frame of the second shape, or of the world. */
-struct sadmm_gap {
+struct sadmm_separation {
     double distance;  /* m; negative: the depth */
     vec3 normal;      /* unit, from the first to the second */
     vec3 a, b;        /* of either, b - a = distance normal */
@@ -22,7 +22,8 @@ struct sadmm_gap {
 /* Of the two types, in either order? Two planes and two meshes have no distance. */
 bool sadmm_closest_is_known(int type_a, int type_b);
 /* False: they are farther apart than `limit` (m, >= 0), which may be infinite. */
-bool sadmm_closest(const struct sadmm_placed *a, const struct sadmm_placed *b, double limit, struct sadmm_gap *gap);
+bool sadmm_closest(const struct sadmm_placed *a, const struct sadmm_placed *b, double limit,
+                   struct sadmm_separation *separation);
 
 /* ---- for closest.c ---------------------------------------------------------------------------------------------- */
 
@@ -33,6 +34,6 @@ struct closest_pose {
 };
 /* a: not a plane; b: a mesh. In the frame of b. */
 bool sadmm_closest_on_mesh(const struct sadmm_placed *a, const struct sadmm_placed *b, const struct closest_pose *pose,
-                           double limit, struct sadmm_gap *gap);
+                           double limit, struct sadmm_separation *separation);
 
 #endif

@@ -17,7 +17,7 @@ struct search {
     struct sadmm_box3 box; /* around a, in the frame of the mesh */
     double limit;          /* nothing farther counts; negative: nor what is less deep */
     bool found;
-    struct sadmm_gap *gap;
+    struct sadmm_separation *separation;
 };
 
 /* Of the triangle's polytope. */
@@ -31,28 +31,30 @@ static void triangle_pair(const struct search *s, const struct mesh_triangle *t,
 }
 
 /* Straight to the front of the triangle; point: the body's farthest behind. */
-static void to_the_front(vec3 normal, vec3 point, struct sadmm_gap *gap)
+static void to_the_front(vec3 normal, vec3 point, struct sadmm_separation *separation)
 {
     const double height = v3_dot(normal, point);
-    closest_put(v3_neg(normal), height, point, v3_madd(point, -height, normal), gap);
+    closest_put(v3_neg(normal), height, point, v3_madd(point, -height, normal), separation);
 }
 
-static bool touches_polytope(const struct search *s, const struct mesh_triangle *t, double limit, struct sadmm_gap *gap)
+static bool touches_polytope(const struct search *s, const struct mesh_triangle *t, double limit,
+                             struct sadmm_separation *separation)
 {
     struct polytope_pair pair = {.R = s->pose->R};
     triangle_pair(s, t, &pair.thin, &pair.size, &pair.t);
     pair.slack = 8 * SADMM_EPSILON * pair.size;
     polytope_of(&s->a->geometry, s->a->blocks, &pair.a);
     mesh_triangle_polytope(t, &pair.b);
-    if (!closest_of_polytopes(&pair, v3_neg(t->normal), limit, gap)) return false;
-    if (gap->distance < 0 && v3_dot(gap->normal, t->normal) > 0) {
+    if (!closest_of_polytopes(&pair, v3_neg(t->normal), limit, separation)) return false;
+    if (separation->distance < 0 && v3_dot(separation->normal, t->normal) > 0) {
         const int v = polytope_support(&pair.a, m3_tmul(pair.R, v3_neg(t->normal)), 0);
-        to_the_front(t->normal, v3_madd(pair_point_a(&pair, v), -pair.a.radius, t->normal), gap);
+        to_the_front(t->normal, v3_madd(pair_point_a(&pair, v), -pair.a.radius, t->normal), separation);
     }
     return true;
 }
 
-static bool touches_smooth(const struct search *s, const struct mesh_triangle *t, double limit, struct sadmm_gap *gap)
+static bool touches_smooth(const struct search *s, const struct mesh_triangle *t, double limit,
+                           struct sadmm_separation *separation)
 {
     struct convex_pair pair = {.R = s->pose->R};
     const struct difference_point zero = {{0, 0, 0}, 0, 0};
@@ -61,10 +63,10 @@ static bool touches_smooth(const struct search *s, const struct mesh_triangle *t
     pair.b.form = CONVEX_POLYTOPE;
     mesh_triangle_polytope(t, &pair.b.p);
     convex_pair_finish(&pair);
-    if (!closest_of_convex(&pair, v3_neg(t->normal), limit, gap)) return false;
-    if (gap->distance < 0 && v3_dot(gap->normal, t->normal) > 0) {
+    if (!closest_of_convex(&pair, v3_neg(t->normal), limit, separation)) return false;
+    if (separation->distance < 0 && v3_dot(separation->normal, t->normal) > 0) {
         const vec3 down = v3_neg(t->normal);
-        to_the_front(t->normal, convex_point_a(&pair, convex_support(&pair, down, &zero).a, down), gap);
+        to_the_front(t->normal, convex_point_a(&pair, convex_support(&pair, down, &zero).a, down), separation);
     }
     return true;
 }
@@ -74,20 +76,22 @@ static double limit_of(const struct search *s) { return s->limit > 0 ? s->limit 
 static void try_triangle(struct search *s, int32_t triangle)
 {
     struct mesh_triangle t;
-    struct sadmm_gap gap;
+    struct sadmm_separation separation;
     mesh_triangle_of(s->mesh, triangle, &t);
-    if (!(geometry_is_smooth(&s->a->geometry) ? touches_smooth : touches_polytope)(s, &t, limit_of(s), &gap)) return;
-    if (gap.distance > s->limit || (s->found && gap.distance == s->limit && triangle > s->gap->triangle)) return;
-    gap.triangle = triangle;
-    gap.a = v3_add(gap.a, t.origin);
-    gap.b = v3_add(gap.b, t.origin);
-    *s->gap = gap;
-    s->limit = gap.distance;
+    if (!(geometry_is_smooth(&s->a->geometry) ? touches_smooth : touches_polytope)(s, &t, limit_of(s), &separation))
+        return;
+    if (separation.distance > s->limit ||
+        (s->found && separation.distance == s->limit && triangle > s->separation->triangle)) return;
+    separation.triangle = triangle;
+    separation.a = v3_add(separation.a, t.origin);
+    separation.b = v3_add(separation.b, t.origin);
+    *s->separation = separation;
+    s->limit = separation.distance;
     s->found = true;
 }
 
 /* The square of how far two boxes are apart. */
-static double box_gap2(const struct sadmm_box3 *box, const double lo[3], const double hi[3])
+static double box_separation2(const struct sadmm_box3 *box, const double lo[3], const double hi[3])
 {
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
@@ -100,7 +104,7 @@ static double box_gap2(const struct sadmm_box3 *box, const double lo[3], const d
 static bool box_is_near(const struct search *s, const double lo[3], const double hi[3])
 {
     const double limit = limit_of(s);
-    return box_gap2(&s->box, lo, hi) <= limit * limit * (1 + 1e-9);
+    return box_separation2(&s->box, lo, hi) <= limit * limit * (1 + 1e-9);
 }
 
 static bool node_is_near(const struct search *s, int32_t node)
@@ -140,14 +144,14 @@ static void search_tree(struct search *s)
     int32_t at = 0;
     while (s->mesh->node[at].first < 0) {
         const int32_t left = at + 1, right = s->mesh->node[left].next;
-        double gap[2];
+        double separation[2];
         for (int k = 0; k < 2; ++k) {
             const struct mesh_node *n = &s->mesh->node[k ? right : left];
             const double lo[3] = {(double)n->lo[0], (double)n->lo[1], (double)n->lo[2]},
                          hi[3] = {(double)n->hi[0], (double)n->hi[1], (double)n->hi[2]};
-            gap[k] = box_gap2(&s->box, lo, hi);
+            separation[k] = box_separation2(&s->box, lo, hi);
         }
-        at = gap[1] < gap[0] ? right : left;
+        at = separation[1] < separation[0] ? right : left;
     }
     try_leaf(s, at);
     const int32_t seen = at;
@@ -187,13 +191,13 @@ static void search_heights(struct search *s)
 }
 
 bool sadmm_closest_on_mesh(const struct sadmm_placed *a, const struct sadmm_placed *b, const struct closest_pose *pose,
-                           double limit, struct sadmm_gap *gap)
+                           double limit, struct sadmm_separation *separation)
 {
     struct mesh mesh;
     double R[9], extent[3];
     const double x[3] = {pose->t.x, pose->t.y, pose->t.z};
     mesh_at(b->blocks, b->geometry.hull, &mesh);
-    struct search s = {.a = a, .pose = pose, .mesh = &mesh, .limit = limit, .gap = gap};
+    struct search s = {.a = a, .pose = pose, .mesh = &mesh, .limit = limit, .separation = separation};
     for (int k = 0; k < 3; ++k) v3_store(pose->R.r[k], R + 3 * k);
     geometry_extents(&a->geometry, R, extent);
     for (int k = 0; k < 3; ++k) {

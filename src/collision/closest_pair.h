@@ -10,14 +10,14 @@
 #define CLOSEST_ON_AXIS 1e-10
 
 /* pa and pb, or b's point moved to where it is due where rounding has left the two off the axis by a little. */
-static inline void closest_put(vec3 n, double distance, vec3 pa, vec3 pb, struct sadmm_gap *gap)
+static inline void closest_put(vec3 n, double distance, vec3 pa, vec3 pb, struct sadmm_separation *separation)
 {
     const vec3 middle = v3_scale(v3_add(pa, pb), 0.5);
-    gap->distance = distance;
-    gap->normal = n;
-    gap->a = v3_madd(middle, -distance / 2, n);
-    gap->b = v3_madd(middle, distance / 2, n);
-    gap->triangle = -1;
+    separation->distance = distance;
+    separation->normal = n;
+    separation->a = v3_madd(middle, -distance / 2, n);
+    separation->b = v3_madd(middle, distance / 2, n);
+    separation->triangle = -1;
 }
 
 /* Are they off the axis, by more than rounding? */
@@ -44,7 +44,7 @@ static inline bool closest_held_apart(const struct polytope_pair *pair, vec3 n, 
 
 /* Of two polytopes, of which b has faces. start: a direction from a to b. */
 static inline bool closest_of_polytopes(const struct polytope_pair *pair, vec3 start, double limit,
-                                        struct sadmm_gap *gap)
+                                        struct sadmm_separation *separation)
 {
     struct polytope_axis axis;
     uint32_t feature;
@@ -56,7 +56,7 @@ static inline bool closest_of_polytopes(const struct polytope_pair *pair, vec3 s
         pa = a;
         pb = b;
     }
-    closest_put(axis.n, axis.separation, pa, pb, gap);
+    closest_put(axis.n, axis.separation, pa, pb, separation);
     return true;
 }
 
@@ -68,8 +68,8 @@ static inline void closest_middle(const struct convex_pair *pair, struct convex_
     vec3 sum = v3(0, 0, 0);
     double least = HUGE_VAL;
     int nearest = 0;
-    bool proven;
-    convex_facing_manifold(pair, axis->n, axis->separation, SADMM_REAL_MAX, &m, &proven);
+    bool witness;
+    convex_clip_manifold(pair, axis->n, axis->separation, SADMM_REAL_MAX, &m, &witness);
     for (int k = 0; k < m.count; ++k) least = smaller_of(m.points[k].separation, least);
     for (int k = 0; k < m.count; ++k) {
         if (m.points[k].separation > least + 1e-9 * pair->size) continue;
@@ -83,7 +83,8 @@ static inline void closest_middle(const struct convex_pair *pair, struct convex_
 }
 
 /* Of two bodies of which one at least is smooth. */
-static inline bool closest_of_convex(struct convex_pair *pair, vec3 start, double limit, struct sadmm_gap *gap)
+static inline bool closest_of_convex(struct convex_pair *pair, vec3 start, double limit,
+                                     struct sadmm_separation *separation)
 {
     struct convex_axis axis;
     uint32_t cache;
@@ -95,7 +96,7 @@ static inline bool closest_of_convex(struct convex_pair *pair, vec3 start, doubl
             : !convex_is_on_flat(pair, &axis, kind == CONVEX_MEMORY_FLAT_A, (int)(cache >> MANIFOLD_DIRECTION_SHIFT),
                                  CLOSEST_ON_AXIS * pair->size))
         closest_middle(pair, &axis);
-    closest_put(axis.n, axis.separation, axis.pa, axis.pb, gap);
+    closest_put(axis.n, axis.separation, axis.pa, axis.pb, separation);
     return true;
 }
 

@@ -170,22 +170,22 @@ static void exchange(struct sadmm_contact_set *a, struct sadmm_contact_set *b)
     *b = swap;
 }
 
-static sadmm_status look(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
-                         struct sadmm_error *error)
+static sadmm_status update_candidates(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                                      struct sadmm_error *error)
 {
     return sadmm_candidates_update(&collision->candidates, input, thread_count(input, input->shape_count), error);
 }
 
-sadmm_status sadmm_collision_look_ahead(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
-                                        struct sadmm_error *error)
+sadmm_status sadmm_collision_find_candidates(struct sadmm_collision *collision,
+                                             const struct sadmm_collision_input *input, struct sadmm_error *error)
 {
-    collision->looked_ahead = collision->row.made = false;
-    TRY(look(collision, input, error));
-    collision->looked_ahead = true;
+    collision->has_candidates = collision->row.made = false;
+    TRY(update_candidates(collision, input, error));
+    collision->has_candidates = true;
     return SADMM_OK;
 }
 
-void sadmm_collision_look_again(struct sadmm_collision *collision) { collision->looked_ahead = false; }
+void sadmm_collision_drop_candidates(struct sadmm_collision *collision) { collision->has_candidates = false; }
 
 /* The new set into `out`, which then takes the place of `contacts`. */
 static sadmm_status find_into(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
@@ -194,8 +194,8 @@ static sadmm_status find_into(struct sadmm_collision *collision, const struct sa
 {
     int threads;
 
-    if (!collision->looked_ahead) TRY(look(collision, input, error));
-    collision->looked_ahead = false;
+    if (!collision->has_candidates) TRY(update_candidates(collision, input, error));
+    collision->has_candidates = false;
     if (collision->candidates.list.count > INT32_MAX / SADMM_MAX_POINTS)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu pairs of shapes may touch: at most %d can be indexed",
                           collision->candidates.list.count, (int)(INT32_MAX / SADMM_MAX_POINTS));

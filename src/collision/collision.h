@@ -2,7 +2,7 @@
  *
  * Shapes live in slots that stay put for a shape's life; a dead slot has alive = false, and a sensor
  * counts as one. The result does not depend on
- * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b, child), where a is the
+ * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b, subshape), where a is the
  * shape of the lower (type, slot) and the normal runs from a to b. Two shapes have a pair for each of their manifolds.
  */
 #ifndef SADMM_COLLISION_COLLISION_H
@@ -18,18 +18,19 @@
 extern "C" {
 #endif
 
-enum { SADMM_MOST_CHILDREN = 65535 }; /* the children of a pair are counted in 32 bits */
+enum { SADMM_MOST_SUBSHAPES = 65535 }; /* the subshapes of a pair are counted in 32 bits */
 
 /* What a shape is made of, apart from where it is and what it is like to touch. Shapes refer to it by a handle, so that
- * several may share one. A geometry has children, the pieces that collide: a pair of shapes has a manifold for each
- * pair of their children, at most. Most types have one child, the whole; where one is given more, each is the whole.
- * The children of a mesh are its triangles: those of a pair are not counted out, but searched for (mesh_walk.h). */
+ * several may share one. A geometry has subshapes, the pieces that collide: a pair of shapes has a manifold for each
+ * pair of their subshapes, at most. Most types have one subshape, the whole; where one is given more, each is the
+ * whole. The subshapes of a mesh are its triangles: those of a pair are not counted out, but searched for
+ * (mesh_walk.h). */
 struct sadmm_geometry {
-    int32_t type;     /* sadmm_shape_type */
-    int32_t children; /* in [1, SADMM_MOST_CHILDREN]; of MESH 0 */
-    double size[3];   /* m, as in sadmm_shape_def; of HULL the half extents of the box around it, whose centre and axes
-                         are the shape's frame; of MESH too */
-    uint32_t hull;    /* of HULL and MESH: offset of its block in the input's `hulls` (hull_data.h, mesh_data.h) */
+    int32_t type;      /* sadmm_shape_type */
+    int32_t subshapes; /* in [1, SADMM_MOST_SUBSHAPES]; of MESH 0 */
+    double size[3];    /* m, as in sadmm_shape_def; of HULL the half extents of the box around it, whose centre and axes
+                          are the shape's frame; of MESH too */
+    uint32_t hull;     /* of HULL and MESH: offset of its block in the input's `hulls` (hull_data.h, mesh_data.h) */
     uint32_t reserved;
 };
 
@@ -70,9 +71,10 @@ struct sadmm_collision_input {
     size_t shape_count;               /* slots, dead ones included */
     const struct sadmm_geometry *geometries; /* by handle */
     size_t geometry_count;
-    const double *hulls;              /* the pool of blocks (hull_data.h); NULL: none is a HULL, a MESH, or smooth (geometry.h) */
+    const double *hulls;              /* shape data (hull_data.h); NULL: none is a HULL, a MESH, or smooth
+                                         (geometry.h) */
     size_t hull_doubles;
-    uint32_t hull_revision;           /* changes whenever the pool does */
+    uint32_t hull_revision;           /* changes whenever the shape data does */
     const struct sadmm_collision_body *bodies; /* by world body slot */
     size_t body_count;
     double dt;                        /* of what contacts are found for: the step, or the sub-step */

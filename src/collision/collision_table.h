@@ -1,9 +1,9 @@
 /* Which pairs of types collide, and how: the one list, for host and device.
  *
  * An entry is PAIR(type of a, type of b, call): a is of the lower type (geometry_rank) or, of two of one type, the shape
- * in the lower slot. In the call a and b are the sizes of the two (vec3, m) and child is the child of the pair (geometry.h); pose,
- * limit, cache and m are as in manifold.h. The list becomes a switch (pair_manifold.h), not a table of pointers: all of
- * it is inlined into the narrow phase, and a pair that is listed twice does not compile.
+ * in the lower slot. In the call a and b are the sizes of the two (vec3, m) and subshape is the subshape of the pair
+ * (geometry.h); pose, limit, cache and m are as in manifold.h. The list becomes a switch (pair_manifold.h), not a table
+ * of pointers: all of it is inlined into the narrow phase, and a pair that is listed twice does not compile.
  *
  * Types without an entry have no contacts and must never meet. Static bodies do not meet each other, so a type that
  * lacks an entry with any other is for static bodies only: sadmm_geometry_check refuses it elsewhere, where a shape is
@@ -29,7 +29,7 @@
     PAIR(CAPSULE, BOX,     manifold_capsule_box(a.x, a.y, b, pose, limit, cache, m))            \
     PAIR(BOX,     BOX,     manifold_box_box(b, a, pose, limit, cache, m))
 
-/* With a hull, by the pool of blocks (hull_data.h), the geometries shape_a and shape_b: a list of their own, so that a
+/* With a hull, by the shape data (hull_data.h), the geometries shape_a and shape_b: a list of their own, so that a
  * narrow phase without hulls is what it would be if there were none. */
 #define SADMM_HULL_TABLE(PAIR)                                                         \
     PAIR(PLANE,   HULL, hull_plane_manifold(shape_b, hulls, pose, limit, m))           \

@@ -19,7 +19,7 @@ SADMM_INLINE double contact_friction(const uint64_t *keys, const double *values,
 }
 
 /* normal: the contact's, in the world. first: index of its first point. */
-SADMM_INLINE void contact_emit_pair(uint32_t slot_a, uint32_t slot_b, uint32_t child, const struct sadmm_proxy *a,
+SADMM_INLINE void contact_emit_pair(uint32_t slot_a, uint32_t slot_b, uint32_t subshape, const struct sadmm_proxy *a,
                                     const struct sadmm_proxy *b, const struct manifold *m, const double normal[3],
                                     double friction, int32_t first, struct sadmm_contact_pair *pair)
 {
@@ -36,16 +36,16 @@ SADMM_INLINE void contact_emit_pair(uint32_t slot_a, uint32_t slot_b, uint32_t c
     pair->cache = m->cache;
     pair->revision = word_of_pair(a->revision, b->revision);
     pair->placed = word_of_pair(a->placed, b->placed);
-    pair->child = child;
+    pair->subshape = subshape;
 }
 
-/* What the points of a pair have in common. The contact was found where its bodies are `ahead` of the step's start
- * (midway.h), and goes back to the start: arms to the start's centres of mass, gaps by the velocities. */
+/* What the points of a pair have in common. The contact was found `time_offset` seconds after the step's start
+ * (midpoint.h) and is referred to the start: arms to the centres of mass there, separations by the velocities. */
 struct pair_motion {
-    double between[3]; /* from the centre of mass of a's body to that of b's, ahead, m */
-    double shift_a[3], shift_b[3]; /* from arms ahead to arms at the start, of one point in space, m */
-    double turn_a[3], turn_b[3]; /* times an arm ahead: what turning has closed of the gap until then, less what it has
-                                    opened, m / m */
+    double between[3]; /* from a's centre of mass to b's, at the time offset, m */
+    double shift_a[3], shift_b[3]; /* from arms at the time offset to arms at the start, of one point in space, m */
+    double turn_a[3], turn_b[3]; /* times an arm at the time offset: by how much rotation has reduced the separation
+                                    until then, m / m */
     double closed; /* by the centres of mass, along the normal, and by what the shifts make of turning in the step, m */
 };
 
@@ -61,11 +61,11 @@ SADMM_RARE double arms_take(const struct sadmm_proxy *a, const struct sadmm_prox
     return across * step > most ? sqrt(most / (across * step)) : 1;
 }
 
-/* ahead: manifold.ahead; by how much the shapes are turned ahead. The point stays where it is on a body beside one that is
- * not dynamic. Of two dynamic bodies the arms of the one that is harder to turn take up most of the way: those of a bullet
- * must be its own. halfway: it was found there, where arms take up all of it. */
-SADMM_INLINE void pair_motion_by(const struct sadmm_proxy *a, double ahead_a, const struct sadmm_proxy *b,
-                                 double ahead_b, const double normal[3], double ahead, bool halfway, double dt,
+/* time_offset: manifold.time_offset; offset_a, offset_b: of the shapes' rotations. The point stays where it is on a
+ * body beside one that is not dynamic. Of two dynamic bodies the arms of the one that is harder to turn take up most of
+ * the way: those of a bullet must be its own. halfway: it was found there, where arms take up all of it. */
+SADMM_INLINE void pair_motion_by(const struct sadmm_proxy *a, double offset_a, const struct sadmm_proxy *b,
+                                 double offset_b, const double normal[3], double time_offset, bool halfway, double dt,
                                  struct pair_motion *m)
 {
     const bool both = a->system_body >= 0 && b->system_body >= 0;
@@ -75,15 +75,15 @@ SADMM_INLINE void pair_motion_by(const struct sadmm_proxy *a, double ahead_a, co
     int k;
     add_cross(normal, a->angular, 1, across_a);
     add_cross(normal, b->angular, 1, across_b);
-    for (k = 0; k < 3; ++k) way[k] = way_ahead(a, b, ahead, k);
+    for (k = 0; k < 3; ++k) way[k] = offset_displacement(a, b, time_offset, k);
     take = both && !halfway ? arms_take(a, b, normal, way, dt) : 1;
     m->closed = 0;
     for (k = 0; k < 3; ++k) {
         m->between[k] = b->com[k] - a->com[k] + way[k];
         m->shift_a[k] = -share_a * (take * way[k]);
         m->shift_b[k] = share_b * (take * way[k]);
-        m->turn_a[k] = ahead_a * across_a[k];
-        m->turn_b[k] = -ahead_b * across_b[k];
+        m->turn_a[k] = offset_a * across_a[k];
+        m->turn_b[k] = -offset_b * across_b[k];
         m->closed -= normal[k] * way[k];
     }
     m->closed += dt * (dot3(across_a, m->shift_a) - dot3(across_b, m->shift_b));
@@ -91,18 +91,18 @@ SADMM_INLINE void pair_motion_by(const struct sadmm_proxy *a, double ahead_a, co
 
 /* Where they are placed. */
 SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
-                                 double ahead, double dt, struct pair_motion *m)
+                                 double time_offset, double dt, struct pair_motion *m)
 {
-    pair_motion_by(a, a->ahead, b, b->ahead, normal, ahead, is_midway(ahead, dt), dt, m);
+    pair_motion_by(a, a->time_offset, b, b->time_offset, normal, time_offset, is_midpoint(time_offset, dt), dt, m);
 }
 /* The same of a pair that was found halfway. */
 SADMM_INLINE void pair_motion_halfway(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
-                                      double ahead, double dt, struct pair_motion *m)
+                                      double time_offset, double dt, struct pair_motion *m)
 {
-    pair_motion_by(a, a->ahead, b, b->ahead, normal, ahead, true, dt, m);
+    pair_motion_by(a, a->time_offset, b, b->time_offset, normal, time_offset, true, dt, m);
 }
 
-/* Without an impulse. Rb, b_arm: of b, at which it is turned ahead. */
+/* Without an impulse. Rb, b_arm: of b, at its time offset. */
 SADMM_INLINE void contact_emit_point_at(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double Rb[9],
                                         const double b_arm[3], const struct pair_motion *motion,
                                         const struct manifold_point *from, struct sadmm_contact_point *point)
@@ -117,8 +117,8 @@ SADMM_INLINE void contact_emit_point_at(const struct sadmm_proxy *a, const struc
         point->arm_a[k] = sadmm_body_moves(a->system_body) ? arm_a[k] + motion->shift_a[k] : 0;
         point->impulse[k] = 0;
     }
-    point->gap = (double)from->separation + motion->closed + dot3(motion->turn_a, arm_a) +
-                 dot3(motion->turn_b, arm_b);
+    point->separation = (double)from->separation + motion->closed + dot3(motion->turn_a, arm_a) +
+                        dot3(motion->turn_b, arm_b);
     point->error = 0;
     point->feature = from->feature;
     point->migrates = 0;
@@ -133,15 +133,15 @@ SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct s
 
 /* The same of a pair that was not found halfway; normal: set, in the world. */
 SADMM_RARE void contact_emit_turned(const struct sadmm_proxy *a, const struct sadmm_proxy *b, vec3 manifold_normal,
-                                    double ahead, double dt, const struct manifold_point *from, double normal[3],
+                                    double time_offset, double dt, const struct manifold_point *from, double normal[3],
                                     struct sadmm_contact_point *point)
 {
     struct proxy_place of_b;
     struct pair_motion motion;
-    proxy_place_at(b, ahead, dt, &of_b);
+    proxy_place_at(b, time_offset, dt, &of_b);
     rotate_to_world(of_b.R, manifold_normal, normal);
     /* what does not turn is turned by nothing */
-    pair_motion_by(a, ahead, b, ahead, normal, ahead, is_midway(ahead, dt), dt, &motion);
+    pair_motion_by(a, time_offset, b, time_offset, normal, time_offset, is_midpoint(time_offset, dt), dt, &motion);
     contact_emit_point_at(a, b, of_b.R, of_b.arm, &motion, from, point);
 }
 

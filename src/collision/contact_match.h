@@ -1,7 +1,7 @@
 /* How a contact of the last step lives on in this one.
  *
- * Identity: the pair of shapes, the child (sadmm_geometry) and the revisions of the shapes (a slot may hold another
- * shape by now), then the feature. Sets are sorted by (shape_a, shape_b, child). Impulses are kept as world vectors;
+ * Identity: the pair of shapes, the subshape (sadmm_geometry) and the revisions of the shapes (a slot may hold another
+ * shape by now), then the feature. Sets are sorted by (shape_a, shape_b, subshape). Impulses are kept as world vectors;
  * where the normal turned, the normal part goes along the new normal and the tangential part is projected into the new
  * tangent plane, within the friction disc. They are forces times a time step: where the steps differ in length, the
  * forces are what carries over.
@@ -30,20 +30,20 @@ SADMM_INLINE uint64_t contact_shapes(const struct sadmm_contact_pair *pair)
     return ordered_key((uint32_t)pair->shape_a, (uint32_t)pair->shape_b);
 }
 
-/* Does the pair come before (shapes, child) in the order of a set? shapes: ordered_key of the two. */
-SADMM_INLINE bool contact_is_before(const struct sadmm_contact_pair *pair, uint64_t shapes, uint32_t child)
+/* Does the pair come before (shapes, subshape) in the order of a set? shapes: ordered_key of the two. */
+SADMM_INLINE bool contact_is_before(const struct sadmm_contact_pair *pair, uint64_t shapes, uint32_t subshape)
 {
     const uint64_t own = contact_shapes(pair);
-    return own < shapes || (own == shapes && pair->child < child);
+    return own < shapes || (own == shapes && pair->subshape < subshape);
 }
 
-/* Index of the first of the sorted pairs [low, high) that does not come before (shapes, child). */
+/* Index of the first of the sorted pairs [low, high) that does not come before (shapes, subshape). */
 SADMM_INLINE int64_t contact_lower_bound(const struct sadmm_contact_pair *pairs, int64_t low, int64_t high,
-                                         uint64_t shapes, uint32_t child)
+                                         uint64_t shapes, uint32_t subshape)
 {
     while (low < high) {
         int64_t mid = low + (high - low) / 2;
-        if (contact_is_before(&pairs[mid], shapes, child)) low = mid + 1;
+        if (contact_is_before(&pairs[mid], shapes, subshape)) low = mid + 1;
         else high = mid;
     }
     return low;
@@ -51,10 +51,10 @@ SADMM_INLINE int64_t contact_lower_bound(const struct sadmm_contact_pair *pairs,
 
 /* Is `old`, a pair of the same two slots, the same manifold of the same two shapes? All is read at once: no part waits
  * for another. */
-SADMM_INLINE bool contact_goes_on(const struct sadmm_contact_pair *old, uint32_t child, const struct sadmm_proxy *a,
+SADMM_INLINE bool contact_goes_on(const struct sadmm_contact_pair *old, uint32_t subshape, const struct sadmm_proxy *a,
                                   const struct sadmm_proxy *b)
 {
-    return (old->child == child) & (old->revision == word_of_pair(a->revision, b->revision));
+    return (old->subshape == subshape) & (old->revision == word_of_pair(a->revision, b->revision));
 }
 
 /* What the pair that goes on remembers, 0: nothing that holds. */

@@ -91,8 +91,8 @@ SADMM_INLINE double contact_radius(const struct sadmm_proxy *a, const struct sad
     rb = geometry_is_curved(&b->geometry) ? proxy_curvature_radius(b, normal, -1, point->arm_b) : HUGE_VAL;
     const double radius = ra < HUGE_VAL && rb < HUGE_VAL ? (ra + rb > 0 ? ra * rb / (ra + rb) : 0) : smaller_of(ra, rb);
     const double least = radius / (1 + CURVATURE_ROUNDING);
-    const bool rocks = (a->system_body >= 0 && least > rolling_height(normal, point->arm_a, point->gap)) ||
-                       (b->system_body >= 0 && least > rolling_height(normal, point->arm_b, point->gap));
+    const bool rocks = (a->system_body >= 0 && least > rolling_height(normal, point->arm_a, point->separation)) ||
+                       (b->system_body >= 0 && least > rolling_height(normal, point->arm_b, point->separation));
     return radius < HUGE_VAL && rocks ? radius : 0;
 }
 
@@ -125,7 +125,7 @@ SADMM_INLINE bool contact_lasts(const struct sadmm_proxy *a, const struct sadmm_
     int32_t k;
     if (before->count != count || count > ROLLING_POINTS) return false;
     for (k = before->first; k < before->first + count; ++k) {
-        if (points[k].gap < -deep) return false;
+        if (points[k].separation < -deep) return false;
         presses = presses || sadmm_normal_impulse(before, &points[k]) > 0;
     }
     return presses;
@@ -167,7 +167,7 @@ SADMM_INLINE bool contact_may_migrate(const struct sadmm_proxy *a, const struct 
 SADMM_INLINE double migration_share(double ratio) { return ratio / (1 + ratio); }
 
 /* Changes of more than this share of an arm (and of a normal, rad) are those of another place. */
-#define MIGRATION_MOST MIDWAY_TURN
+#define MIGRATION_MOST MIDPOINT_TURN
 
 /* By what the normal changes in the half step that is left; normal: halfway. old_points: the first of the old pair's. */
 SADMM_INLINE void migrate_normal(const double old_normal[3], const struct sadmm_contact_migration *old, double share,
@@ -245,7 +245,8 @@ SADMM_INLINE void migrate_apart(const struct migration_pair *pair, struct migrat
 
 /* Two dynamic bodies that roll on each other move by means, so that it is halfway through the step that an impulse acts:
  * the arms are those to where they touch there, not those that were moved to one point in space of the start
- * (contact_emit.h). They go back, and the gap with them; dt: of the step, half of which they are ahead. */
+ * (contact_emit.h). They are referred to the start of the step, and the separation with them; their time offset is dt /
+ * 2. */
 SADMM_INLINE void migrate_from_halfway(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt,
                                        const double normal[3], struct sadmm_contact_point *point)
 {
@@ -254,11 +255,11 @@ SADMM_INLINE void migrate_from_halfway(const struct sadmm_proxy *a, const struct
     add_cross(normal, a->angular, 1, across_a);
     add_cross(normal, b->angular, 1, across_b);
     for (k = 0; k < 3; ++k) {
-        const double way = way_ahead(a, b, dt / 2, k), shift_a = proxy_share(a, b) * way,
+        const double way = offset_displacement(a, b, dt / 2, k), shift_a = proxy_share(a, b) * way,
                      shift_b = proxy_share(b, a) * way;
         point->arm_a[k] += shift_a;
         point->arm_b[k] -= shift_b;
-        point->gap += dt * (across_a[k] * shift_a + across_b[k] * shift_b);
+        point->separation += dt * (across_a[k] * shift_a + across_b[k] * shift_b);
     }
 }
 

@@ -124,7 +124,7 @@ SADMM_INLINE int convex_own_directions(const struct convex *c, vec3 n, vec3 to_o
     if (flat >= 0) own[count++] = convex_flat_normal(c, flat);
     if (c->form != CONVEX_POLYTOPE) {
         const real round2 = to_other.x * to_other.x + to_other.y * to_other.y;
-        struct convex_facing line;
+        struct convex_feature line;
         if (convex_line(c, n, &line) && v3_dot(line.normal, n) >= CONVEX_BESIDE) own[count++] = line.normal;
         if (round2 > 0) {
             const real turn = real_sqrt((n.x * n.x + n.y * n.y) / round2);
@@ -217,7 +217,7 @@ SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simple
     struct epa e;
     uint32_t held = 0; /* by this flat */
     int tries = 0;
-    bool sure = false, proven = false; /* is axis an optimum, the best one? */
+    bool sure = false, witness = false; /* is axis an optimum, the best one? */
     if (!convex_epa_begin(pair, simplex, &e)) { /* a - b is flat but for rounding */
         convex_local(pair, axis, active);
         return;
@@ -236,7 +236,7 @@ SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simple
         int k;
         if (!face) break;
         if (face->height >= best - pair->equal) { /* unless the two just touch, or rounding has turned faces */
-            proven = face->height > pair->equal && face->height <= best + pair->equal;
+            witness = face->height > pair->equal && face->height <= best + pair->equal;
             break;
         }
         other.n = epa_normal(&e, face);
@@ -256,7 +256,7 @@ SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simple
         if (of_flat && of_flat != held && flat.separation >= axis->separation - pair->slack) {
             const bool better = flat.separation > axis->separation + pair->equal;
             convex_axis_along(pair, flat.n, axis, active);
-            sure = convex_is_flat_proven(pair, &flat, of_flat);
+            sure = convex_is_flat_witness(pair, &flat, of_flat);
             if (sure) held = of_flat;
             if (better) continue; /* it may be all that there is to find */
         }
@@ -267,11 +267,11 @@ SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simple
         ++tries;
     }
     if (!sure) {
-        if (proven) convex_polish(pair, active, &axis->n, &axis->separation);
+        if (witness) convex_polish(pair, active, &axis->n, &axis->separation);
         else convex_local(pair, axis, active);
     }
     /* proof, but for what the faces that were given up have beside their optimum */
-    if (!proven || tries > 0) convex_ask_beside(pair, axis, active);
+    if (!witness || tries > 0) convex_ask_beside(pair, axis, active);
 }
 
 /* 2. v: the shortest vector, by the walk. False: not certain. */
@@ -285,7 +285,7 @@ SADMM_INLINE bool convex_apart(const struct convex_pair *pair, const struct gjk_
     if (!(length > 1000 * pair->slack)) return false; /* of less the vector may be rounding */
     of_flat = convex_flat_beside(pair, n, &flat);
     if (of_flat && flat.separation >= length - convex_radii(pair) - 2 * pair->slack &&
-        convex_is_flat_proven(pair, &flat, of_flat)) {
+        convex_is_flat_witness(pair, &flat, of_flat)) {
         convex_axis_along(pair, flat.n, axis, active);
         return true;
     }

@@ -3,7 +3,7 @@
 #ifndef SADMM_COLLISION_CONVEX_FLAT_H
 #define SADMM_COLLISION_CONVEX_FLAT_H
 
-#include "convex_facing.h"
+#include "convex_clip.h"
 
 struct convex_axis {
     vec3 n;          /* unit, from a to b */
@@ -57,24 +57,25 @@ SADMM_INLINE bool convex_is_on_flat(const struct convex_pair *pair, const struct
                                     real tolerance)
 {
     const struct convex *c = of_a ? &pair->a : &pair->b;
-    struct convex_facing facing;
+    struct convex_feature feature;
     vec3 x = of_a ? v3_madd(axis->pa, -pair->a.p.radius, axis->n) : v3_madd(axis->pb, pair->b.p.radius, axis->n);
     if (of_a) x = m3_tmul(pair->R, v3_sub(x, pair->t));
-    convex_facing_of(c, convex_flat_normal(c, flat), &facing);
-    return convex_is_on(&facing, x, tolerance);
+    convex_feature_of(c, convex_flat_normal(c, flat), &feature);
+    return convex_is_on(&feature, x, tolerance);
 }
 
 /* Do two points that face each other along a flat's normal prove that no direction beside it is better? memory: of the
  * flat. */
-SADMM_INLINE bool convex_is_flat_proven(const struct convex_pair *pair, const struct convex_axis *axis, uint32_t memory)
+SADMM_INLINE bool convex_is_flat_witness(const struct convex_pair *pair, const struct convex_axis *axis,
+                                         uint32_t memory)
 {
     struct manifold m;
-    bool proven;
+    bool witness;
     if (convex_is_on_flat(pair, axis, (memory & CONVEX_MEMORY_MASK) == CONVEX_MEMORY_FLAT_A,
                           (int)(memory >> MANIFOLD_DIRECTION_SHIFT), 0))
         return true;
-    convex_facing_manifold(pair, axis->n, axis->separation, SADMM_REAL_MAX, &m, &proven);
-    return proven;
+    convex_clip_manifold(pair, axis->n, axis->separation, SADMM_REAL_MAX, &m, &witness);
+    return witness;
 }
 
 #endif

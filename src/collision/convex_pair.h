@@ -15,8 +15,8 @@ struct convex_pair {
     vec3 shift;  /* of b, while it is held away from a */
     vec3 centre[2]; /* of mass, as of pair_pose */
     bool tips[2];
-    vec3 spread; /* what points of rims are spread from (convex_facing.h); 0: a side of the other one's flat or line */
-    uint32_t left_out; /* of b: bit k: corner k, 16 + k: side k: points there are not wanted (convex_facing.h) */
+    vec3 spread; /* what points of rims are spread from (convex_clip.h); 0: a side of the other one's flat or line */
+    uint32_t left_out; /* of b: bit k: corner k, 16 + k: side k: points there are not wanted (convex_clip.h) */
     real thin;   /* the thinner one's smallest extent */
     real size;   /* of both, and of what is between them: what rounding is measured by */
     real slack;  /* rounding of a separation */

@@ -5,7 +5,8 @@
 #include "convex.h"
 #include "geometry.h"
 
-/* d: unit, own frame. Not of planes and meshes. hulls: the pool; may be NULL for what does without (geometry.h). */
+/* d: unit, own frame. Not of planes and meshes. hulls: the shape data; may be NULL for what does without
+ * (geometry.h). */
 SADMM_INLINE vec3 geometry_farthest(const struct sadmm_geometry *g, const double *hulls, vec3 d)
 {
     const vec3 s = v3_load(g->size);

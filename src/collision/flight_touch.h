@@ -41,11 +41,11 @@ struct sadmm_swept_shape {
     const struct sadmm_flight *flight;
 };
 
-/* Two of them, in the order of pairs (geometry_rank); child: of the pair. */
+/* Two of them, in the order of pairs (geometry_rank); subshape: of the pair. */
 struct sadmm_swept_pair {
     struct sadmm_swept_shape a, b;
     const double *hulls;
-    uint32_t child;
+    uint32_t subshape;
     double threshold; /* points that approach slower than this are left out, m/s */
     bool lost;        /* out: it took too many tests to decide */
 };
@@ -60,7 +60,7 @@ struct sadmm_flight_touch {
 };
 
 /* False: no point of the pair, none of which is a mesh, touches in [from, to] that approaches fast enough. Points of the
- * result: all that touch then; `child`: of which of its children, the first one that touches. */
+ * result: all that touch then; `subshape`: of which of its subshapes, the first one that touches. */
 bool sadmm_flight_touch(struct sadmm_swept_pair *pair, double from, double to, struct sadmm_flight_touch *touch);
 
 #ifdef __cplusplus

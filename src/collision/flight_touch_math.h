@@ -86,7 +86,7 @@ SADMM_CALLED void touch_test(const struct sadmm_swept_pair *p, double t, struct 
     touch_place(&p->a, t, &at->a);
     touch_place(&p->b, t, &at->b);
     at->pose = pair_pose(p->a.geometry->type == SADMM_SHAPE_PLANE, at->a.R, at->a.x, at->b.R, at->b.x);
-    at->distance = (double)shapes_apart(p->a.geometry, p->b.geometry, p->hulls, p->child, &at->pose, &n);
+    at->distance = (double)shapes_apart(p->a.geometry, p->b.geometry, p->hulls, p->subshape, &at->pose, &n);
     rotate_to_world(at->b.R, n, at->normal);
 }
 
@@ -95,7 +95,7 @@ SADMM_CALLED void touch_test_closely(const struct sadmm_swept_pair *p, struct to
 {
     at->m.count = 0;
     at->m.cache = 0;
-    pair_manifold(p->a.geometry, p->b.geometry, p->hulls, p->child, &at->pose, SADMM_REAL_MAX, 0, &at->m);
+    pair_manifold(p->a.geometry, p->b.geometry, p->hulls, p->subshape, &at->pose, SADMM_REAL_MAX, 0, &at->m);
     rotate_to_world(at->b.R, at->m.normal, at->manifold_normal);
     if (at->m.count > 0) memcpy(at->normal, at->manifold_normal, sizeof at->normal);
 }
@@ -199,7 +199,7 @@ SADMM_INLINE bool touch_balls_meet(const struct sadmm_swept_pair *p, double from
     return length3(x) <= (1 + TOUCH_NEAR) * (reach + sags);
 }
 
-/* Of one child. */
+/* Of one subshape. */
 SADMM_RARE bool swept_touch_of(struct sadmm_swept_pair *p, double from, double to, struct sadmm_flight_touch *touch)
 {
     const double thin = touch_thinner(p), passed = touch_passed_at_once(p, to - from);
@@ -246,17 +246,17 @@ SADMM_INLINE bool touch_is_earlier(struct sadmm_swept_pair *pair, double from, d
 SADMM_INLINE bool swept_touch(struct sadmm_swept_pair *pair, double from, double to,
                               struct sadmm_flight_touch *touch)
 {
-    const uint32_t children = pair_children(pair->a.geometry, pair->b.geometry);
+    const uint32_t subshapes = pair_subshapes(pair->a.geometry, pair->b.geometry);
     struct sadmm_flight_touch own;
     uint32_t first = 0;
     bool found = false;
-    for (pair->child = 0; pair->child < children; ++pair->child) {
+    for (pair->subshape = 0; pair->subshape < subshapes; ++pair->subshape) {
         if (!touch_is_earlier(pair, from, to, found, touch, &own)) continue;
         *touch = own;
-        first = pair->child;
+        first = pair->subshape;
         found = true;
     }
-    pair->child = first;
+    pair->subshape = first;
     return found;
 }
 

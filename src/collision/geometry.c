@@ -18,12 +18,12 @@ sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, enum sa
     if ((uint32_t)geometry->type >= SADMM_SHAPE_TYPE_COUNT)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%stype = %d: must be in [0, %d)", name,
                           (int)geometry->type, SADMM_SHAPE_TYPE_COUNT);
-    if (geometry->type == SADMM_SHAPE_MESH && geometry->children != 0)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%schildren = %d: must be 0 of a mesh", name,
-                          (int)geometry->children);
-    if (geometry->type != SADMM_SHAPE_MESH && (geometry->children < 1 || geometry->children > SADMM_MOST_CHILDREN))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%schildren = %d: must be in [1, %d]", name,
-                          (int)geometry->children, SADMM_MOST_CHILDREN);
+    if (geometry->type == SADMM_SHAPE_MESH && geometry->subshapes != 0)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%ssubshapes = %d: must be 0 of a mesh", name,
+                          (int)geometry->subshapes);
+    if (geometry->type != SADMM_SHAPE_MESH && (geometry->subshapes < 1 || geometry->subshapes > SADMM_MOST_SUBSHAPES))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%ssubshapes = %d: must be in [1, %d]", name,
+                          (int)geometry->subshapes, SADMM_MOST_SUBSHAPES);
     for (int other = 0; needs_every_pair(geometry, motion) && other < SADMM_SHAPE_TYPE_COUNT; ++other)
         if (!pair_is_listed(geometry->type, other))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
@@ -52,11 +52,11 @@ sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *inp
     const size_t hull_doubles = input->hulls ? input->hull_doubles : 0;
     const bool of_block = geometry->type == SADMM_SHAPE_HULL || geometry->type == SADMM_SHAPE_MESH;
     if (of_block && (geometry->hull < HULL_FIRST_OWN || geometry->hull >= hull_doubles))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%shull = %u: must be in [%d, %zu), the pool of hulls",
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%shull = %u: must be in [%d, %zu), the shape data",
                           name, geometry->hull, HULL_FIRST_OWN, hull_doubles);
     if (geometry_is_smooth(geometry) && hull_doubles < HULL_FIRST_OWN)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "%stype = %d: needs a pool of hulls, of %d doubles or more", name, (int)geometry->type,
+                          "%stype = %d: needs shape data of %d doubles or more", name, (int)geometry->type,
                           HULL_FIRST_OWN);
     return SADMM_OK;
 }

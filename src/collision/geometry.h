@@ -29,7 +29,7 @@ SADMM_INLINE int geometry_sizes(int type)
  * what their triangles' other shapes are seen from: they come last. */
 SADMM_INLINE int geometry_rank(int type) { return type == SADMM_SHAPE_MESH ? (int)SADMM_SHAPE_TYPE_COUNT : type; }
 
-/* Is it one of those that hulls and the like meet by convex.h, and for which a world has a pool (hull_data.h)? */
+/* Is it one of those that hulls and the like meet by convex.h, and for which a world has shape data (hull_data.h)? */
 SADMM_INLINE int geometry_is_smooth(const struct sadmm_geometry *g)
 {
     return g->type >= SADMM_SHAPE_CYLINDER && g->type <= SADMM_SHAPE_ELLIPSOID;
@@ -113,11 +113,11 @@ SADMM_INLINE void geometry_extents(const struct sadmm_geometry *g, const double 
     for (k = 0; k < 3; ++k) extent[k] = HUGE_VAL;
 }
 
-/* Manifolds that a pair may have at most: child = (child of a) x (children of b) + (child of b). 0: a mesh is one of
- * them, whose triangle is the child (mesh_walk.h finds them). */
-SADMM_INLINE uint32_t pair_children(const struct sadmm_geometry *a, const struct sadmm_geometry *b)
+/* Manifolds that a pair may have at most: subshape = (subshape of a) x (subshapes of b) + (subshape of b). 0: a mesh is
+ * one of them, whose triangle is the subshape (mesh_walk.h finds them). */
+SADMM_INLINE uint32_t pair_subshapes(const struct sadmm_geometry *a, const struct sadmm_geometry *b)
 {
-    return (uint32_t)a->children * (uint32_t)b->children;
+    return (uint32_t)a->subshapes * (uint32_t)b->subshapes;
 }
 
 #endif

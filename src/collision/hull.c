@@ -14,12 +14,12 @@
 #include "core/base/check.h"
 #include "core/base/memory.h"
 #include "core/math/quat.h"
-#include "hull_block.h"
 #include "hull_data.h"
 #include "hull_faces.h"
 #include "hull_measure.h"
 #include "hull_mesh.h"
 #include "hull_points.h"
+#include "hull_write.h"
 
 enum { LEAST_POINTS = 4, MOST_POINTS = 1000000 };
 /* Of more points those inside are left out first, and hulls of more corners given up before they fill the memory. */
@@ -69,7 +69,7 @@ struct making {
     double *scaled;            /* the points as qhull gets them */
     double *vertices, *planes; /* of the mesh */
     int32_t *rank;
-    double merge, rounding;
+    double merge, convex_radius;
     size_t vertex_capacity, plane_capacity, rank_capacity;
 };
 
@@ -228,14 +228,14 @@ static void choose_box(const struct making *m, const double principal[4], sadmm_
     }
     const struct hull_box box = sadmm_hull_box(m->vertices, count, best, inside);
     memcpy(hull->orientation, best ? best : unit, sizeof hull->orientation);
-    for (int k = 0; k < 3; ++k) hull->half[k] = box.half[k] + m->rounding;
+    for (int k = 0; k < 3; ++k) hull->half[k] = box.half[k] + m->convex_radius;
     for (int k = 0; k < 3; ++k) hull->position[k] = m->points.middle[k] + box.position[k];
 }
 
 static bool allocate(const struct hull_mesh *mesh, sadmm_hull *hull)
 {
     const size_t vertices = (size_t)mesh->vertex_count, faces = (size_t)mesh->face_count;
-    hull->doubles = sadmm_hull_block_doubles(mesh);
+    hull->doubles = sadmm_hull_data_doubles(mesh);
     hull->block = (double *)sadmm_alloc(hull->doubles, sizeof *hull->block);
     hull->vertices = (double *)sadmm_alloc(vertices, 3 * sizeof *hull->vertices);
     hull->face_first = (int32_t *)sadmm_alloc(faces + 1, sizeof *hull->face_first);
@@ -253,13 +253,13 @@ static bool fill(struct making *m, const double *given, const struct hull_solid 
     choose_box(m, solid->axes, hull, inside);
     sadmm_hull_turn_planes(&m->mesh, inside, hull->orientation, m->planes);
     if (!order_as_given(m, inside)) return false;
-    sadmm_hull_block_write(&m->mesh, inside, m->planes, m->rounding, hull->block);
+    sadmm_hull_data_write(&m->mesh, inside, m->planes, m->convex_radius, hull->block);
     for (int32_t v = 0; v < hull->vertex_count; ++v)
         memcpy(hull->vertices + 3 * v, given + 3 * m->points.at[m->mesh.point[v]].number, 3 * sizeof *given);
     memcpy(hull->face_first, m->mesh.face_first, ((size_t)hull->face_count + 1) * sizeof *hull->face_first);
     memcpy(hull->corners, m->mesh.corner, (size_t)m->mesh.face_first[hull->face_count] * sizeof *hull->corners);
     hull->merge = m->merge;
-    hull->rounding = m->rounding;
+    hull->convex_radius = m->convex_radius;
     hull->volume = solid->volume;
     memcpy(hull->moments, solid->moments, sizeof hull->moments);
     memcpy(hull->axes, solid->axes, sizeof hull->axes);
@@ -271,7 +271,7 @@ static bool fill(struct making *m, const double *given, const struct hull_solid 
 static sadmm_status build(struct making *m, const double *given, sadmm_hull **out, struct sadmm_error *error)
 {
     struct hull_solid solid;
-    if (!sadmm_hull_solid(&m->mesh, m->vertices, m->planes, m->rounding, &solid))
+    if (!sadmm_hull_solid(&m->mesh, m->vertices, m->planes, m->convex_radius, &solid))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->points: their hull has a volume of %g m^3",
                           solid.volume);
     double *inside = (double *)sadmm_alloc((size_t)m->mesh.vertex_count, 3 * sizeof *inside);
@@ -303,7 +303,7 @@ static sadmm_status make(const sadmm_hull_def *def, sadmm_hull **out)
     sadmm_hull *last = NULL, *made = NULL;
     bool done = false;
     while (!done) {
-        struct making m = {.merge = def->merge, .rounding = def->rounding};
+        struct making m = {.merge = def->merge, .convex_radius = def->convex_radius};
         const sadmm_status status = make_once(&m, &next, &made, NULL);
         if (status == SADMM_OK) done = made->vertex_count == m.points.count;
         free_making(&m);
@@ -327,7 +327,7 @@ sadmm_status sadmm_hull_create(const sadmm_hull_def *def, sadmm_hull **out)
         return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->point_count = %zu: must be in [%d, %d]",
                           def->point_count, LEAST_POINTS, MOST_POINTS);
     TRY(sadmm_check_range("def->merge", def->merge, 0, 1e-2, NULL));
-    TRY(sadmm_check_range("def->rounding", def->rounding, 0, 1e6, NULL));
+    TRY(sadmm_check_range("def->convex_radius", def->convex_radius, 0, 1e6, NULL));
     TRY(sadmm_check_vector("def->points", def->points, 3 * (int)def->point_count, 1e6, NULL));
     return make(def, out);
 }
@@ -354,9 +354,9 @@ const double *sadmm_hull_vertices(const sadmm_hull *hull)
     return hull ? hull->vertices : NULL;
 }
 
-double sadmm_hull_rounding(const sadmm_hull *hull)
+double sadmm_hull_convex_radius(const sadmm_hull *hull)
 {
-    return hull ? hull->rounding : 0;
+    return hull ? hull->convex_radius : 0;
 }
 
 double sadmm_hull_merge(const sadmm_hull *hull)

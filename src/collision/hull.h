@@ -5,8 +5,8 @@
  *   hull_faces.c     qhull: points to faces
  *   hull_mesh.c      faces as loops of corners: are they a polyhedron; their order
  *   hull_measure.c   planes, volume, principal axes, the box around it
- *   hull_round.c     what rounding adds to the integrals
- *   hull_block.c     the block that contact finding reads (hull_data.h), and those that every pool begins with
+ *   hull_round.c     what the convex radius adds to the integrals
+ *   hull_write.c     the block that contact finding reads (hull_data.h), and those that all shape data begins with
  *   hull_archive.c   a hull as bytes and back
  *
  * Contact finding works in the frame of a box around the hull, not in that of the points: its half extents are bounds
@@ -28,8 +28,8 @@ struct sadmm_hull {
     double *block;          /* hull_data.h */
     size_t doubles;         /* of the block */
     double merge;           /* as it was asked for */
-    double rounding;        /* m; the vertices are those of the core */
-    double half[3];         /* of the box around the hull, rounding included, m */
+    double convex_radius;   /* m; the vertices are those of the core */
+    double half[3];         /* of the box around the hull, convex radius included, m */
     double position[3], orientation[4]; /* the block's frame in that of the points */
     double *vertices;       /* 3 each, as they were given */
     int32_t *face_first;    /* face_count + 1 */
@@ -50,7 +50,7 @@ void sadmm_hull_release(const sadmm_hull *hull);
 struct sadmm_archive;
 void sadmm_hull_archive(struct sadmm_archive *archive, sadmm_hull **hull);
 
-/* The blocks that every pool begins with, HULL_FIRST_OWN doubles. */
-void sadmm_hull_prelude(double *pool);
+/* The blocks that all shape data begins with, HULL_FIRST_OWN doubles. */
+void sadmm_hull_prelude(double *data);
 
 #endif

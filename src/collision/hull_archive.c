@@ -63,8 +63,9 @@ static bool header_fits(const struct sadmm_hull *hull)
     return h->vertices >= 4 && h->vertices <= HULL_MOST_VERTICES && h->edges >= 6 && h->edges <= HULL_MOST_EDGES &&
            h->faces >= 4 && h->faces == 2 - h->vertices + h->edges && h->vertex_stride == hull_stride(h->vertices) &&
            h->face_stride == hull_stride(h->faces) && h->doubles == hull_doubles(h->vertices, h->faces, h->edges) &&
-           (size_t)h->doubles == hull->doubles && h->reserved == 0 && h->rounding >= 0 && isfinite(h->rounding) &&
-           h->vertices == hull->vertex_count && h->edges == hull->edge_count && h->faces == hull->face_count;
+           (size_t)h->doubles == hull->doubles && h->reserved == 0 && h->convex_radius >= 0 &&
+           isfinite(h->convex_radius) && h->vertices == hull->vertex_count && h->edges == hull->edge_count &&
+           h->faces == hull->face_count;
 }
 
 static bool block_fits(const struct sadmm_hull *hull)
@@ -143,7 +144,7 @@ void sadmm_hull_archive(struct sadmm_archive *archive, sadmm_hull **hull)
     SADMM_ARCHIVE(archive, h->face_count);
     SADMM_ARCHIVE(archive, doubles);
     SADMM_ARCHIVE(archive, h->merge);
-    SADMM_ARCHIVE(archive, h->rounding);
+    SADMM_ARCHIVE(archive, h->convex_radius);
     SADMM_ARCHIVE(archive, h->half);
     SADMM_ARCHIVE(archive, h->position);
     SADMM_ARCHIVE(archive, h->orientation);

@@ -1,8 +1,8 @@
 /* A convex polytope as contact finding reads it: one block of memory without pointers, the same on host and device.
  *
- * A world has its hulls in one pool of doubles, block after block; a geometry names a block by its offset there. The
- * first blocks of every pool are the same: the unit cube, a segment and a point, which boxes, capsules and spheres are
- * to a hull (polytope.h scales them).
+ * The shape data of a world is an array of doubles with a block for every hull; a geometry has the offset of its block.
+ * The first blocks are always the same: the unit cube, a segment and a point, which boxes, capsules and spheres are to
+ * a hull (polytope.h scales them).
  *
  * A block:
  *
@@ -38,7 +38,7 @@ struct sadmm_hull_header {
     int32_t vertex_stride, face_stride;
     int32_t doubles; /* the whole block */
     int32_t reserved;
-    double rounding; /* m: the hull is the points' with a ball of this radius around every point of it */
+    double convex_radius; /* m: the hull is the points' with a ball of this radius around every point of it */
 };
 
 enum { HULL_HEADER_DOUBLES = 5 };
@@ -56,7 +56,7 @@ SADMM_INLINE int32_t hull_doubles(int32_t vertices, int32_t faces, int32_t edges
            (hull_links(vertices, faces, edges) + 3) / 4;
 }
 
-/* Offsets of the blocks that every pool begins with, and of the first of its own. */
+/* Offsets of the blocks that all shape data begins with, and of the first of its own. */
 enum {
     HULL_CUBE = 0,      /* half extents 1. Vertex v: bit k set where coordinate k is +1 */
     HULL_CUBE_DOUBLES = HULL_HEADER_DOUBLES + 24 + 32 + 34, /* 8 vertices, 6 faces, 12 edges: 7 + 48 + 48 + 9 + 24 = 136 links */

@@ -82,7 +82,7 @@ double sadmm_hull_bulge(const struct hull_mesh *mesh, const double *vertices, co
 /* Sums over the tetrahedra between `origin` and the triangles of the faces, along axes turned by `axes` (its columns);
  * exact but for rounding, and without cancellation where `origin` is inside. */
 static struct hull_integrals integrate(const struct hull_mesh *mesh, const double *vertices, const double *planes,
-                                       double rounding, vec3 origin, mat3 axes)
+                                       double convex_radius, vec3 origin, mat3 axes)
 {
     struct hull_integrals sum = {0};
     for (int32_t f = 0; f < mesh->face_count; ++f) {
@@ -106,7 +106,7 @@ static struct hull_integrals integrate(const struct hull_mesh *mesh, const doubl
             }
         }
     }
-    if (rounding > 0) sadmm_hull_add_round(mesh, vertices, planes, rounding, origin, axes, &sum);
+    if (convex_radius > 0) sadmm_hull_add_round(mesh, vertices, planes, convex_radius, origin, axes, &sum);
     for (int i = 0; i < 3; ++i)
         for (int j = i + 1; j < 3; ++j) sum.second[i][j] = sum.second[j][i];
     return sum;
@@ -119,7 +119,7 @@ static vec3 mean(const double *vertices, int32_t count)
     return v3_scale(sum, 1.0 / count);
 }
 
-bool sadmm_hull_solid(const struct hull_mesh *mesh, const double *vertices, const double *planes, double rounding,
+bool sadmm_hull_solid(const struct hull_mesh *mesh, const double *vertices, const double *planes, double convex_radius,
                       struct hull_solid *solid)
 {
     static const double none[4] = {1, 0, 0, 0};
@@ -128,13 +128,13 @@ bool sadmm_hull_solid(const struct hull_mesh *mesh, const double *vertices, cons
     struct hull_integrals sum = integrate(mesh, vertices, planes, 0, centre, given);
     solid->volume = sum.volume;
     if (!(sum.volume > 0)) return false;
-    if (rounding > 0) sum = integrate(mesh, vertices, planes, rounding, centre, given);
+    if (convex_radius > 0) sum = integrate(mesh, vertices, planes, convex_radius, centre, given);
     centre = v3_madd(centre, 1 / sum.volume, v3_load(sum.first));
-    sum = integrate(mesh, vertices, planes, rounding, centre, given);
+    sum = integrate(mesh, vertices, planes, convex_radius, centre, given);
     principal_axes(sum.second, solid->axes);
     /* Again along these axes: across a thin hull they are known to its thickness then, not to its length alone. */
     double rest[4];
-    sum = integrate(mesh, vertices, planes, rounding, centre, q_matrix(q_load(solid->axes)));
+    sum = integrate(mesh, vertices, planes, convex_radius, centre, q_matrix(q_load(solid->axes)));
     principal_axes(sum.second, rest);
     q_store(q_normalize(q_mul(q_load(solid->axes), q_load(rest))), solid->axes);
     solid->volume = sum.volume;

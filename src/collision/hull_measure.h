@@ -26,8 +26,8 @@ struct hull_solid {
     double axes[4];    /* principal axes to the frame of the vertices; unit quaternion */
 };
 
-/* Of the polyhedron, or of what is within `rounding` of it, m. False: the polyhedron has no volume. */
-bool sadmm_hull_solid(const struct hull_mesh *mesh, const double *vertices, const double *planes, double rounding,
+/* Of the polyhedron with a convex radius, m. False: the polyhedron has no volume. */
+bool sadmm_hull_solid(const struct hull_mesh *mesh, const double *vertices, const double *planes, double convex_radius,
                       struct hull_solid *solid);
 
 /* Axes of a box that lies on the largest face, along its longest edge; unit quaternion. */

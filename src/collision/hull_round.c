@@ -34,7 +34,7 @@ static void add_first(struct hull_integrals *sum, double share, vec3 p)
     sum->first[2] += share * p.z;
 }
 
-struct rounding {
+struct hull_round {
     const struct hull_mesh *mesh;
     const double *vertices, *planes;
     double r;
@@ -42,18 +42,18 @@ struct rounding {
     mat3 axes;
 };
 
-static vec3 vertex_at(const struct rounding *round, int32_t vertex)
+static vec3 vertex_at(const struct hull_round *round, int32_t vertex)
 {
     return m3_tmul(round->axes, v3_sub(v3_load(round->vertices + 3 * vertex), round->origin));
 }
 
-static vec3 normal_of(const struct rounding *round, int32_t face)
+static vec3 normal_of(const struct hull_round *round, int32_t face)
 {
     return m3_tmul(round->axes, v3_load(round->planes + 4 * face));
 }
 
 /* A triangle of a face, raised along n. */
-static void add_prism(const struct rounding *round, vec3 n, vec3 a, vec3 b, vec3 c, struct hull_integrals *sum)
+static void add_prism(const struct hull_round *round, vec3 n, vec3 a, vec3 b, vec3 c, struct hull_integrals *sum)
 {
     const double r = round->r, area = v3_dot(n, v3_cross(v3_sub(b, a), v3_sub(c, a))) / 2;
     const vec3 three = v3_add(v3_add(a, b), c);
@@ -69,7 +69,7 @@ static void add_prism(const struct rounding *round, vec3 n, vec3 a, vec3 b, vec3
 }
 
 /* A vertex's part that is proportional to the area of S. */
-static void add_sector(const struct rounding *round, vec3 x, double area, struct hull_integrals *sum)
+static void add_sector(const struct hull_round *round, vec3 x, double area, struct hull_integrals *sum)
 {
     const double r = round->r, ball = r * r * r / 3 * area;
     sum->volume += ball;
@@ -80,7 +80,7 @@ static void add_sector(const struct rounding *round, vec3 x, double area, struct
 
 /* Between faces f and g. The edge runs along d, with f to its left, from `from` to `to`: the wedge, and the arc's part of
  * the vertex at either end. */
-static void add_edge(const struct rounding *round, vec3 from, vec3 to, vec3 nf, vec3 ng, struct hull_integrals *sum)
+static void add_edge(const struct hull_round *round, vec3 from, vec3 to, vec3 nf, vec3 ng, struct hull_integrals *sum)
 {
     const double r = round->r, length = v3_norm(v3_sub(to, from));
     const vec3 d = v3_scale(v3_sub(to, from), 1 / length), middle = v3_scale(v3_add(from, to), 0.5);
@@ -109,7 +109,7 @@ static void add_edge(const struct rounding *round, vec3 from, vec3 to, vec3 nf, 
 void sadmm_hull_add_round(const struct hull_mesh *mesh, const double *vertices, const double *planes, double r,
                           vec3 origin, mat3 axes, struct hull_integrals *sum)
 {
-    const struct rounding round = {mesh, vertices, planes, r, origin, axes};
+    const struct hull_round round = {mesh, vertices, planes, r, origin, axes};
     for (int32_t v = 0; v < mesh->vertex_count; ++v) add_sector(&round, vertex_at(&round, v), 2 * pi, sum);
     for (int32_t f = 0; f < mesh->face_count; ++f) {
         const int32_t first = mesh->face_first[f], end = mesh->face_first[f + 1];

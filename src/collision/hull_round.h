@@ -1,4 +1,4 @@
-/* What rounding adds to a polyhedron's integrals. */
+/* What the convex radius adds to a polyhedron's integrals. */
 #ifndef SADMM_COLLISION_HULL_ROUND_H
 #define SADMM_COLLISION_HULL_ROUND_H
 

@@ -48,7 +48,7 @@ SADMM_INLINE bool inner_ball_of(const struct sadmm_proxy *p, const double *hulls
     if (!(radius > 0)) return false;
     *ball = *p;
     ball->geometry.type = SADMM_SHAPE_SPHERE;
-    ball->geometry.children = 1;
+    ball->geometry.subshapes = 1;
     ball->geometry.size[0] = radius;
     ball->spin = 0;
     for (i = 0; i < 3; ++i) {
@@ -60,28 +60,28 @@ SADMM_INLINE bool inner_ball_of(const struct sadmm_proxy *p, const double *hulls
 
 /* pair_manifold.h */
 SADMM_CALLED void ball_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
-                                uint32_t child, const struct pair_pose *pose, struct manifold *m);
+                                uint32_t subshape, const struct pair_pose *pose, struct manifold *m);
 
-/* Where a ball meets the other shape, in the frame of the pair's b, `ahead` seconds into the step. */
+/* Where a ball meets the other shape, in the frame of the pair's b, `time_offset` seconds into the step. */
 struct inner_ball {
     vec3 centre, normal; /* the pair's: from a to b */
     vec3 on_other;       /* nearest of the other shape's surface */
     real radius, separation;
-    double ahead;
+    double time_offset;
     bool hits; /* within the step */
     bool of_b;
 };
 
-/* a, b: the pair. ball, its proxy: of b where of_b. child: of a mesh. from: when the pair does not touch yet; ahead: when
- * the ball is inspected if it does not hit. False: nothing is near. */
+/* a, b: the pair. ball, its proxy: of b where of_b. subshape: of a mesh. from: when the pair does not touch yet;
+ * time_offset: when the ball is inspected if it does not hit. False: nothing is near. */
 SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                   const struct sadmm_proxy *ball, bool of_b, const double *hulls, uint32_t child,
-                                   double from, double gravity, double dt, double ahead, struct inner_ball *found)
+                                   const struct sadmm_proxy *ball, bool of_b, const double *hulls, uint32_t subshape,
+                                   double from, double gravity, double dt, double time_offset, struct inner_ball *found)
 {
     const bool swapped = of_b && a->geometry.type != SADMM_SHAPE_PLANE;
     const struct sadmm_proxy *first = swapped || !of_b ? ball : a, *second = swapped ? a : of_b ? ball : b;
-    const struct first_touch touch = pair_first_touch(first, second, hulls, child, from, gravity, dt);
-    const double at = touch.missed ? ahead : touch.ahead;
+    const struct first_touch touch = pair_first_touch(first, second, hulls, subshape, from, gravity, dt);
+    const double at = touch.missed ? time_offset : touch.time_offset;
     struct proxy_place there;
     const struct pair_pose pose = proxies_pose(first, second, at, dt, &there),
                            own = proxies_pose(a, b, at, dt, &there);
@@ -90,13 +90,13 @@ SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sad
     mat3 R;
     int k;
     found->hits = !touch.missed;
-    found->ahead = at;
+    found->time_offset = at;
     found->of_b = of_b;
     found->radius = (real)ball->geometry.size[0];
     m.count = 0;
     m.cache = 0;
     m.normal = v3(0, 0, 1); /* set in any case, for compilers that do not see that it is where there is a point */
-    ball_manifold(&first->geometry, &second->geometry, hulls, child, &pose, &m);
+    ball_manifold(&first->geometry, &second->geometry, hulls, subshape, &pose, &m);
     if (m.count == 0) return false;
     point = &m.points[0];
     found->separation = point->separation;
@@ -135,7 +135,7 @@ SADMM_INLINE void inner_add(struct manifold *m, vec3 position, real separation, 
 }
 
 /* The ball's point along n against a plane of the other shape, n . x = offset, with the ball's centre at x. On the ball,
- * not midway: accelerations may have it found at a distance that would be a long arm. */
+ * not halfway: with accelerations it may be found at a distance that would make a long arm. */
 SADMM_INLINE void inner_add_ball(const struct inner_ball *ball, vec3 centre, real offset, struct manifold *m)
 {
     const real side = ball->of_b ? -1 : 1, along = v3_dot(m->normal, centre),
@@ -150,7 +150,7 @@ SADMM_INLINE void inner_instead(const struct sadmm_proxy *a, const struct sadmm_
 {
     const vec3 n = ball->normal;
     struct proxy_place of_b;
-    const struct pair_pose pose = proxies_pose(a, b, ball->ahead, dt, &of_b);
+    const struct pair_pose pose = proxies_pose(a, b, ball->time_offset, dt, &of_b);
     const real offset = v3_dot(n, ball->on_other);
     vec3 x;
     real separation;
@@ -160,7 +160,7 @@ SADMM_INLINE void inner_instead(const struct sadmm_proxy *a, const struct sadmm_
     m->normal = n;
     m->count = 0;
     m->cache = 0;
-    m->ahead = ball->ahead;
+    m->time_offset = ball->time_offset;
     if (ball->of_b) {
         x = geometry_farthest(&b->geometry, hulls, v3_neg(n));
         separation = v3_dot(n, x) - offset;
@@ -212,7 +212,7 @@ SADMM_INLINE bool inner_tumbles(const struct sadmm_proxy *p, const double Rb[9],
 {
     double normal[3];
     rotate_to_world(Rb, n, normal);
-    return turning_speed(p, normal, 1) * dt > MIDWAY_TURN;
+    return turning_speed(p, normal, 1) * dt > MIDPOINT_TURN;
 }
 
 /* Along the manifold's normal, against the outermost of its points on the other shape, unless they hold it. */
@@ -221,7 +221,7 @@ SADMM_INLINE void inner_along(const struct sadmm_proxy *a, const struct sadmm_pr
 {
     const real side = ball->of_b ? -1 : 1;
     struct proxy_place of_b;
-    const struct pair_pose pose = proxies_pose(ball->of_b ? a : proxy, b, m->ahead, dt, &of_b);
+    const struct pair_pose pose = proxies_pose(ball->of_b ? a : proxy, b, m->time_offset, dt, &of_b);
     const vec3 centre = ball->of_b ? ball->centre : r3_vec3(pose.t);
     real offset = 0;
     int k;
@@ -235,10 +235,10 @@ SADMM_INLINE void inner_along(const struct sadmm_proxy *a, const struct sadmm_pr
 }
 
 /* Is the pair's memory of the side it came from as good as none: a body turns by more than it is
- * turned ahead at most? */
+ * turned to the time offset at most? */
 SADMM_INLINE bool inner_forgets(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt)
 {
-    return turning_rate(a->angular) * dt > MIDWAY_TURN || turning_rate(b->angular) * dt > MIDWAY_TURN;
+    return turning_rate(a->angular) * dt > MIDPOINT_TURN || turning_rate(b->angular) * dt > MIDPOINT_TURN;
 }
 
 /* Is a manifold deep by more than this share of the thinner shape? */
@@ -254,7 +254,7 @@ SADMM_INLINE bool inner_is_deep(const struct sadmm_proxy *a, const struct sadmm_
 
 /* Of one body's ball. */
 SADMM_INLINE void inner_ball_add(const struct sadmm_proxy *a, const struct sadmm_proxy *b, bool of_b,
-                                 const double *hulls, uint32_t child, bool remembers, double from, double gravity,
+                                 const double *hulls, uint32_t subshape, bool remembers, double from, double gravity,
                                  double dt, struct manifold *m)
 {
     struct sadmm_proxy proxy;
@@ -262,7 +262,7 @@ SADMM_INLINE void inner_ball_add(const struct sadmm_proxy *a, const struct sadmm
     real along;
     bool alone;
     if (inner_is_heavy(of_b ? b : a, of_b ? a : b) || !inner_ball_of(of_b ? b : a, hulls, &proxy) ||
-        !inner_ball_meets(a, b, &proxy, of_b, hulls, child, from, gravity, dt, m->ahead, &ball))
+        !inner_ball_meets(a, b, &proxy, of_b, hulls, subshape, from, gravity, dt, m->time_offset, &ball))
         return;
     along = v3_dot(ball.normal, m->normal);
     alone = ball.hits && relative_speed(a->velocity, b->velocity) * dt > INNER_BALL_ALONE * (double)ball.radius;
@@ -282,7 +282,7 @@ SADMM_INLINE void inner_ball_add(const struct sadmm_proxy *a, const struct sadmm
     m->count = 1;
 }
 
-/* Onto the surface of the body that its impulses turn, or the one that is easier to turn: midway to what accelerations
+/* Onto the surface of the body that its impulses turn, or the one that is easier to turn: halfway to what accelerations
  * are yet to close may be a long arm. */
 SADMM_INLINE void inner_on_surface(const struct sadmm_proxy *a, const struct sadmm_proxy *b, struct manifold *m)
 {
@@ -295,20 +295,20 @@ SADMM_INLINE void inner_on_surface(const struct sadmm_proxy *a, const struct sad
 }
 
 SADMM_INLINE void inner_balls_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                 uint32_t child, bool remembers, struct first_touch touch, double gravity, double dt,
+                                 uint32_t subshape, bool remembers, struct first_touch touch, double gravity, double dt,
                                  struct manifold *m)
 {
     int of_b; /* a loop: compilers are not to make it twice */
     remembers &= !inner_forgets(a, b, dt);
     for (of_b = 0; of_b < 2 && !touch.missed; ++of_b)
-        inner_ball_add(a, b, of_b, hulls, child, remembers, touch.ahead, gravity, dt, m);
+        inner_ball_add(a, b, of_b, hulls, subshape, remembers, touch.time_offset, gravity, dt, m);
     inner_on_surface(a, b, m);
 }
-SADMM_RARE void inner_balls_pooled(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                   uint32_t child, bool remembers, struct first_touch touch, double gravity, double dt,
-                                   struct manifold *m)
+SADMM_RARE void inner_balls_with_hulls(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                                       uint32_t subshape, bool remembers, struct first_touch touch, double gravity,
+                                       double dt, struct manifold *m)
 {
-    inner_balls_of(a, b, hulls, child, remembers, touch, gravity, dt, m);
+    inner_balls_of(a, b, hulls, subshape, remembers, touch, gravity, dt, m);
 }
 SADMM_RARE void inner_balls_plain(const struct sadmm_proxy *a, const struct sadmm_proxy *b, bool remembers,
                                   struct first_touch touch, double gravity, double dt, struct manifold *m)
@@ -319,17 +319,17 @@ SADMM_RARE void inner_balls_plain(const struct sadmm_proxy *a, const struct sadm
 /* To the manifold of a pair. remembers: its cache is of the last step; touch: of the pair, and so none of the balls in it
  * is earlier; hulls: NULL as of pair_first_touch. */
 SADMM_INLINE void inner_balls_add(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                  uint32_t child, bool remembers, struct first_touch touch, double gravity, double dt,
-                                  struct manifold *m)
+                                  uint32_t subshape, bool remembers, struct first_touch touch, double gravity,
+                                  double dt, struct manifold *m)
 {
-    if (hulls) inner_balls_pooled(a, b, hulls, child, remembers, touch, gravity, dt, m);
+    if (hulls) inner_balls_with_hulls(a, b, hulls, subshape, remembers, touch, gravity, dt, m);
     else inner_balls_plain(a, b, remembers, touch, gravity, dt, m);
 }
 
 /* Is the centre of mass of a's body behind the triangle of a mesh b, over it? Other triangles may be what the body
  * touches, or would, if it were not so deep. pose: of a in b's frame. */
 SADMM_INLINE bool inner_is_behind(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                  uint32_t child, const struct pair_pose *pose)
+                                  uint32_t subshape, const struct pair_pose *pose)
 {
     struct mesh_triangle t;
     struct mesh mesh;
@@ -340,7 +340,7 @@ SADMM_INLINE bool inner_is_behind(const struct sadmm_proxy *a, const struct sadm
     if (a->system_body < 0 || is_own_ball(a) || !(a->spin > INNER_TURNS * a->thin)) return false;
     for (k = 0; k < 3; ++k) x[k] = b->R[k] * a->arm[0] + b->R[3 + k] * a->arm[1] + b->R[6 + k] * a->arm[2];
     mesh_at(hulls, b->geometry.hull, &mesh);
-    mesh_triangle_of(&mesh, (int32_t)child, &t);
+    mesh_triangle_of(&mesh, (int32_t)subshape, &t);
     centre = v3_sub(v3_sub(r3_vec3(pose->t), v3_load(x)), t.origin);
     height = v3_dot(t.normal, centre);
     return height < 0 && height > -(real)geometry_radius(&a->geometry) && mesh_is_over(&t, centre, 0);
@@ -351,7 +351,7 @@ SADMM_INLINE bool inner_is_behind(const struct sadmm_proxy *a, const struct sadm
 SADMM_INLINE bool inner_is_asked(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double gravity, double dt,
                                  const struct manifold *m)
 {
-    return fall_of(gravity, dt) + a->fall + b->fall > 2 * MIDWAY_TRAVEL * smaller_of(a->thin, b->thin) ||
+    return fall_of(gravity, dt) + a->fall + b->fall > 2 * MIDPOINT_TRAVEL * smaller_of(a->thin, b->thin) ||
            (a->spin + b->spin > INNER_ROCKS * smaller_of(a->thin, b->thin) && inner_is_deep(a, b, m, INNER_SINKS));
 }
 

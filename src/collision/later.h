@@ -14,12 +14,12 @@
 SADMM_INLINE void proxy_begin_later(const struct sadmm_proxy *p, double hit, double since, double dt,
                                     struct sadmm_proxy *out)
 {
-    const double on = turn_ahead(turning_rate(p->angular), dt - since);
+    const double on = turn_time_offset(turning_rate(p->angular), dt - since);
     struct sadmm_proxy own = *p, turned;
     int k;
-    own.ahead -= hit; /* it turns from there */
+    own.time_offset -= hit; /* it turns from there */
     *out = *proxy_at(&own, since + on - hit, 0, &turned);
-    out->ahead = on;
+    out->time_offset = on;
     for (k = 0; k < 3; ++k) {
         out->com[k] += since * p->velocity[k];
         out->x[k] = out->com[k] + out->arm[k];
@@ -27,15 +27,15 @@ SADMM_INLINE void proxy_begin_later(const struct sadmm_proxy *p, double hit, dou
 }
 
 /* As proxy_at of such a pair: its motion is taken back to the start of the whole step. */
-SADMM_RARE const struct sadmm_proxy *proxy_at_later(const struct sadmm_proxy *p, double hit, double since, double ahead,
-                                                    double dt, struct sadmm_proxy *out)
+SADMM_RARE const struct sadmm_proxy *proxy_at_later(const struct sadmm_proxy *p, double hit, double since,
+                                                    double time_offset, double dt, struct sadmm_proxy *out)
 {
-    const double left = dt - since, on = ahead == since + 0.5 * left ? 0.5 * left : ahead - since;
+    const double left = dt - since, on = time_offset == since + 0.5 * left ? 0.5 * left : time_offset - since;
     struct sadmm_proxy later, turned;
     int k;
     proxy_begin_later(p, hit, since, dt, &later);
     *out = *proxy_at(&later, on, left, &turned);
-    out->ahead += since;
+    out->time_offset += since;
     for (k = 0; k < 3; ++k) {
         out->com[k] = p->com[k];
         out->x[k] = p->com[k] + out->arm[k];
@@ -43,20 +43,20 @@ SADMM_RARE const struct sadmm_proxy *proxy_at_later(const struct sadmm_proxy *p,
     return out;
 }
 
-/* Where points part (`opens`, m/s), a gap below 0 at the start is that at `since`, and none below 0 by then: what it lacks
- * is what forces and curvature add to the way. */
+/* Where points part (`opens`, m/s), a separation below 0 at the start is that at `since`, and none below 0 by then:
+ * what it lacks is what forces and curvature add to the way. */
 #define SINCE_ROUNDING 1e-6
-SADMM_RARE void open_gap(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double since, const double normal[3],
-                         struct sadmm_contact_point *point)
+SADMM_RARE void open_separation(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double since,
+                                const double normal[3], struct sadmm_contact_point *point)
 {
     double opens = 0, across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0};
     int k;
-    if (!(point->gap < -SINCE_ROUNDING * smaller_of(a->thin, b->thin))) return;
+    if (!(point->separation < -SINCE_ROUNDING * smaller_of(a->thin, b->thin))) return;
     add_cross(normal, a->angular, 1, across_a);
     add_cross(normal, b->angular, 1, across_b);
     for (k = 0; k < 3; ++k) opens += normal[k] * (b->velocity[k] - a->velocity[k]);
     opens += dot3(across_b, point->arm_b) - dot3(across_a, point->arm_a);
-    if (opens > 0) point->gap = larger_of(point->gap + since * opens, DBL_MIN);
+    if (opens > 0) point->separation = larger_of(point->separation + since * opens, DBL_MIN);
 }
 
 #endif

@@ -5,7 +5,7 @@
  * Pair convention. a is the shape of the lower (type, slot): plane, sphere, capsule, box. Everything is computed and
  * given in the frame of b, the shape with more structure: positions stay near b's centre, where float is precise
  * (pair_pose does the differences in double). The normal runs from a to b, a separation below 0 is penetration and a
- * point lies midway between the two surfaces.
+ * point lies halfway between the two surfaces.
  *
  * limit: points with separation <= limit are kept; a deep manifold is never dropped, and rounding favours contact.
  *
@@ -35,7 +35,7 @@ struct manifold {
     vec3 normal; /* unit, frame of b, from a to b */
     int count;   /* 0: not in contact */
     uint32_t cache;
-    double ahead; /* s: of the step's start, where the pair is (pair_manifold.h: find_manifold) */
+    double time_offset; /* s: of the step's start, where the pair is (pair_manifold.h: find_manifold) */
     struct manifold_point points[SADMM_MANIFOLD_POINTS];
 };
 
@@ -44,7 +44,7 @@ struct pair_pose {
     row3 R[3];
     row3 t;
     row3 centre[2]; /* of mass, of the body of a and of b, in the frame of b, where `tips` says so: */
-    bool tips[2];   /* the body moves, and one of the two shapes has round rims (convex_facing.h) */
+    bool tips[2];   /* the body moves, and one of the two shapes has round rims (convex_clip.h) */
 };
 
 /* How clearly the cached axis must be beaten: this share of the depth, and of the thinner shape's extent. */

@@ -258,7 +258,7 @@ SADMM_INLINE bool box_corner_over_face(const struct box_pair *b, const struct bo
 
 /* The face that an edge axis is completed by: the one nearest to the normal, unless what lies beyond half the thinner
  * box's extent to the side of the crossing is out of reach; -1: none. */
-SADMM_INLINE int box_facing_axis(const struct box_pair *b, vec3 n, real separation)
+SADMM_INLINE int box_clip_axis(const struct box_pair *b, vec3 n, real separation)
 {
     real cosine = 0, sine;
     int axis, nearest = -1;
@@ -360,7 +360,7 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
             break;
         }
         if (axis < 6) break;
-        axis = box_facing_axis(&b, m->normal, m->points[m->count - 1].separation);
+        axis = box_clip_axis(&b, m->normal, m->points[m->count - 1].separation);
         if (axis < 0) break;
         negative = v3_dot(box_axis_direction(&b, axis, 0), m->normal) < 0;
         turn = BOX_COMPLETE;

@@ -82,8 +82,8 @@ SADMM_HOST_CALL bool box_edge_manifold(const struct box_pair *b, int axis, int n
     separation = v3_dot(n, v3_sub(p2, p1));
 
     if (v3_norm2(l) < 1 - MANIFOLD_COS_NEAR * MANIFOLD_COS_NEAR) {
-        /* nearly parallel: ends of the stretch the edges have in common along their mean direction, where the gap has
-         * not opened past the limit */
+        /* nearly parallel: ends of the stretch the edges have in common along their mean direction, where the
+         * separation has not opened past the limit */
         vec3 mean = b->R[i][j] > 0 ? v3_add(axis1, w) : v3_sub(axis1, w);
         real inverse = 1 / v3_norm(mean), d1, d2, lo1, hi1, lo2, hi2, lo, hi, deepest = SADMM_REAL_MAX;
         mean = v3_scale(mean, inverse);
@@ -97,22 +97,24 @@ SADMM_HOST_CALL bool box_edge_manifold(const struct box_pair *b, int axis, int n
         hi = real_min(hi1, hi2);
         if (hi - lo > MANIFOLD_SNAP * real_min(b->h1[i], b->h2[j])) {
             for (end = 0; end < 2; ++end) {
-                /* the gap along the normal where the one edge ends and where the other does; the smaller one counts */
-                real x = end ? hi : lo, gap, gap1, gap2, x1[3], x2[3];
+                /* the separation along the normal where the one edge ends and where the other does; the smaller one
+                 * counts */
+                real x = end ? hi : lo, nearest, end1, end2, x1[3], x2[3];
                 vec3 a1 = v3_madd(p, (x - v3_dot(mean, p)) / d1, axis1), a2 = v3_madd(q, (x - v3_dot(mean, q)) / d2, w);
                 vec3 d = v3_sub(a1, v3_from_array(b->t));
                 uint32_t feature;
                 for (k = 0; k < 3; ++k) x2[k] = d.x * b->R[0][k] + d.y * b->R[1][k] + d.z * b->R[2][k];
                 v3_to_array(a2, x1);
-                gap1 = box_depth_along(x2, n2, b->h2, j);
-                gap2 = box_depth_along(x1, n1, b->h1, i);
-                gap = real_min(gap1, gap2);
-                deepest = real_min(deepest, gap);
-                if (gap > b->limit) continue;
+                end1 = box_depth_along(x2, n2, b->h2, j);
+                end2 = box_depth_along(x1, n1, b->h1, i);
+                nearest = real_min(end1, end2);
+                deepest = real_min(deepest, nearest);
+                if (nearest > b->limit) continue;
                 /* the end belongs to the edge that stops there */
                 if (end ? hi1 <= hi2 : lo1 >= lo2) feature = box_feature_vertex(0, box_edge_end(c1, i, end));
                 else feature = box_feature_vertex(1, box_edge_end(c2, j, (end != 0) == (d2 > 0)));
-                manifold_add(m, gap1 <= gap2 ? v3_madd(a1, gap / 2, n) : v3_madd(a2, -gap / 2, n), gap, feature);
+                manifold_add(m, end1 <= end2 ? v3_madd(a1, nearest / 2, n) : v3_madd(a2, -nearest / 2, n), nearest,
+                             feature);
             }
             if (m->count > 0 && deepest - separation <= MANIFOLD_FLAT * b->thin) return crossing;
         }

@@ -1,6 +1,5 @@
-/* Facing faces, seen along the normal: the face of the other box that points against the reference face is clipped by
- * its sides (Sutherland-Hodgman). The edges of the polygon carry labels, from which the features of its vertices
- * follow.
+/* Face clipping along the normal: the face of the other box that points against the reference face is clipped by its
+ * sides (Sutherland-Hodgman). The edges of the polygon carry labels, from which the features of its vertices follow.
  * The normal is the reference face's own, or that of an edge axis near it (manifold_box.h): then the incident face is
  * projected onto the reference plane along the normal, and separations are along it. */
 #ifndef SADMM_COLLISION_MANIFOLD_BOX_FACE_H
@@ -157,7 +156,7 @@ SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R
         position[2] = p->at[2];
         manifold_add(m, v3_from_array(position), separation, feature);
     }
-    /* in-plane to the reference frame, midway between the incident face and the reference face */
+    /* in-plane to the reference frame, halfway between the incident face and the reference face */
     for (i = first; i < m->count; ++i) {
         real position[3], half = lean.cosine * m->points[i].separation / 2;
         position[u] = m->points[i].position.x + lean.u * half;

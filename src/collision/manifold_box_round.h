@@ -217,7 +217,7 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
         vec3 c0 = segment_at(p, first, u), c1 = segment_at(p, last, u);
         real s0 = v3_dot(n, c0) - ha[k] - radius, s1 = v3_dot(n, c1) - ha[k] - radius;
         bool one = last - first <= MANIFOLD_SNAP * real_min(half, v3_max_abs(h)); /* then the deeper end */
-        /* midway between the lowest point of the ball and the face */
+        /* halfway between the lowest point of the ball and the face */
         if (one ? s0 <= s1 : s0 <= limit) manifold_add(m, v3_madd(c0, -(radius + s0 / 2), n), s0, 1);
         if (one ? s0 > s1 : s1 <= limit) manifold_add(m, v3_madd(c1, -(radius + s1 / 2), n), s1, 2);
     }
@@ -257,7 +257,7 @@ SADMM_INLINE void manifold_segment_outside(real radius, real half, vec3 h, vec3 
             real distance = v3_norm(d), separation = distance - radius;
             if (!(v3_dot(m->normal, d) >= MANIFOLD_COS_NEAR * distance)) continue;
             best_end = real_min(best_end, separation);
-            if (separation <= limit) /* midway between the end's surface and the box */
+            if (separation <= limit) /* halfway between the end's surface and the box */
                 manifold_add(m, v3_madd(qe, -separation / 2, distance > 0 ? v3_scale(d, 1 / distance) : m->normal),
                              separation, first_feature + (uint32_t)e);
         }

@@ -5,24 +5,24 @@
  *   2. The direction along which the two are farthest apart, or least deep in each other (convex_axis.h).
  *   3. A flat whose normal is that direction, to within rounding, gives its own: what rolls has its true
  *      normal, and what stands has one that does not shiver.
- *   4. The points of what faces along it (convex_facing.h); the nearest points as well where these do not have them.
+ *   4. The points of what faces along it (convex_clip.h); the nearest points as well where these do not have them.
  */
 #ifndef SADMM_COLLISION_MANIFOLD_CONVEX_H
 #define SADMM_COLLISION_MANIFOLD_CONVEX_H
 
 #include "convex_axis.h"
-#include "convex_facing.h"
+#include "convex_clip.h"
 #include "manifold_hull.h"
 
 /* Along a flat's normal: the points of what faces along it, or the one of what has one alone there. False: it is not
- * proven that no direction beside it is better, or the two are so deep in each other that another side may be. */
+ * a witness that no direction beside it is better, or the two are so deep in each other that another side may be. */
 SADMM_INLINE bool convex_on_flat(const struct convex_pair *pair, const struct convex_axis *axis, bool of_a, int flat,
                                  real limit, struct manifold *m)
 {
-    bool proven;
+    bool witness;
     if (axis->separation + convex_radii(pair) < -CONVEX_SHALLOW * pair->thin) return false;
-    convex_facing_manifold(pair, axis->n, axis->separation, limit, m, &proven);
-    if (proven || !convex_is_on_flat(pair, axis, of_a, flat, 0)) return proven;
+    convex_clip_manifold(pair, axis->n, axis->separation, limit, m, &witness);
+    if (witness || !convex_is_on_flat(pair, axis, of_a, flat, 0)) return witness;
     hull_add_nearest(pair->thin, axis->pa, axis->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
     return true;
 }
@@ -97,8 +97,8 @@ SADMM_INLINE bool convex_search(struct convex_pair *pair, vec3 side, bool known,
 SADMM_INLINE void convex_points(const struct convex_pair *pair, const struct convex_axis *axis, real limit,
                                 struct manifold *m)
 {
-    bool proven;
-    convex_facing_manifold(pair, axis->n, axis->separation, limit, m, &proven);
+    bool witness;
+    convex_clip_manifold(pair, axis->n, axis->separation, limit, m, &witness);
     hull_add_nearest(pair->thin, axis->pa, axis->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
 }
 
@@ -148,7 +148,7 @@ SADMM_RARE void convex_plane_manifold(const struct sadmm_geometry *b, const doub
     if (flat < 0) {
         for (k = 0; k < 2; ++k) convex_plane_point(m, convex_point(&c, k, down), offset, limit, (uint32_t)k + 1);
     } else {
-        struct convex_facing disc;
+        struct convex_feature disc;
         const vec3 x = convex_point(&c, flat, down);
         const real s = v3_dot(m->normal, x) + offset;
         const vec3 centre[2] = {v3(0, 0, 0), pose->tips[1] ? r3_vec3(pose->centre[1]) : v3(0, 0, 0)};

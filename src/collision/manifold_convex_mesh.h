@@ -27,14 +27,14 @@ struct convex_triangle {
 };
 
 SADMM_INLINE void convex_triangle_make(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
-                                       const double *blocks, uint32_t child, const struct pair_pose *pose,
+                                       const double *blocks, uint32_t subshape, const struct pair_pose *pose,
                                        struct convex_triangle *p)
 {
     struct convex_pair *pair = &p->pair;
     struct mesh_place place;
     int k;
     mesh_at(blocks, b->hull, &p->mesh);
-    mesh_triangle_of(&p->mesh, (int32_t)child, &p->triangle);
+    mesh_triangle_of(&p->mesh, (int32_t)subshape, &p->triangle);
     convex_of(a, blocks, &pair->a);
     pair->b.form = CONVEX_POLYTOPE;
     pair->b.size = v3(0, 0, 0);
@@ -79,13 +79,13 @@ SADMM_INLINE bool convex_cap_is_even(const struct convex_triangle *p)
            c->size.x * real_sqrt(d.x * d.x + d.y * d.y) <= MANIFOLD_FLAT * p->pair.thin;
 }
 
-/* The points along the normal of the face, with the lowest one of the body if it is over the face. The smallest gap
- * that there is, largest: there is none. */
+/* The points along the normal of the face, with the lowest one of the body if it is over the face. The smallest
+ * separation that there is, largest: there is none. */
 SADMM_INLINE real convex_on_front(const struct convex_triangle *p, real limit, struct manifold *m)
 {
     const struct convex_axis *front = &p->front;
-    bool proven;
-    const real least = convex_facing_manifold(&p->pair, front->n, front->separation, limit, m, &proven);
+    bool witness;
+    const real least = convex_clip_manifold(&p->pair, front->n, front->separation, limit, m, &witness);
     if (!mesh_is_over(&p->triangle, front->pa, 4 * p->pair.slack)) return least;
     if (!convex_cap_is_even(p))
         hull_add_nearest(p->pair.thin, front->pa, front->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
@@ -233,7 +233,7 @@ SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct 
 }
 
 SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
-                                     const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
+                                     const double *blocks, uint32_t subshape, const struct pair_pose *pose, real limit,
                                      uint32_t cache, struct manifold *m)
 {
     const uint32_t of_front = CONVEX_MEMORY_FLAT_B | (uint32_t)MESH_FRONT << MANIFOLD_DIRECTION_SHIFT;
@@ -242,7 +242,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     struct convex_axis axis;
     uint32_t found;
     bool flat, shallow;
-    convex_triangle_make(a, b, blocks, child, pose, &p);
+    convex_triangle_make(a, b, blocks, subshape, pose, &p);
     convex_recall(&p.pair, cache, &memory);
     if (!memory.known) memory.side = p.front.n;
     if (p.front.separation > limit + p.pair.slack) return;

@@ -1,7 +1,7 @@
 /* A convex hull (b) against plane, sphere, capsule, box and hull (a), in the frame of b.
  *
- *   1. The axis of the last step. Where it is a face's, and the points of the facing faces prove that no other is better
- *      by enough to take its place, that is all: what rests never asks for more.
+ *   1. The axis of the last step. Where it is a face's, and the points of the clipped faces prove that no other is
+ *      better by enough to take its place, that is all: what rests never asks for more.
  *   2. The distance (gjk.h) or, where the two meet, the depth (epa.h), with the nearest points.
  *   3. The axis to use. As for boxes (manifold_box.h): the last step's stays unless clearly beaten, and its side until
  *      the two are apart; a face within 8 degrees of the nearest points' normal is preferred to what is not a face.
@@ -43,28 +43,29 @@ SADMM_INLINE real hull_bonus(const struct polytope_pair *pair, real separation)
 }
 
 /* What is left between the two, at most, seen from a point of b's surface that is inside a, or of a's inside b: such a
- * point has to leave by some face. x: midway between the two surfaces, `gap` < 0 apart along the axis. */
-SADMM_INLINE real hull_way_out(const struct polytope_pair *pair, const struct polytope_axis *axis, vec3 x, real gap)
+ * point has to leave by some face. x: halfway between the two surfaces, `separation` < 0 apart along the axis. */
+SADMM_INLINE real hull_way_out(const struct polytope_pair *pair, const struct polytope_axis *axis, vec3 x,
+                               real separation)
 {
     const bool of_a = axis->kind == AXIS_FACE_A;
     const struct polytope *p = of_a ? &pair->a : &pair->b;
-    vec3 inside = v3_madd(x, of_a ? gap / 2 + pair->b.radius : -gap / 2 - pair->a.radius, axis->n);
+    vec3 inside = v3_madd(x, of_a ? separation / 2 + pair->b.radius : -separation / 2 - pair->a.radius, axis->n);
     if (of_a) inside = m3_tmul(pair->R, v3_sub(inside, pair->t));
-    return real_max(gap, polytope_height(p, inside, of_a ? axis->a : axis->b) - pair_radii(pair));
+    return real_max(separation, polytope_height(p, inside, of_a ? axis->a : axis->b) - pair_radii(pair));
 }
 
-/* Do the points of a face axis prove that no axis beats it by more than the last step's axis is given? */
-SADMM_INLINE bool hull_is_proven(const struct polytope_pair *pair, const struct polytope_axis *axis,
-                                 const struct manifold *m)
+/* Is a face axis a witness by its points: does no axis beat it by more than the bonus of the last step's axis? */
+SADMM_INLINE bool hull_is_witness(const struct polytope_pair *pair, const struct polytope_axis *axis,
+                                  const struct manifold *m)
 {
     const real most = axis->separation + hull_bonus(pair, axis->separation);
     vec3 middle = v3(0, 0, 0);
-    real gap = 0;
+    real separation = 0;
     int k, deepest = 0;
     if (m->count == 0) return false;
     for (k = 0; k < m->count; ++k) {
         middle = v3_add(middle, m->points[k].position);
-        gap += m->points[k].separation;
+        separation += m->points[k].separation;
         if (m->points[k].separation < m->points[deepest].separation) deepest = k;
     }
     /* two points of the cores as near to each other as the planes are: nothing is nearer, and no plane parts them
@@ -75,8 +76,8 @@ SADMM_INLINE bool hull_is_proven(const struct polytope_pair *pair, const struct 
     /* the face along the normal need not have the deepest corner */
     if (m->points[deepest].separation > axis->separation + MANIFOLD_FLAT * pair->thin) return false;
     middle = v3_scale(middle, (real)1 / (real)m->count);
-    gap /= (real)m->count;
-    return hull_way_out(pair, axis, middle, gap) <= most ||
+    separation /= (real)m->count;
+    return hull_way_out(pair, axis, middle, separation) <= most ||
            hull_way_out(pair, axis, m->points[deepest].position, m->points[deepest].separation) <= most;
 }
 
@@ -141,11 +142,11 @@ SADMM_INLINE bool hull_crossing(const struct polytope_pair *pair, const struct p
     return v3_norm(v3_cross(axis->n, v3_sub(*pb, *pa))) <= MANIFOLD_KEEP_EXTENT * pair->thin;
 }
 
-/* Is the last step's axis one of two edges whose nearest points prove that no other beats it by more than it is given?
- * pa, pb: these points. While the two are apart, where they are as near as the planes across the axis are. Else each
- * of them is inside of the other body, and no direction is less deep than its way to that one's surface. */
-SADMM_INLINE bool hull_edges_are_proven(const struct polytope_pair *pair, const struct polytope_axis *axis, vec3 *pa,
-                                        vec3 *pb, uint32_t *feature)
+/* Is the last step's axis one of two edges and a witness by their nearest points: does no other beat it by more than
+ * its bonus? pa, pb: these points. While the two are apart, where they are as near as the planes across the axis are.
+ * Else each of them is inside of the other body, and no direction is less deep than its way to that one's surface. */
+SADMM_INLINE bool hull_edges_are_witness(const struct polytope_pair *pair, const struct polytope_axis *axis, vec3 *pa,
+                                         vec3 *pb, uint32_t *feature)
 {
     const real cores = axis->separation + pair_radii(pair);
     vec3 d;
@@ -247,10 +248,10 @@ SADMM_INLINE void hull_choose(const struct polytope_pair *pair, const struct pol
     if (axis->separation <= face.separation + more) *axis = face;
 }
 
-/* The point midway between pa and pb, unless m has one that is as deep. */
+/* The point halfway between pa and pb, unless m has one that is as deep. */
 SADMM_INLINE void hull_add_nearest(real thin, vec3 pa, vec3 pb, uint32_t feature, struct manifold *m)
 {
-    const real gap = v3_dot(m->normal, v3_sub(pb, pa)), even = gap + MANIFOLD_FLAT * thin;
+    const real separation = v3_dot(m->normal, v3_sub(pb, pa)), even = separation + MANIFOLD_FLAT * thin;
     const vec3 x = v3_scale(v3_add(pa, pb), (real)0.5);
     int k, least = 0;
     for (k = 0; k < m->count; ++k) {
@@ -259,10 +260,10 @@ SADMM_INLINE void hull_add_nearest(real thin, vec3 pa, vec3 pb, uint32_t feature
     }
     if (m->count == SADMM_MANIFOLD_POINTS) { /* in place of the one that is farthest apart */
         m->points[least].position = x;
-        m->points[least].separation = gap;
+        m->points[least].separation = separation;
         m->points[least].feature = feature;
     } else {
-        manifold_add(m, x, gap, feature);
+        manifold_add(m, x, separation, feature);
     }
 }
 
@@ -287,9 +288,9 @@ SADMM_INLINE bool hull_by_memory(const struct polytope_pair *pair, real limit, u
     *start = kept->n;
     if (kept->separation > limit + pair->slack) return true;
     if (kept->kind == AXIS_EDGES || pair->a.faces == 0) return false;
-    facing_manifold(pair, kept->n, kept->separation, limit, m);
+    clip_manifold(pair, kept->n, kept->separation, limit, m);
     m->cache = cache;
-    if (hull_is_proven(pair, kept, m)) return true;
+    if (hull_is_witness(pair, kept, m)) return true;
     m->count = 0;
     m->cache = 0;
     return false;
@@ -338,7 +339,7 @@ SADMM_INLINE void hull_by_nearest(const struct polytope_pair *pair, const struct
     else hull_choose_inside(pair, kept, known, &axis);
     hull_keep_edges(pair, nearest, &axis, &pa, &pb, &feature);
     if (pair->a.faces > 0 || hull_has_face_along(pair, axis.n))
-        facing_manifold(pair, axis.n, axis.separation, limit, m);
+        clip_manifold(pair, axis.n, axis.separation, limit, m);
     if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) axis = *nearest; /* not over each other */
     m->normal = axis.n;
     m->cache = axis_memory(&axis);
@@ -377,7 +378,7 @@ SADMM_RARE void hull_manifold_from(const struct sadmm_geometry *a, const struct 
     m->cache = 0;
     polytope_pair_make(a, b, hulls, pose, &pair);
     known = hull_recall(&pair, cache, &kept);
-    if (hull_edges_are_proven(&pair, &kept, &pa, &pb, &feature)) nearest = kept;
+    if (hull_edges_are_witness(&pair, &kept, &pa, &pb, &feature)) nearest = kept;
     else if (!hull_nearest_from(&pair, walk, limit, &nearest, &pa, &pb, &feature)) return;
     hull_by_nearest(&pair, &kept, known, &nearest, pa, pb, feature, limit, m);
 }
@@ -399,7 +400,7 @@ SADMM_RARE void hull_manifold(const struct sadmm_geometry *a, const struct sadmm
 
     polytope_pair_make(a, b, hulls, pose, &pair);
     if (hull_by_memory(&pair, limit, cache, &kept, &known, &start, m)) return;
-    if (hull_edges_are_proven(&pair, &kept, &pa, &pb, &feature)) nearest = kept;
+    if (hull_edges_are_witness(&pair, &kept, &pa, &pb, &feature)) nearest = kept;
     else if (!hull_nearest(&pair, start, limit, &nearest, &pa, &pb, &feature)) return;
     hull_by_nearest(&pair, &kept, known, &nearest, pa, pb, feature, limit, m);
 #endif

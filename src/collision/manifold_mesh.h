@@ -3,8 +3,8 @@
  *
  *   1. What is above the triangle's plane by more than the limit is no contact. Nor is, where all around the triangle is
  *      in its plane, what has no vertex over it: of the points there only those are kept.
- *   2. What lies on it: the points of the facing faces, if the deepest of the body is among them. That is all that most
- *      pairs ask for.
+ *   2. What lies on it: the points of the clipped faces, if the deepest of the body is among them. That is all that
+ *      most pairs ask for.
  *   3. Else the nearest points, or the least depth, and the axis to use, as for hulls. Where the surface does not push
  *      along that, its face takes over, if the body is over it; of what is in each other, the best of all axes that it
  *      does push along. But not if it says something else altogether: that a body whose rim hangs over a wall is to
@@ -58,12 +58,12 @@ SADMM_INLINE struct mesh_place mesh_place_of(const struct sadmm_geometry *a, con
 }
 
 SADMM_INLINE void mesh_pair_make(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
-                                 uint32_t child, const struct pair_pose *pose, struct mesh_pair *p)
+                                 uint32_t subshape, const struct pair_pose *pose, struct mesh_pair *p)
 {
     struct polytope_pair *pair = &p->pair;
     struct mesh_place place;
     mesh_at(blocks, b->hull, &p->mesh);
-    mesh_triangle_of(&p->mesh, (int32_t)child, &p->triangle);
+    mesh_triangle_of(&p->mesh, (int32_t)subshape, &p->triangle);
     polytope_of(a, blocks, &pair->a);
     mesh_triangle_polytope(&p->triangle, &pair->b);
     place = mesh_place_of(a, b, &p->triangle, pose);
@@ -196,9 +196,10 @@ SADMM_INLINE void mesh_ends_over(const struct mesh_pair *p, real limit, struct m
     m->normal = p->front.n;
     for (k = 0; k < pair->a.vertices; ++k) {
         const vec3 x = pair_point_a(pair, k);
-        const real gap = v3_dot(n, x) - pair->a.radius;
-        if (gap > limit + pair->slack || !mesh_is_over(&p->triangle, x, beside)) continue;
-        manifold_add(m, v3_madd(x, -pair->a.radius - gap / 2, n), gap, polytope_feature(FEATURE_VERTEX_A, 0, k) + 1);
+        const real separation = v3_dot(n, x) - pair->a.radius;
+        if (separation > limit + pair->slack || !mesh_is_over(&p->triangle, x, beside)) continue;
+        manifold_add(m, v3_madd(x, -pair->a.radius - separation / 2, n), separation,
+                     polytope_feature(FEATURE_VERTEX_A, 0, k) + 1);
     }
 }
 
@@ -214,7 +215,7 @@ SADMM_INLINE void mesh_on_front(const struct mesh_pair *p, real limit, struct ma
         mesh_ends_over(p, limit, m);
         return;
     }
-    facing_manifold(pair, p->front.n, p->front.separation, limit, m);
+    clip_manifold(pair, p->front.n, p->front.separation, limit, m);
     v = polytope_support(&pair->a, v3_neg(m3_tmul(pair->R, n)), 0);
     x = pair_point_a(pair, v);
     if (!mesh_is_over(&p->triangle, x, 4 * pair->slack)) return;
@@ -325,8 +326,8 @@ SADMM_INLINE bool mesh_by_memory(const struct mesh_pair *p, real limit, uint32_t
     if (pair->a.faces == 0 || (*known && kept->kind == AXIS_EDGES)) return false;
     of_a = *known && kept->kind == AXIS_FACE_A;
     face = of_a ? kept : &p->front;
-    facing_manifold(pair, face->n, face->separation, limit, m);
-    if (of_a ? hull_is_proven(pair, kept, m) && mesh_allows(&p->mesh, &p->triangle, v3_neg(kept->n))
+    clip_manifold(pair, face->n, face->separation, limit, m);
+    if (of_a ? hull_is_witness(pair, kept, m) && mesh_allows(&p->mesh, &p->triangle, v3_neg(kept->n))
              : mesh_lies_on(pair, &p->front, *known, m)) {
         m->cache = of_a ? cache : axis_memory(&p->front);
         mesh_finish(p, face->kind, m);
@@ -414,7 +415,7 @@ SADMM_RARE void mesh_by_surface(const struct mesh_pair *p, const struct polytope
     real least;
     if (nearest->separation < -pair_radii(pair) && !kept_front) mesh_best_axis(p, &axis);
     if (axis.kind == AXIS_FACE_B && pair->a.faces == 0) mesh_ends_over(p, limit, m);
-    else facing_manifold(pair, axis.n, axis.separation, limit, m);
+    else clip_manifold(pair, axis.n, axis.separation, limit, m);
     m->cache = axis_memory(&axis);
     if (axis.kind == AXIS_EDGES && hull_crossing(pair, &axis, &pa, &pb)) {
         pa = v3_madd(pa, pair->a.radius, axis.n);
@@ -446,7 +447,7 @@ SADMM_INLINE void mesh_by_nearest(const struct mesh_pair *p, const struct polyto
     }
     if (mesh_is_front(&p->triangle, v3_neg(axis.n))) axis = p->front;
     if (p->pair.a.faces > 0 || hull_has_face_along(&p->pair, axis.n))
-        facing_manifold(&p->pair, axis.n, axis.separation, limit, m);
+        clip_manifold(&p->pair, axis.n, axis.separation, limit, m);
     if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) { /* not over each other */
         axis = *nearest;
         if (!mesh_allows(&p->mesh, &p->triangle, v3_neg(axis.n))) {
@@ -462,21 +463,21 @@ SADMM_INLINE void mesh_by_nearest(const struct mesh_pair *p, const struct polyto
 
 /* In two parts (hull_manifold_at_once). */
 SADMM_RARE bool mesh_manifold_at_once(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
-                                      const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
+                                      const double *blocks, uint32_t subshape, const struct pair_pose *pose, real limit,
                                       uint32_t cache, struct gjk_walk *walk, struct manifold *m)
 {
     struct mesh_pair p;
     struct polytope_axis kept;
     vec3 start;
     bool known;
-    mesh_pair_make(a, b, blocks, child, pose, &p);
+    mesh_pair_make(a, b, blocks, subshape, pose, &p);
     if (mesh_by_memory(&p, limit, cache, &kept, &known, &start, m)) return true;
     hull_walk(&p.pair, start, limit, walk);
     return walk->end == GJK_FAR;
 }
 
 SADMM_RARE void mesh_manifold_from(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
-                                   uint32_t child, const struct pair_pose *pose, real limit, uint32_t cache,
+                                   uint32_t subshape, const struct pair_pose *pose, real limit, uint32_t cache,
                                    const struct gjk_walk *walk, struct manifold *m)
 {
     struct mesh_pair p;
@@ -484,7 +485,7 @@ SADMM_RARE void mesh_manifold_from(const struct sadmm_geometry *a, const struct 
     vec3 pa, pb;
     uint32_t feature;
     bool known;
-    mesh_pair_make(a, b, blocks, child, pose, &p);
+    mesh_pair_make(a, b, blocks, subshape, pose, &p);
     kept = p.front;
     known = mesh_recall(&p, cache, &kept);
     if (hull_nearest_from(&p.pair, walk, limit, &nearest, &pa, &pb, &feature))
@@ -493,20 +494,20 @@ SADMM_RARE void mesh_manifold_from(const struct sadmm_geometry *a, const struct 
 
 /* The whole. */
 SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
-                              uint32_t child, const struct pair_pose *pose, real limit, uint32_t cache,
+                              uint32_t subshape, const struct pair_pose *pose, real limit, uint32_t cache,
                               struct manifold *m)
 {
 #ifdef __CUDACC__ /* as hull_manifold */
     struct gjk_walk walk;
-    if (!mesh_manifold_at_once(a, b, blocks, child, pose, limit, cache, &walk, m))
-        mesh_manifold_from(a, b, blocks, child, pose, limit, cache, &walk, m);
+    if (!mesh_manifold_at_once(a, b, blocks, subshape, pose, limit, cache, &walk, m))
+        mesh_manifold_from(a, b, blocks, subshape, pose, limit, cache, &walk, m);
 #else
     struct mesh_pair p;
     struct polytope_axis kept, nearest;
     vec3 pa, pb, start;
     uint32_t feature;
     bool known;
-    mesh_pair_make(a, b, blocks, child, pose, &p);
+    mesh_pair_make(a, b, blocks, subshape, pose, &p);
     kept = p.front; /* until something is known */
     if (mesh_by_memory(&p, limit, cache, &kept, &known, &start, m)) return;
     if (hull_nearest(&p.pair, start, limit, &nearest, &pa, &pb, &feature))

@@ -16,7 +16,7 @@ SADMM_INLINE void manifold_plane_round_end(struct manifold *m, vec3 centre, real
                                            uint32_t feature)
 {
     real height = v3_dot(m->normal, centre) + offset, s = height - radius;
-    /* midway between the lowest point of the ball and the plane */
+    /* halfway between the lowest point of the ball and the plane */
     if (s <= limit) manifold_add(m, v3_madd(centre, -(radius + s / 2), m->normal), s, feature);
 }
 

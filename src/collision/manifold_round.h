@@ -69,7 +69,7 @@ SADMM_INLINE void segments_closest(vec3 p, vec3 u, real hp, vec3 q, vec3 w, real
     *t = b;
 }
 
-/* Balls around ca and cb whose centres are apart sideways as well: adds the point midway between their surfaces on the
+/* Balls around ca and cb whose centres are apart sideways as well: adds the point halfway between their surfaces on the
  * line along the normal on which they are nearest. Returns the separation there, a large number where they pass each
  * other by. */
 SADMM_INLINE real manifold_add_section(struct manifold *m, vec3 ca, real ra, vec3 cb, real rb, real limit,

@@ -1,6 +1,6 @@
 /* A triangle mesh or a heightfield as contact finding reads it: one block of memory without pointers, the same on host
- * and device, in the pool of blocks that hulls are in (hull_data.h), and in a frame whose origin is the middle of the
- * box around it. What takes the time is memory, so that a query fetches little: boxes are float, rounded outwards.
+ * and device, in the shape data, as hulls are (hull_data.h), and in a frame whose origin is the middle of the box
+ * around it. What takes the time is memory, so that a query fetches little: boxes are float, rounded outwards.
  *
  * A block of triangles:
  *

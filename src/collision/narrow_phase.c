@@ -27,27 +27,27 @@ static void begin_later(const struct sadmm_collision_input *input, const struct 
     proxy_begin_later(p, input->since[p->body], since, input->dt, out);
 }
 
-/* A shape of a pair that was found `ahead` seconds into the step. */
+/* A shape of a pair that was found `time_offset` seconds into the step. */
 SADMM_ALWAYS_INLINE const struct sadmm_proxy *proxy_found_at(const struct sadmm_collision_input *input,
-                                                             const struct sadmm_proxy *p, double since, double ahead,
-                                                             struct sadmm_proxy *turned)
+                                                             const struct sadmm_proxy *p, double since,
+                                                             double time_offset, struct sadmm_proxy *turned)
 {
-    return since > 0 ? proxy_at_later(p, input->since[p->body], since, ahead, input->dt, turned)
-                     : proxy_at(p, ahead, input->dt, turned);
+    return since > 0 ? proxy_at_later(p, input->since[p->body], since, time_offset, input->dt, turned)
+                     : proxy_at(p, time_offset, input->dt, turned);
 }
 
 /* Write the manifold as a pair with its points; there is capacity. `before`: the pair that it goes on from, or NULL.
  * ratio: step_ratio of both sets. */
 SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
-                              uint32_t b, uint32_t child, const struct manifold *m,
+                              uint32_t b, uint32_t subshape, const struct manifold *m,
                               const struct sadmm_contact_set *old, double ratio,
                               const struct sadmm_contact_pair *before, struct old_pairs beside,
                               struct sadmm_contact_set *out)
 {
     const double since = since_of(input, &c->proxies[a], &c->proxies[b]);
     struct sadmm_proxy turned[2];
-    const struct sadmm_proxy *pa = proxy_found_at(input, &c->proxies[a], since, m->ahead, &turned[0]),
-                             *pb = proxy_found_at(input, &c->proxies[b], since, m->ahead, &turned[1]);
+    const struct sadmm_proxy *pa = proxy_found_at(input, &c->proxies[a], since, m->time_offset, &turned[0]),
+                             *pb = proxy_found_at(input, &c->proxies[b], since, m->time_offset, &turned[1]);
     struct sadmm_contact_pair *pair = &out->pairs[out->pair_count++];
     const double friction = contact_friction(input->friction_pairs, input->friction_values,
                                              (int64_t)input->friction_pair_count, a, b, pa, pb);
@@ -57,24 +57,24 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
     double normal[3];
 
     rotate_to_world(pb->R, m->normal, normal);
-    pair_motion_of(pa, pb, normal, m->ahead, input->dt, &motion);
-    const bool midway =
-        since == 0 && is_midway(m->ahead, input->dt); /* what is found elsewhere has no half step left */
+    pair_motion_of(pa, pb, normal, m->time_offset, input->dt, &motion);
+    const bool midpoint =
+        since == 0 && is_midpoint(m->time_offset, input->dt); /* what is found elsewhere has no half step left */
     const struct sadmm_contact_pair *from = before;
     if (beside.first < beside.last)
         from = contact_rolls_from(pa, pb, before, old->pairs, beside.first, beside.last, old->points, m->count, normal);
-    migration_begin(pa, pb, midway ? from : NULL, last, input->dt, ratio, m->count, normal, &rolling);
+    migration_begin(pa, pb, midpoint ? from : NULL, last, input->dt, ratio, m->count, normal, &rolling);
     rolling.across = from != before;
-    contact_emit_pair(a, b, child, pa, pb, m, rolling.normal, friction, (int32_t)out->point_count, pair);
+    contact_emit_pair(a, b, subshape, pa, pb, m, rolling.normal, friction, (int32_t)out->point_count, pair);
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count];
         contact_emit_point(pa, pb, &motion, &m->points[i], point);
-        if (since > 0) open_gap(pa, pb, since, normal, point);
+        if (since > 0) open_separation(pa, pb, since, normal, point);
         const bool carried = before && contact_carry(before, old->points, i, rolling.normal, friction, ratio, point);
         if (!carried && beside.first < beside.last)
             contact_carry_across(old->pairs, beside.first, beside.last, old->points, pair->revision, i, rolling.normal,
                                  friction, ratio, point);
-        const double radius = midway ? contact_radius(pa, pb, m->count, normal, point) : 0;
+        const double radius = midpoint ? contact_radius(pa, pb, m->count, normal, point) : 0;
         if ((rolling.before || rolling.soon || radius > 0) &&
             migrate_point(pa, pb, &rolling, last, i, radius, input->dt, normal, point,
                           &out->migrations[out->point_count]))
@@ -117,35 +117,36 @@ struct narrow_phase {
 
 /* The pair that a manifold goes on from, NULL: none. They are asked for in the order of sets. */
 SADMM_ALWAYS_INLINE const struct sadmm_contact_pair *find_before(struct narrow_phase *n, uint64_t shapes,
-                                                                 uint32_t child, const struct sadmm_proxy *a,
+                                                                 uint32_t subshape, const struct sadmm_proxy *a,
                                                                  const struct sadmm_proxy *b)
 {
     const struct sadmm_contact_pair *pairs = n->old->pairs;
     const size_t count = n->old->pair_count;
     size_t at = n->next;
-    while (at < count && contact_is_before(&pairs[at], shapes, child)) ++at;
+    while (at < count && contact_is_before(&pairs[at], shapes, subshape)) ++at;
     n->next = at;
-    return at < count && contact_shapes(&pairs[at]) == shapes && contact_goes_on(&pairs[at], child, a, b) ? &pairs[at]
-                                                                                                         : NULL;
+    if (at == count || contact_shapes(&pairs[at]) != shapes) return NULL;
+    return contact_goes_on(&pairs[at], subshape, a, b) ? &pairs[at] : NULL;
 }
 
 /* Write the manifold of a pair, if it has points; false when out of memory. */
-SADMM_ALWAYS_INLINE bool keep(struct narrow_phase *n, uint32_t a, uint32_t b, uint32_t child,
+SADMM_ALWAYS_INLINE bool keep(struct narrow_phase *n, uint32_t a, uint32_t b, uint32_t subshape,
                               const struct manifold *m, const struct sadmm_contact_pair *before,
                               struct old_pairs beside)
 {
     if (m->count == 0) return true;
-    if (n->seams.first && seam_hides(&n->seams, n->candidates->proxies, n->input->hulls, a, b, child, m)) return true;
+    if (n->seams.first && seam_hides(&n->seams, n->candidates->proxies, n->input->hulls, a, b, subshape, m))
+        return true;
     if (!has_capacity(n->out) && !add_capacity(n->out)) return false;
     if (contact_may_migrate(&n->candidates->proxies[a], &n->candidates->proxies[b], before,
                             n->old->points, m->count) &&
         !has_migrations(n->out))
         return false;
-    emit(n->candidates, n->input, a, b, child, m, n->old, n->ratio, before, beside, n->out);
+    emit(n->candidates, n->input, a, b, subshape, m, n->old, n->ratio, before, beside, n->out);
     return true;
 }
 
-/* Of a triangle, or a pair that was hit: the other one is part of find_children alone. */
+/* Of a triangle, or a pair that was hit: the other one is part of find_subshapes alone. */
 __attribute__((noinline)) static bool keep_triangle(struct narrow_phase *n, uint32_t a, uint32_t b, uint32_t triangle,
                                                     const struct manifold *m, const struct sadmm_contact_pair *before,
                                                     struct old_pairs beside)
@@ -177,8 +178,8 @@ static double touch_any(const struct narrow_phase *n, const struct mesh *mesh, c
     return first;
 }
 
-/* b: a mesh. pa, pb: the two in a step of dt that begins at `since`. By itself: find_children is as quick as it is because
- * all of find_manifold is inlined into it, and what keeps that. */
+/* b: a mesh. pa, pb: the two in a step of dt that begins at `since`. By itself: find_subshapes is as quick as it is
+ * because all of find_manifold is inlined into it, and what keeps that. */
 __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uint32_t a, uint32_t b,
                                                      const struct sadmm_proxy *pa, const struct sadmm_proxy *pb,
                                                      double since, double dt)
@@ -206,16 +207,16 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
         m.cache = 0;
         triangle_manifold(&pa->geometry, &pb->geometry, input->hulls, (uint32_t)triangle, &start.pose,
                           (real)start.limit, cache, &m);
-        m.ahead = start.ahead;
+        m.time_offset = start.time_offset;
         if (pair_asks_balls(pa, pb, input->hulls, (uint32_t)triangle, &start, input->gravity, dt, &m))
             inner_balls_add(pa, pb, input->hulls, (uint32_t)triangle, cache != 0, start.touch, input->gravity, dt, &m);
-        m.ahead += since;
+        m.time_offset += since;
         if (!keep_triangle(n, a, b, (uint32_t)triangle, &m, before, beside)) return false;
     }
     return true;
 }
 
-/* find_children of a pair that was hit within the step. */
+/* find_subshapes of a pair that was hit within the step. */
 __attribute__((noinline)) static bool find_later(struct narrow_phase *n, uint32_t a, uint32_t b, double since)
 {
     const struct sadmm_collision_input *input = n->input;
@@ -225,36 +226,36 @@ __attribute__((noinline)) static bool find_later(struct narrow_phase *n, uint32_
 
     begin_later(input, &n->candidates->proxies[a], since, &pa);
     begin_later(input, &n->candidates->proxies[b], since, &pb);
-    const uint32_t children = pair_children(&pa.geometry, &pb.geometry);
-    if (children == 0) return find_triangles(n, a, b, &pa, &pb, since, left);
-    for (uint32_t child = 0; child < children; ++child) {
-        const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), child, &pa, &pb);
+    const uint32_t subshapes = pair_subshapes(&pa.geometry, &pb.geometry);
+    if (subshapes == 0) return find_triangles(n, a, b, &pa, &pb, since, left);
+    for (uint32_t subshape = 0; subshape < subshapes; ++subshape) {
+        const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), subshape, &pa, &pb);
         const struct pair_start start = pair_start_of(&pa, &pb, input->margin, input->gravity, left);
-        find_manifold(&pa, &pb, input->hulls, child, input->margin, input->gravity, left, &start,
+        find_manifold(&pa, &pb, input->hulls, subshape, input->margin, input->gravity, left, &start,
                       before ? contact_memory(before, &pa, &pb) : 0, &m);
-        m.ahead += since;
-        if (!keep_triangle(n, a, b, child, &m, before, no_pairs)) return false;
+        m.time_offset += since;
+        if (!keep_triangle(n, a, b, subshape, &m, before, no_pairs)) return false;
     }
     return true;
 }
 
 /* The manifolds of two shapes; false when out of memory. */
-static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
+static bool find_subshapes(struct narrow_phase *n, uint32_t a, uint32_t b)
 {
     const struct sadmm_collision_input *input = n->input;
     const struct sadmm_proxy *pa = &n->candidates->proxies[a], *pb = &n->candidates->proxies[b];
-    const uint32_t children = pair_children(&pa->geometry, &pb->geometry);
+    const uint32_t subshapes = pair_subshapes(&pa->geometry, &pb->geometry);
     const double since = since_of(input, pa, pb);
     struct manifold m;
 
     if (since > 0) return find_later(n, a, b, since);
-    if (children == 0) return find_triangles(n, a, b, pa, pb, 0, input->dt);
-    for (uint32_t child = 0; child < children; ++child) {
-        const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), child, pa, pb);
+    if (subshapes == 0) return find_triangles(n, a, b, pa, pb, 0, input->dt);
+    for (uint32_t subshape = 0; subshape < subshapes; ++subshape) {
+        const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), subshape, pa, pb);
         const struct pair_start start = pair_start_of(pa, pb, input->margin, input->gravity, input->dt);
-        find_manifold(pa, pb, input->hulls, child, input->margin, input->gravity, input->dt, &start,
+        find_manifold(pa, pb, input->hulls, subshape, input->margin, input->gravity, input->dt, &start,
                       before ? contact_memory(before, pa, pb) : 0, &m);
-        if (!keep(n, a, b, child, &m, before, no_pairs)) return false;
+        if (!keep(n, a, b, subshape, &m, before, no_pairs)) return false;
     }
     return true;
 }
@@ -290,7 +291,7 @@ bool SADMM_COLLISION_KERNEL(narrow_phase)(const struct sadmm_candidates *c, cons
                      count = list_meeting(c, input, begin, last, keys);
         for (size_t i = 0; i < count; ++i)
             if (!sadmm_pair_is_disabled(input, keys[i]) &&
-                !find_children(&n, (uint32_t)(keys[i] >> 32), (uint32_t)keys[i]))
+                !find_subshapes(&n, (uint32_t)(keys[i] >> 32), (uint32_t)keys[i]))
                 return false;
         begin = last;
     }

@@ -20,7 +20,7 @@
  * making as much of the rest as they do without it. */
 #if defined SADMM_SMOOTH_ELSEWHERE
 void SADMM_SMOOTH_ELSEWHERE(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
-                            const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
+                            const double *hulls, uint32_t subshape, const struct pair_pose *pose, real limit,
                             uint32_t cache, struct manifold *m);
 #elif !defined SADMM_WITHOUT_SMOOTH
 #include "smooth_manifold.h"
@@ -72,15 +72,15 @@ SADMM_INLINE void pose_add_centres(const struct sadmm_proxy *a, const struct sad
     pose->tips[1] = b->system_body >= 0;
 }
 
-/* Of two shapes turned to Ra and Rb about xa and xb, and moved on by `ahead` seconds (midway.h). */
+/* Of two shapes turned to Ra and Rb about xa and xb, and moved on by `time_offset` seconds (midpoint.h). */
 SADMM_INLINE struct pair_pose pose_between(const struct sadmm_proxy *a, const double Ra[9], const double xa[3],
                                            const struct sadmm_proxy *b, const double Rb[9], const double xb[3],
-                                           double ahead)
+                                           double time_offset)
 {
     struct pair_pose pose;
     double d[3];
     int i;
-    for (i = 0; i < 3; ++i) d[i] = xa[i] - xb[i] - way_ahead(a, b, ahead, i);
+    for (i = 0; i < 3; ++i) d[i] = xa[i] - xb[i] - offset_displacement(a, b, time_offset, i);
     pose = pose_at(a->geometry.type == SADMM_SHAPE_PLANE, Ra, d, Rb);
 #ifndef SADMM_WITHOUT_SMOOTH
     pose_add_centres(a, b, &pose);
@@ -89,18 +89,18 @@ SADMM_INLINE struct pair_pose pose_between(const struct sadmm_proxy *a, const do
 }
 
 /* Of two shapes as they are placed. */
-SADMM_INLINE struct pair_pose turned_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead)
+SADMM_INLINE struct pair_pose turned_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double time_offset)
 {
-    return pose_between(a, a->R, a->x, b, b->R, b->x, ahead);
+    return pose_between(a, a->R, a->x, b, b->R, b->x, time_offset);
 }
 
-SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead,
+SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double time_offset,
                                            double dt, struct proxy_place *of_b)
 {
     struct proxy_place of_a;
-    proxy_place_at(a, ahead, dt, &of_a);
-    proxy_place_at(b, ahead, dt, of_b);
-    return pose_between(a, of_a.R, of_a.x, b, of_b->R, of_b->x, ahead);
+    proxy_place_at(a, time_offset, dt, &of_a);
+    proxy_place_at(b, time_offset, dt, of_b);
+    return pose_between(a, of_a.R, of_a.x, b, of_b->R, of_b->x, time_offset);
 }
 
 SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
@@ -116,14 +116,15 @@ SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, co
     }
 }
 
-/* Of one child of the pair. The rank of a (geometry.h) is not above b's; m->count is 0 when the shapes are apart, and
- * for types that are not listed or meshes (triangle_manifold). hulls: the pool (hull_data.h); NULL: there are none. */
+/* Of one subshape of the pair. The rank of a (geometry.h) is not above b's; m->count is 0 when the shapes are apart,
+ * and for types that are not listed or meshes (triangle_manifold). hulls: the shape data (hull_data.h); NULL: there are
+ * none. */
 SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
-                                const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
+                                const double *hulls, uint32_t subshape, const struct pair_pose *pose, real limit,
                                 uint32_t cache, struct manifold *m)
 {
     const vec3 a = v3_load(shape_a->size), b = v3_load(shape_b->size);
-    (void)child; /* no type has more than one piece, but meshes */
+    (void)subshape; /* no type has more than one piece, but meshes */
     m->count = 0;
     m->cache = 0;
     if (hulls && shape_b->type == SADMM_SHAPE_HULL) {
@@ -132,7 +133,7 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
     }
 #ifndef SADMM_WITHOUT_SMOOTH
     if (hulls && geometry_is_smooth(shape_b)) {
-        SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, child, pose, limit, cache, m);
+        SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, subshape, pose, limit, cache, m);
         return;
     }
 #endif
@@ -147,22 +148,23 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
 
 /* Of a triangle of the mesh b. */
 SADMM_INLINE void triangle_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
-                                    const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
+                                    const double *blocks, uint32_t subshape, const struct pair_pose *pose, real limit,
                                     uint32_t cache, struct manifold *m)
 {
 #ifndef SADMM_WITHOUT_SMOOTH
     if (geometry_is_smooth(a)) {
-        SADMM_SMOOTH_ELSEWHERE(a, b, blocks, child, pose, limit, cache, m);
+        SADMM_SMOOTH_ELSEWHERE(a, b, blocks, subshape, pose, limit, cache, m);
         return;
     }
 #endif
-    mesh_manifold(a, b, blocks, child, pose, limit, cache, m);
+    mesh_manifold(a, b, blocks, subshape, pose, limit, cache, m);
 }
 
 /* Of the ball of a body (inner_ball.h) and the other shape of a pair, at any distance. The ball is a, or b where a is a
  * plane. */
 SADMM_CALLED void ball_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
-                                const double *hulls, uint32_t child, const struct pair_pose *pose, struct manifold *m)
+                                const double *hulls, uint32_t subshape, const struct pair_pose *pose,
+                                struct manifold *m)
 {
     const real far = SADMM_REAL_MAX / 4, radius = (real)shape_a->size[0];
     const vec3 b = v3_load(shape_b->size);
@@ -173,16 +175,16 @@ SADMM_CALLED void ball_manifold(const struct sadmm_geometry *shape_a, const stru
     else if (shape_b->type == SADMM_SHAPE_BOX) manifold_sphere_box(radius, b, pose, far, 0, m);
     else if (!hulls) return;
     else if (shape_b->type == SADMM_SHAPE_HULL) hull_manifold(shape_a, shape_b, hulls, pose, far, 0, m);
-    else if (shape_b->type == SADMM_SHAPE_MESH) mesh_manifold(shape_a, shape_b, hulls, child, pose, far, 0, m);
+    else if (shape_b->type == SADMM_SHAPE_MESH) mesh_manifold(shape_a, shape_b, hulls, subshape, pose, far, 0, m);
 #ifndef SADMM_WITHOUT_SMOOTH
-    else SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, child, pose, far, 0, m);
+    else SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, subshape, pose, far, 0, m);
 #endif
 }
 
 /* What is known of two shapes in a step before their manifold is asked for. */
 struct pair_start {
     struct pair_pose pose;
-    double ahead, limit;
+    double time_offset, limit;
     bool moves_on; /* the pair is one of those in advance.h */
     struct first_touch touch; /* of one that moves on: pair_start_at; else nothing is known of it */
 };
@@ -192,12 +194,12 @@ SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const 
 {
     const double speed = relative_speed(a->velocity, b->velocity);
     struct pair_start start;
-    start.ahead = proxy_ahead(a, b, speed, dt);
+    start.time_offset = proxy_time_offset(a, b, speed, dt);
     start.limit = proxy_limit(a, b, speed, margin, gravity, dt);
-    start.moves_on = advance_needed(a, b, start.ahead, dt);
-    start.touch.ahead = 0;
+    start.moves_on = advance_needed(a, b, start.time_offset, dt);
+    start.touch.time_offset = 0;
     start.touch.missed = false;
-    start.pose = turned_pose(a, b, start.ahead);
+    start.pose = turned_pose(a, b, start.time_offset);
     return start;
 }
 
@@ -207,50 +209,50 @@ SADMM_INLINE void pair_start_at(const struct sadmm_proxy *a, const struct sadmm_
 {
     struct proxy_place of_b;
     start->touch = first;
-    start->ahead = first.ahead;
+    start->time_offset = first.time_offset;
     if (first.missed) start->limit = proxy_near_limit(a, b, margin, gravity, dt);
-    start->pose = proxies_pose(a, b, start->ahead, dt, &of_b);
+    start->pose = proxies_pose(a, b, start->time_offset, dt, &of_b);
 }
 
 /* Is the pair to have contacts of the balls in its bodies, be it fast or not? m: its manifold without. */
 SADMM_INLINE bool pair_sinks(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                             uint32_t child, const struct pair_start *start, double gravity, double dt,
+                             uint32_t subshape, const struct pair_start *start, double gravity, double dt,
                              const struct manifold *m)
 {
     return inner_is_asked(a, b, gravity, dt, m) ||
-           (hulls && b->geometry.type == SADMM_SHAPE_MESH && inner_is_behind(a, b, hulls, child, &start->pose));
+           (hulls && b->geometry.type == SADMM_SHAPE_MESH && inner_is_behind(a, b, hulls, subshape, &start->pose));
 }
 SADMM_INLINE bool pair_asks_balls(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                  uint32_t child, const struct pair_start *start, double gravity, double dt,
+                                  uint32_t subshape, const struct pair_start *start, double gravity, double dt,
                                   const struct manifold *m)
 {
-    return start->moves_on || pair_sinks(a, b, hulls, child, start, gravity, dt, m);
+    return start->moves_on || pair_sinks(a, b, hulls, subshape, start, gravity, dt, m);
 }
 
-/* The manifold of two shapes in a step: where they are halfway through it (midway.h), or where a pair that is faster
+/* The manifold of two shapes in a step: where they are halfway through it (midpoint.h), or where a pair that is faster
  * than that first touches (advance.h). start: pair_start_of the two. */
 SADMM_HOST_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
-                                     uint32_t child, double margin, double gravity, double dt,
-                                     const struct pair_start *midway, uint32_t cache, struct manifold *m)
+                                     uint32_t subshape, double margin, double gravity, double dt,
+                                     const struct pair_start *midpoint, uint32_t cache, struct manifold *m)
 {
-    struct pair_start start = *midway;
+    struct pair_start start = *midpoint;
     if (start.moves_on)
-        pair_start_at(a, b, pair_first_touch(a, b, hulls, child, 0, gravity, dt), margin, gravity, dt, &start);
+        pair_start_at(a, b, pair_first_touch(a, b, hulls, subshape, 0, gravity, dt), margin, gravity, dt, &start);
     const struct pair_pose pose = start.pose; /* pair_manifold's own stays in registers */
-    pair_manifold(&a->geometry, &b->geometry, hulls, child, &pose, (real)start.limit, cache, m);
-    m->ahead = start.ahead;
+    pair_manifold(&a->geometry, &b->geometry, hulls, subshape, &pose, (real)start.limit, cache, m);
+    m->time_offset = start.time_offset;
     if (start.moves_on || inner_is_asked(a, b, gravity, dt, m))
-        inner_balls_add(a, b, hulls, child, cache != 0, start.touch, gravity, dt, m);
+        inner_balls_add(a, b, hulls, subshape, cache != 0, start.touch, gravity, dt, m);
 }
 
 /* ---- meshes: their triangles have one pose in common -------------------------------------------------------------- */
 
 /* When a pair that moves on first touches the triangle, s; HUGE_VAL: not within the step. */
 SADMM_INLINE double mesh_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *blocks,
-                                     uint32_t child, double gravity, double dt)
+                                     uint32_t subshape, double gravity, double dt)
 {
-    const struct first_touch first = pair_first_touch(a, b, blocks, child, 0, gravity, dt);
-    return first.missed ? HUGE_VAL : first.ahead;
+    const struct first_touch first = pair_first_touch(a, b, blocks, subshape, 0, gravity, dt);
+    return first.missed ? HUGE_VAL : first.time_offset;
 }
 
 /* From where the manifolds of all triangles are found: where a pair that moves on touches the first of them. `first`:
@@ -258,7 +260,7 @@ SADMM_INLINE double mesh_first_touch(const struct sadmm_proxy *a, const struct s
 SADMM_INLINE void mesh_start_at(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double first, double margin,
                                 double gravity, double dt, struct pair_start *start)
 {
-    const struct first_touch touch = {first < HUGE_VAL ? first : start->ahead, !(first < HUGE_VAL)};
+    const struct first_touch touch = {first < HUGE_VAL ? first : start->time_offset, !(first < HUGE_VAL)};
     pair_start_at(a, b, touch, margin, gravity, dt, start);
 }
 

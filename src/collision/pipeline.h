@@ -11,7 +11,7 @@ struct sadmm_collision {
      * set that they replace. */
     struct sadmm_contact_set spare, between;
     bool can_undo;
-    bool looked_ahead; /* the candidates are those of the next find */
+    bool has_candidates; /* the candidates are those of the next find */
     struct sadmm_box_row row; /* of their boxes, made when it is asked for (swept_bodies.h) */
     /* One a thread beyond the first; its first thread writes to the new set itself. */
     struct sadmm_contact_set *parts;

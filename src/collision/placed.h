@@ -13,7 +13,7 @@ struct sadmm_placed {
     double R[9], x[3]; /* shape to world, row-major; its origin, m */
     struct sadmm_geometry geometry;
     const double *blocks; /* that geometry.hull is an offset in (hull_data.h). Of others than hulls and meshes: what
-                             every pool begins with */
+                             all shape data begins with */
     uint32_t slot;
     int32_t body, environment;
     uint32_t category, mask;

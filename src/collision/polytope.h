@@ -1,5 +1,5 @@
 /* Convex polytopes of the narrow phase: a hull, or what a box, a capsule's segment and a sphere's centre are beside
- * one, with a round of `radius` around it. All are blocks of the world's pool (hull_data.h).
+ * one, with a round of `radius` around it. All are blocks of the world's shape data (hull_data.h).
  */
 #ifndef SADMM_COLLISION_POLYTOPE_H
 #define SADMM_COLLISION_POLYTOPE_H
@@ -49,7 +49,7 @@ SADMM_INLINE void polytope_at(const double *hulls, uint32_t at, struct polytope 
     p->vertex_next = p->vertex_first + header->vertices + 1;
     p->scale = v3(1, 1, 1);
     p->scaled = false;
-    p->radius = (real)header->rounding;
+    p->radius = (real)header->convex_radius;
 }
 
 /* Of a sphere, capsule, box or hull. */

@@ -2,20 +2,21 @@
 #ifndef SADMM_COLLISION_PROXY_H
 #define SADMM_COLLISION_PROXY_H
 
-#include "core/math/quat.h"
 #include "bounds.h"
 #include "collision.h"
+#include "core/math/quat.h"
 #include "geometry.h"
-#include "midway.h"
+#include "midpoint.h"
 
 struct sadmm_proxy {
-    double R[9], x[3];  /* shape to world, row-major; centre, m: its body turned ahead (midway.h), not yet moved on */
+    double R[9], x[3];  /* shape to world, row-major; centre, m: at the time offset's rotation (midpoint.h), not yet
+                           moved */
     struct sadmm_geometry geometry; /* a copy: a pair needs no third place in memory */
-    double arm[3];      /* centre relative to the body's centre of mass, m, world: turned ahead as well */
+    double arm[3];      /* centre relative to the body's centre of mass, m, world: likewise rotated */
     double com[3];      /* of the body, at the step's start */
     double velocity[3]; /* of the body, m/s */
     double angular[3];  /* of the body, rad/s */
-    double ahead;       /* by how much it was turned ahead, s: [0, dt / 2] */
+    double time_offset; /* of its rotation, s: [0, dt / 2] */
     double spin, fall;  /* reach of rotation, and of the force and torque on the body, within the step, m */
     double thin;        /* smallest extent, m */
     double inertia;     /* of the body: its largest principal moment, kg m^2 */
@@ -34,10 +35,10 @@ SADMM_INLINE vec3 proxy_centre(const struct sadmm_proxy *p)
     return v3_load(x);
 }
 
-/* How a shape is turned ahead. */
+/* Rotation of a shape to its time offset. */
 struct proxy_turn {
-    double rate, ahead; /* rad/s, s */
-    quat body, shape;   /* to the world */
+    double rate, time_offset; /* rad/s, s */
+    quat body, shape;         /* to the world */
 };
 
 /* since: the body's orientation is the one that it has then, s after the step's start. */
@@ -48,8 +49,8 @@ SADMM_INLINE struct proxy_turn proxy_turn_since(const struct sadmm_shape *shape,
     const quat start = q_load(body->orientation);
     struct proxy_turn turn;
     turn.rate = moves ? turning_rate(body->velocity + 3) : 0;
-    turn.ahead = moves ? since + turn_ahead(turn.rate, dt - since) : 0;
-    turn.body = moves ? turned(start, body->velocity + 3, turn.ahead - since) : start;
+    turn.time_offset = moves ? since + turn_time_offset(turn.rate, dt - since) : 0;
+    turn.body = moves ? turned(start, body->velocity + 3, turn.time_offset - since) : start;
     turn.shape = q_normalize(q_mul(turn.body, q_load(shape->orientation)));
     return turn;
 }
@@ -79,7 +80,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     double reach;
     int i;
 
-    p->ahead = turn->ahead;
+    p->time_offset = turn->time_offset;
     p->geometry = *geometry;
     for (i = 0; i < 3; ++i) v3_store(R.r[i], p->R + 3 * i);
     v3_store(arm, p->arm);
@@ -106,16 +107,17 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
 }
 
 /* Is a pair that was found there to be turned to it? Halfway is where shapes are placed. */
-SADMM_INLINE bool is_midway(double ahead, double dt) { return ahead == 0.5 * dt; }
+SADMM_INLINE bool is_midpoint(double time_offset, double dt) { return time_offset == 0.5 * dt; }
 
-/* A shape of a pair that was found `ahead` seconds into the step: where it is placed, or turned on in `turned`. */
-SADMM_INLINE const struct sadmm_proxy *proxy_at(const struct sadmm_proxy *p, double ahead, double dt,
+/* A shape of a pair that was found `time_offset` seconds into the step: where it is placed, or turned on in
+ * `turned`. */
+SADMM_INLINE const struct sadmm_proxy *proxy_at(const struct sadmm_proxy *p, double time_offset, double dt,
                                                 struct sadmm_proxy *turned)
 {
     double Q[9];
     int i, k;
-    if (is_midway(ahead, dt) || (p->angular[0] == 0 && p->angular[1] == 0 && p->angular[2] == 0)) return p;
-    turn_between(p->angular, p->ahead, ahead, Q);
+    if (is_midpoint(time_offset, dt) || (p->angular[0] == 0 && p->angular[1] == 0 && p->angular[2] == 0)) return p;
+    turn_between(p->angular, p->time_offset, time_offset, Q);
     *turned = *p;
     for (i = 0; i < 3; ++i) {
         for (k = 0; k < 3; ++k)
@@ -123,7 +125,7 @@ SADMM_INLINE const struct sadmm_proxy *proxy_at(const struct sadmm_proxy *p, dou
         turned->arm[i] = Q[3 * i] * p->arm[0] + Q[3 * i + 1] * p->arm[1] + Q[3 * i + 2] * p->arm[2];
         turned->x[i] = p->com[i] + turned->arm[i];
     }
-    turned->ahead = ahead;
+    turned->time_offset = time_offset;
     return turned;
 }
 
@@ -131,11 +133,11 @@ SADMM_INLINE const struct sadmm_proxy *proxy_at(const struct sadmm_proxy *p, dou
 struct proxy_place {
     double R[9], x[3], arm[3];
 };
-SADMM_INLINE void proxy_place_at(const struct sadmm_proxy *p, double ahead, double dt, struct proxy_place *place)
+SADMM_INLINE void proxy_place_at(const struct sadmm_proxy *p, double time_offset, double dt, struct proxy_place *place)
 {
     double Q[9];
     int i, k;
-    if (is_midway(ahead, dt) || (p->angular[0] == 0 && p->angular[1] == 0 && p->angular[2] == 0)) {
+    if (is_midpoint(time_offset, dt) || (p->angular[0] == 0 && p->angular[1] == 0 && p->angular[2] == 0)) {
         for (i = 0; i < 9; ++i) place->R[i] = p->R[i];
         for (i = 0; i < 3; ++i) {
             place->x[i] = p->x[i];
@@ -143,7 +145,7 @@ SADMM_INLINE void proxy_place_at(const struct sadmm_proxy *p, double ahead, doub
         }
         return;
     }
-    turn_between(p->angular, p->ahead, ahead, Q);
+    turn_between(p->angular, p->time_offset, time_offset, Q);
     for (i = 0; i < 3; ++i) {
         for (k = 0; k < 3; ++k)
             place->R[3 * i + k] = Q[3 * i] * p->R[k] + Q[3 * i + 1] * p->R[3 + k] + Q[3 * i + 2] * p->R[6 + k];
@@ -179,16 +181,17 @@ SADMM_INLINE double proxy_limit(const struct sadmm_proxy *a, const struct sadmm_
     return pair_limit(margin, a->thin, b->thin, speed, a->spin, b->spin, a->fall, b->fall, fall_of(gravity, dt), dt);
 }
 
-/* move_ahead of two shapes. */
-SADMM_INLINE double proxy_ahead(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double speed, double dt)
+/* move_time_offset of two shapes. */
+SADMM_INLINE double proxy_time_offset(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double speed, double dt)
 {
-    return move_ahead(speed, a->thin < b->thin ? a->thin : b->thin, dt);
+    return move_time_offset(speed, a->thin < b->thin ? a->thin : b->thin, dt);
 }
 
-/* What b moves relative to a in `ahead` seconds, m; 0 where velocities are so large that they leave no time. */
-SADMM_INLINE double way_ahead(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead, int axis)
+/* What b moves relative to a in `time_offset` seconds, m; 0 where velocities are so large that they leave no time. */
+SADMM_INLINE double offset_displacement(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double time_offset,
+                                        int axis)
 {
-    return ahead > 0 ? ahead * (b->velocity[axis] - a->velocity[axis]) : 0;
+    return time_offset > 0 ? time_offset * (b->velocity[axis] - a->velocity[axis]) : 0;
 }
 
 /* Of two dynamic bodies, what share of the way to one point in space the arms of p's take: most of it those of the one that

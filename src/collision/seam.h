@@ -288,12 +288,13 @@ SADMM_RARE bool seam_hides_at(const struct seam_piece *piece, const struct sadmm
 
 /* Is the manifold of two shapes one that the union of their pieces does not have? It has points. */
 SADMM_RARE bool seam_hides(const struct seam_view *seams, const struct sadmm_proxy *proxies, const double *hulls,
-                           uint32_t a, uint32_t b, uint32_t child, const struct manifold *m)
+                           uint32_t a, uint32_t b, uint32_t subshape, const struct manifold *m)
 {
     const struct sadmm_proxy *pa = &proxies[a], *pb = &proxies[b];
     const double thin = smaller_of(pa->thin, pb->thin);
-    const vec3 way = v3((real)way_ahead(pa, pb, m->ahead, 0), (real)way_ahead(pa, pb, m->ahead, 1),
-                        (real)way_ahead(pa, pb, m->ahead, 2));
+    const vec3 way = v3((real)offset_displacement(pa, pb, m->time_offset, 0),
+                        (real)offset_displacement(pa, pb, m->time_offset, 1),
+                        (real)offset_displacement(pa, pb, m->time_offset, 2));
     int side;
     for (side = 0; side < 2; ++side) {
         const uint32_t slot = side ? a : b;
@@ -306,7 +307,7 @@ SADMM_RARE bool seam_hides(const struct seam_view *seams, const struct sadmm_pro
         piece.own = &proxies[slot];
         piece.flush = SEAM_FLUSH * thin;
         piece.beside = SEAM_BESIDE * thin;
-        piece.triangle = (int32_t)child;
+        piece.triangle = (int32_t)subshape;
         piece.axis = seam_axis(&piece.own->geometry);
         if (seam_hides_at(&piece, pb, m, side ? way : v3(0, 0, 0), side ? -1 : 1)) return true;
     }

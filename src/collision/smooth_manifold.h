@@ -6,10 +6,10 @@
 #include "manifold_convex.h"
 #include "manifold_convex_mesh.h"
 
-/* Sets m; its count is 0 before. child: of meshes. */
+/* Sets m; its count is 0 before. subshape: of meshes. */
 SADMM_INLINE void pair_manifold_of_smooth(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
-                                          const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
-                                          uint32_t cache, struct manifold *m)
+                                          const double *hulls, uint32_t subshape, const struct pair_pose *pose,
+                                          real limit, uint32_t cache, struct manifold *m)
 {
     switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
 #define SADMM_MANIFOLD(A, B, call) \
@@ -18,7 +18,7 @@ SADMM_INLINE void pair_manifold_of_smooth(const struct sadmm_geometry *shape_a, 
 #undef SADMM_MANIFOLD
     default: /* the only one with others */
         if (shape_b->type == SADMM_SHAPE_MESH)
-            convex_mesh_manifold(shape_a, shape_b, hulls, child, pose, limit, cache, m);
+            convex_mesh_manifold(shape_a, shape_b, hulls, subshape, pose, limit, cache, m);
         break;
     }
 }

@@ -16,20 +16,20 @@ enum sadmm_swept_kind { SADMM_SWEPT_NONE, SADMM_SWEPT_FIXED, SADMM_SWEPT_DYNAMIC
 struct sadmm_pair_list;
 
 /* Candidates of the step; sadmm_collision_find then does not search for them again. */
-sadmm_status sadmm_collision_look_ahead(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
-                                        struct sadmm_error *error);
+sadmm_status sadmm_collision_find_candidates(struct sadmm_collision *collision,
+                                             const struct sadmm_collision_input *input, struct sadmm_error *error);
 
-/* Bodies have other velocities since: it does. */
-void sadmm_collision_look_again(struct sadmm_collision *collision);
+/* Bodies have other velocities since: sadmm_collision_find finds candidates itself. */
+void sadmm_collision_drop_candidates(struct sadmm_collision *collision);
 
-/* Bodies that a contact of the last set presses on become SADMM_SWEPT_NONE. After look_ahead. */
+/* Bodies that a contact of the last set presses on become SADMM_SWEPT_NONE. After find_candidates. */
 void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const struct sadmm_contact_set *contacts,
                                   unsigned char *kinds);
 
 /* The pairs of shapes, as (a << 32 | b) in the order of pairs, that approach faster than the threshold, at least as far
  * as their velocities and boxes show, and of which either has restitution (bounces: any shape has), or which pass
- * (fast_pair.h): other pairs come as far as the surface in the step in which they are found, as the solve has it. After look_ahead. False:
- * out of memory. */
+ * (fast_pair.h): other pairs come as far as the surface in the step in which they are found, as the solve has it. After
+ * find_candidates. False: out of memory. */
 bool sadmm_collision_list_fast(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                                double threshold, bool bounces, struct sadmm_pair_list *list);
 /* Are they a dynamic body and one that moves that the solve might let through each other? Their way within the step is

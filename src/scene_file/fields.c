@@ -161,7 +161,7 @@ TABLE(sadmm_shape_fields, "a shape", shape_list);
 static const struct sadmm_field hull_list[] = {
     OTHER("points"),
     REAL(sadmm_hull_def, merge),
-    REAL(sadmm_hull_def, rounding),
+    REAL(sadmm_hull_def, convex_radius),
 };
 TABLE(sadmm_hull_fields, "a hull", hull_list);
 

@@ -17,7 +17,7 @@ static sadmm_status number_of(struct sadmm_writer *w, struct sadmm_key_tree *num
 
 sadmm_status sadmm_write_hull(struct sadmm_writer *w, const sadmm_hull *hull, json_int_t *number)
 {
-    const sadmm_hull_def def = {.merge = sadmm_hull_merge(hull), .rounding = sadmm_hull_rounding(hull)};
+    const sadmm_hull_def def = {.merge = sadmm_hull_merge(hull), .convex_radius = sadmm_hull_convex_radius(hull)};
     const double *vertices = sadmm_hull_vertices(hull);
     bool known;
     TRY(number_of(w, &w->hull_numbers, hull, &known, number));

@@ -210,13 +210,13 @@ static sadmm_status in_palm(sadmm_world *world, int32_t index, double at[3], dou
 }
 
 /* What the hand feels of its weight and of what it holds, N. */
-static sadmm_status felt_weight(sadmm_world *world, double *weight, struct sadmm_error *error)
+static sadmm_status reaction_weight(sadmm_world *world, double *weight, struct sadmm_error *error)
 {
     sadmm_coupling_id id;
     sadmm_coupling_state state;
     sadmm_status status = sadmm_world_coupling_at(world, 0, &id);
     if (status == SADMM_OK) status = sadmm_world_coupling_state(world, id, &state);
-    *weight = -state.felt_force[2];
+    *weight = -state.reaction_force[2];
     return sadmm_scene_world_error(world, status, error);
 }
 
@@ -228,7 +228,7 @@ struct lifting {
 };
 
 /* Memory: height at the start, place in the palm when it was lifted, the lowest height and the largest way from that
- * place since, weight that was felt while it was held. */
+ * place since, its weight by the reaction while it was held. */
 enum { START, PLACE, LOWEST = PLACE + 3, SLIP, WEIGHT, MEMORY };
 
 static sadmm_status observe_lifting(sadmm_world *world, double t, double dt, const struct lifting *about,
@@ -238,7 +238,7 @@ static sadmm_status observe_lifting(sadmm_world *world, double t, double dt, con
     if (t > 0 && (t < about->when->lifted - 1e-9 || task->finished)) return SADMM_OK;
     if (t < about->when->held + 1e-9) {
         sadmm_status status = in_palm(world, about->body, at, &height, error);
-        if (status == SADMM_OK && t > 0) status = felt_weight(world, &memory[WEIGHT], error);
+        if (status == SADMM_OK && t > 0) status = reaction_weight(world, &memory[WEIGHT], error);
         if (status != SADMM_OK) return status;
         if (t == 0) {
             memory[START] = height;
@@ -256,7 +256,7 @@ static sadmm_status observe_lifting(sadmm_world *world, double t, double dt, con
     }
     if (t + dt <= about->when->released + 1e-9) return SADMM_OK;
     /* The hand rests at both times: what it feels less is the weight. 0.1 N: a hundredth of what it weighs by itself. */
-    sadmm_status status = felt_weight(world, &weight, error);
+    sadmm_status status = reaction_weight(world, &weight, error);
     task->figures[3].value = memory[WEIGHT] - weight;
     task->finished = true;
     task->passed = task->figures[0].value > 0.9 * about->rise && task->figures[1].value < 0.003 &&
@@ -334,7 +334,7 @@ static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world,
                             struct sadmm_scene_result *result, struct sadmm_error *error)
 {
     static const struct sadmm_scene_task lifted = {
-        .figures = {{"lifted", "m", 0}, {"slip", "m", 0}, {"held", "s", 0}, {"felt", "N", 0}}, .figure_count = 4,
+        .figures = {{"lifted", "m", 0}, {"slip", "m", 0}, {"held", "s", 0}, {"reaction", "N", 0}}, .figure_count = 4,
     };
     static const struct lifting golden = {&sadmm_golden_task, GOLDEN, 0.15, 1};
     static const struct lifting heavy = {&sadmm_heavy_task, HEAVY, 0.13, 1.5};

@@ -109,12 +109,12 @@ static void check_mass(const sadmm_hull *hull)
     }
 }
 
-static void check_backwards(const struct cloud *c, double merge, double rounding, const sadmm_hull *hull)
+static void check_backwards(const struct cloud *c, double merge, double convex_radius, const sadmm_hull *hull)
 {
     struct cloud back = {.count = 0};
     sadmm_hull *other = NULL;
     for (size_t i = c->count; i-- > 0;) add_point(&back, c->x[3 * i], c->x[3 * i + 1], c->x[3 * i + 2]);
-    MUST(try_round_hull(&back, merge, rounding, &other) == SADMM_OK, "%s", sadmm_last_message());
+    MUST(try_round_hull(&back, merge, convex_radius, &other) == SADMM_OK, "%s", sadmm_last_message());
     MUST(other->vertex_count == hull->vertex_count && other->face_count == hull->face_count, "%d faces and %d",
          (int)other->face_count, (int)hull->face_count);
     MUST(other->volume == hull->volume && memcmp(other->half, hull->half, sizeof hull->half) == 0 &&
@@ -129,8 +129,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const double merge = take_choice(&in, 4) ? 1e-6 : take_choice(&in, 2) ? take_scale(&in, 1e-12, 1e-2) : 0;
     const struct cloud c = take_cloud(&in);
     sadmm_hull *hull = NULL;
-    const double rounding = take_rarely(&in, 4) ? take_scale(&in, 1e-9, 10) : 0;
-    const sadmm_status status = try_round_hull(&c, merge, rounding, &hull);
+    const double convex_radius = take_rarely(&in, 4) ? take_scale(&in, 1e-9, 10) : 0;
+    const sadmm_status status = try_round_hull(&c, merge, convex_radius, &hull);
     if (status != SADMM_OK) {
         MUST(status == SADMM_ERROR_INVALID_ARGUMENT, "%s", sadmm_status_name(status));
         MUST(strstr(sadmm_last_message(), "lie within") || strstr(sadmm_last_message(), "def->points["), "%s",
@@ -141,7 +141,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     /* Where points are hard on qhull more faces are joined than asked for, by up to 1e-5 of the extent. */
     check_hull(hull, &c, (4 * fmax(merge, 1e-5) + 1e-9) * extent_of(&c));
     check_mass(hull);
-    check_backwards(&c, merge, rounding, hull);
+    check_backwards(&c, merge, convex_radius, hull);
     sadmm_hull_destroy(hull);
     return 0;
 }

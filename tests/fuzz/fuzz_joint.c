@@ -161,7 +161,7 @@ static void must_be_sound(struct machine *m)
         sadmm_coupling_state s;
         MUST(sadmm_world_coupling_at(m->world, k, &id) == SADMM_OK, "coupling %d", k);
         MUST(sadmm_world_coupling_state(m->world, id, &s) == SADMM_OK, "coupling %d", k);
-        MUST(all_finite(s.felt_force, 3) && all_finite(s.felt_torque, 3) && all_finite(s.body_force, 3) &&
+        MUST(all_finite(s.reaction_force, 3) && all_finite(s.reaction_torque, 3) && all_finite(s.body_force, 3) &&
                  all_finite(s.body_torque, 3) && all_finite(s.rotation_error, 3),
              "coupling %d", k);
     }

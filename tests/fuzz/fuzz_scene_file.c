@@ -54,7 +54,7 @@ static const char everything[] =
 static const char hulls[] =
     "{'format': 'subadmm scene', 'format_version': 1, 'bodies': [{'mass': 1, 'inertia': [1, 1, 1], 'shapes': ["
     "{'type': 'hull', 'hull': 0}, {'type': 'hull', 'hull': 1, 'position': [1, 0, 0]}]}],"
-    "'hulls': [{'points': [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], 'rounding': 0.1},"
+    "'hulls': [{'points': [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], 'convex_radius': 0.1},"
     "{'points': [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [0.5, 0.5, 1.001]], 'merge': 0.01}]}";
 
 /* Small exports. */

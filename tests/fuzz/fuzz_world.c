@@ -150,9 +150,11 @@ static void must_be_sound(struct machine *m)
         double n2 = 0;
         for (int i = 0; i < 3; ++i) n2 += c->normal[i] * c->normal[i];
         MUST(fabs(n2 - 1) <= 1e-12, "contact %d: |n|^2 - 1 = %g", k, n2 - 1);
-        MUST(all_finite(c->position, 3) && all_finite(c->impulse, 3) && all_finite(c->force, 3) && isfinite(c->gap) &&
+        MUST(all_finite(c->position, 3) && all_finite(c->impulse, 3) && all_finite(c->force, 3) &&
+             isfinite(c->separation) &&
                  isfinite(c->friction) && c->friction >= 0,
-             "contact %d: gap %g, impulse %g %g %g", k, c->gap, c->impulse[0], c->impulse[1], c->impulse[2]);
+             "contact %d: separation %g, impulse %g %g %g", k, c->separation, c->impulse[0], c->impulse[1],
+             c->impulse[2]);
         MUST(c->triangle >= -1 && c->triangle < MAX_TRIANGLES, "contact %d: triangle %d", k, c->triangle);
     }
 }
@@ -195,7 +197,7 @@ static sadmm_settings take_settings(struct machine *m, sadmm_settings s)
         case 15: s.measure_residuals = take_choice(in, 2); break;
         case 16: s.certify = take_choice(in, 2); break;
         case 17: s.recover_wrenches = take_choice(in, 2); break;
-        case 18: s.baumgarte = take_number(in, 0, 1); break;
+        case 18: s.correction_factor = take_number(in, 0, 1); break;
         case 19: s.slop = take_number(in, 0, 1); break;
         case 20: s.correction_speed = take_number(in, 0, 1e3); break;
         case 21: s.restitution_threshold = take_number(in, 0, 10); break;
@@ -275,7 +277,7 @@ static const sadmm_hull *hull_at(int k)
             points[3 * i + 1] = 0.5 * sin(2.4 * i);
             points[3 * i + 2] = (i % 2 ? 0.4 : -0.4) / (k % HULLS + 1);
         }
-        const sadmm_hull_def def = {.points = points, .point_count = (size_t)count, .rounding = k % 2 ? 0.05 : 0};
+        const sadmm_hull_def def = {.points = points, .point_count = (size_t)count, .convex_radius = k % 2 ? 0.05 : 0};
         if (sadmm_hull_create(&def, hull) != SADMM_OK) return NULL;
     }
     return *hull;

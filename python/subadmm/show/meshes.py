@@ -144,10 +144,10 @@ def form_of(shape: Shape, patch=10.0, detail=DETAIL):
         return (kind, detail, length), one * size[0], lambda: _turned(_arc(detail, -length, length), detail)
     if kind in ("hull", "mesh"):
         vertices, triangles = shape.geometry()
-        rounding = shape.rounding
-        key = (kind, vertices.tobytes(), triangles.tobytes(), rounding)
-        if rounding > 0:
-            return key, one, lambda: _rounded(vertices, rounding, max(detail // 2, 8))
+        convex_radius = shape.convex_radius
+        key = (kind, vertices.tobytes(), triangles.tobytes(), convex_radius)
+        if convex_radius > 0:
+            return key, one, lambda: _rounded(vertices, convex_radius, max(detail // 2, 8))
         return key, one, lambda: Mesh(vertices, triangles)
     raise ValueError(f"shape: there is no mesh of type {kind}")
 

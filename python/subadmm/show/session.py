@@ -130,4 +130,4 @@ class Session:
             if self._coupling is None or self._target is None:
                 return None
             held = np.array(self._held.position) + rotate(np.array(self._held.orientation), self._at)
-            return held, self._target, -np.array(self._coupling.felt_force)
+            return held, self._target, -np.array(self._coupling.reaction_force)

@@ -66,9 +66,9 @@ class Lead:
         body, (own, _) = self.coupling.body, self.coupling.frame
         return np.array(body.position) + rotate(np.array(body.orientation), np.array(own))
 
-    def felt(self):
+    def reaction(self):
         """(force, N; torque about the target, N m): what the user feels."""
-        return np.array(self.coupling.felt_force), np.array(self.coupling.felt_torque)
+        return np.array(self.coupling.reaction_force), np.array(self.coupling.reaction_torque)
 
 
 class Hand:

@@ -20,7 +20,7 @@ class SteeringPanel:
     def __init__(self, server, session, is_near):
         """is_near(point): is it near enough to what there is to see for something to be led there?"""
         self.server, self.session, self._is_near = server, session, is_near
-        self._felt = []          # of each coupling: where it is held, force, torque
+        self._reaction = []          # of each coupling: where it is held, force, torque
         self._time = deque(maxlen=_KEPT)
         self._force = deque(maxlen=_KEPT)
         self._torque = deque(maxlen=_KEPT)
@@ -39,7 +39,7 @@ class SteeringPanel:
             for part, unit, colour in (("force", "N", "#1e5ac8"), ("torque", "N m", "#c87a1e")) if steering.leads else ():
                 self._plots.append(gui.add_uplot(
                     (np.zeros(1),) * 2, ({"label": "s"}, {"label": unit, "stroke": colour, "width": 2}),
-                    title=f"felt {part}, {unit}", height=120, scales={"x": {"time": False}, "y": {"auto": True}}))
+                    title=f"reaction {part}, {unit}", height=120, scales={"x": {"time": False}, "y": {"auto": True}}))
             if 0 < sum(len(chain.joints) for chain in steering.chains) <= _MOST:
                 with gui.add_folder("joints", expand_by_default=False):
                     for chain in steering.chains:
@@ -144,36 +144,36 @@ class SteeringPanel:
 
             self._gizmos.append(gizmo)
         thin = 0.006 * radius
-        self._arrows = [scene.add_arrows(f"/felt/{name}", np.zeros((0, 2, 3), np.float32), colour, shaft_radius=thin,
+        self._arrows = [scene.add_arrows(f"/reaction/{name}", np.zeros((0, 2, 3), np.float32), colour, shaft_radius=thin,
                                          head_radius=2.5 * thin, head_length=6 * thin)
                         for name, colour in (("force", (30, 90, 200)), ("torque", (200, 122, 30)))]
 
     def read(self):
-        """What is felt now. With the session locked."""
+        """The current reaction. With the session locked."""
         session = self.session
-        self._felt = [(lead.grip(), *lead.felt()) for lead in session.steering.leads]
-        if self._felt and session.running:
+        self._reaction = [(lead.grip(), *lead.reaction()) for lead in session.steering.leads]
+        if self._reaction and session.running:
             self._time.append(session.steps * session.world.settings.dt)
-            self._force.append(max(np.linalg.norm(force) for _, force, _ in self._felt))
-            self._torque.append(max(np.linalg.norm(torque) for _, _, torque in self._felt))
+            self._force.append(max(np.linalg.norm(force) for _, force, _ in self._reaction))
+            self._torque.append(max(np.linalg.norm(torque) for _, _, torque in self._reaction))
 
     def draw(self):
-        """Arrows along what is felt: as long as `_length` at the largest of the last time."""
-        if not self._felt:
+        """Arrows along the reaction, of length `_length` at the largest of the last time."""
+        if not self._reaction:
             return
         for part, handle, kept in ((1, self._arrows[0], self._force), (2, self._arrows[1], self._torque)):
             scale = self._length / max(max(kept, default=0), 1e-9)
             if self._on.value:
-                handle.points = np.array([[one[0], one[0] + scale * one[part]] for one in self._felt], np.float32)
+                handle.points = np.array([[one[0], one[0] + scale * one[part]] for one in self._reaction], np.float32)
             elif len(handle.points):
                 handle.points = np.zeros((0, 2, 3), np.float32)
 
     def say(self):
         """The figures and the plot."""
-        if not self._felt:
+        if not self._reaction:
             return
         lines = []
-        for lead, (_, force, torque) in zip(self.session.steering.leads, self._felt):
+        for lead, (_, force, torque) in zip(self.session.steering.leads, self._reaction):
             x, y, z = force
             lines.append(f"{lead.name} feels {np.linalg.norm(force):.2f} N ({x:.1f}, {y:.1f}, {z:.1f}), "
                          f"{np.linalg.norm(torque):.3f} N m")

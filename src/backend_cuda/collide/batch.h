@@ -25,12 +25,12 @@ static __device__ void write_batch(const collision_view &v, const struct batch &
 /* The candidates of a pair. */
 static __device__ void add(const collision_view &v, struct batch *out, uint64_t first, uint32_t count)
 {
-    for (uint32_t child = 0; child < count; ++child) {
+    for (uint32_t subshape = 0; subshape < count; ++subshape) {
         if (out->count == BATCH) {
             write_batch(v, *out, reserve(v.candidate_count + COUNT_FOUND, out->count));
             out->count = 0;
         }
-        out->keys[out->count++] = first + child;
+        out->keys[out->count++] = first + subshape;
     }
 }
 

@@ -186,7 +186,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
         for (int k = 0; k < 3; ++k) leaf.velocity[k] = proxy.velocity[k];
         leaf.thin = proxy.thin;
         leaf.slot = (int32_t)slot;
-        leaf.children = proxy.geometry.children;
+        leaf.subshapes = proxy.geometry.subshapes;
     }
     store_placed<MANY>(leaf, is_leaf ? &v.placed[i] : nullptr, shared);
     if (!v.leaf_keys || !is_leaf) return;
@@ -400,7 +400,7 @@ static __device__ void add_planes(const collision_view &v, const struct collisio
             const bool near = proxy_plane_meets(&proxy, &leaf.box, reach);
             if ((filters_meet(filter, leaf.filter) & near) && is_enabled(v, filter, leaf.filter))
                 add(v, out, first_candidate(v, plane, slot),
-                    candidates_of(v, proxy.geometry.children, leaf.children));
+                    candidates_of(v, proxy.geometry.subshapes, leaf.subshapes));
         }
     }
 }
@@ -427,7 +427,7 @@ static __device__ void test_leaves(const collision_view &v, const struct collisi
         const struct collision_leaf other = next;
         if (k + 1 < count) next = v.placed[list.numbers[k + 1][threadIdx.x]];
         if (leaves_overlap(leaf, other) & leaves_meet(v, leaf, other, dt))
-            add_pair(v, out, candidate_key(v, leaf, other), candidates_of(v, leaf.children, other.children));
+            add_pair(v, out, candidate_key(v, leaf, other), candidates_of(v, leaf.subshapes, other.subshapes));
     }
 }
 
@@ -519,17 +519,17 @@ static __device__ __forceinline__ void write_hits(const collision_view &v, const
                                                   uint64_t hits, const struct collision_leaf *others)
 {
     unsigned total = (unsigned)bits_set(hits);
-    if (v.child_bits > 0) {
+    if (v.subshape_bits > 0) {
         total = 0;
         for (uint64_t left = hits; left; left &= left - 1)
-            total += candidates_of(v, leaf.children, others[trailing_zeros(left)].children);
+            total += candidates_of(v, leaf.subshapes, others[trailing_zeros(left)].subshapes);
     }
     unsigned long long at = reserve_by_warp(v.candidate_count, total);
     for (; hits; hits &= hits - 1) {
         const struct collision_leaf &other = others[trailing_zeros(hits)];
-        const uint32_t count = candidates_of(v, leaf.children, other.children);
+        const uint32_t count = candidates_of(v, leaf.subshapes, other.subshapes);
         const uint64_t first = candidate_key(v, leaf, other);
-        for (uint32_t child = 0; child < count; ++child) store_candidate(v, at++, first + child);
+        for (uint32_t subshape = 0; subshape < count; ++subshape) store_candidate(v, at++, first + subshape);
         if (count == 0) list_mesh_pair(v, first);
     }
 }

@@ -6,7 +6,7 @@
  *   take      hits in the order of time, and what the two come near from then on   a block a group
  *   replace   shapes of what was hit, where they are now; the list of hits; the candidates are searched for again
  *   later     manifolds of what was hit, in what is left of the step               a thread a candidate, after `narrow`
- *   reopen    their points, and gaps of swept bodies                               after `emit`
+ *   reopen    their points, and separations of swept bodies                               after `emit`
  *
  * Steps have these kernels if they are planned to (CUDA(plan_hits)); where nothing is fast all of them return at once. Lists have no order, and results do not depend on it: the next hit is
  * that of the least (time, key), shapes of a body are taken in order, a list's length and what becomes of it are the same

@@ -94,9 +94,10 @@ static __device__ __noinline__ void start_on_mesh(const hits_view &v, const stru
     const int64_t count = usable_candidates(v.c);
     double least = HUGE_VAL;
     for (int64_t i = lower_bound(v.c.candidates, count, key);
-         i < count && v.c.candidates[i] >> v.c.child_bits == key >> v.c.child_bits; ++i)
+         i < count && v.c.candidates[i] >> v.c.subshape_bits == key >> v.c.subshape_bits; ++i)
         least = smaller_of(
-            mesh_first_touch(a, b, v.c.hulls, candidate_of(v.c, v.c.candidates[i]).child, step.gravity, left), least);
+            mesh_first_touch(a, b, v.c.hulls, candidate_of(v.c, v.c.candidates[i]).subshape, step.gravity, left),
+            least);
     mesh_start_at(a, b, least, step.margin, step.gravity, left, start);
 }
 
@@ -108,10 +109,10 @@ static __device__ __noinline__ void find_on_mesh(const hits_view &v, const struc
     if (start->moves_on) start_on_mesh(v, step, own, a, b, left, start);
     m->count = 0;
     m->cache = 0;
-    triangle_manifold(&a->geometry, &b->geometry, v.c.hulls, own.child, &start->pose, (real)start->limit, cache, m);
-    m->ahead = start->ahead;
-    if (pair_asks_balls(a, b, v.c.hulls, own.child, start, step.gravity, left, m))
-        inner_balls_add(a, b, v.c.hulls, own.child, cache != 0, start->touch, step.gravity, left, m);
+    triangle_manifold(&a->geometry, &b->geometry, v.c.hulls, own.subshape, &start->pose, (real)start->limit, cache, m);
+    m->time_offset = start->time_offset;
+    if (pair_asks_balls(a, b, v.c.hulls, own.subshape, start, step.gravity, left, m))
+        inner_balls_add(a, b, v.c.hulls, own.subshape, cache != 0, start->touch, step.gravity, left, m);
 }
 
 /* As find_later on the host. */
@@ -134,14 +135,15 @@ static __global__ void __launch_bounds__(NARROW_THREADS) later_kernel(const __gr
         struct pair_start start = pair_start_of(&later_a, &later_b, step.margin, step.gravity, left);
         int64_t before = search_pair(v.c, own, count);
         uint32_t cache = 0;
-        if (before >= 0 && contact_goes_on(&v.c.before.pairs[before], own.child, &later_a, &later_b))
+        if (before >= 0 && contact_goes_on(&v.c.before.pairs[before], own.subshape, &later_a, &later_b))
             cache = contact_memory(&v.c.before.pairs[before], &later_a, &later_b);
         else before = -1;
         if (b->geometry.type == SADMM_SHAPE_MESH)
             find_on_mesh(v, step, own, &later_a, &later_b, left, &start, cache, &m);
         else
-            find_manifold(&later_a, &later_b, v.c.hulls, own.child, step.margin, step.gravity, left, &start, cache, &m);
-        m.ahead += since;
+            find_manifold(&later_a, &later_b, v.c.hulls, own.subshape, step.margin, step.gravity, left, &start, cache,
+                          &m);
+        m.time_offset += since;
         store_manifold(v.c, i, m, before);
     }
 }
@@ -161,23 +163,23 @@ static __device__ __noinline__ void emit_later(const hits_view &v, int64_t i, co
     struct manifold m;
     double normal[3];
     m.normal = found.head.normal;
-    m.ahead = found.head.ahead;
+    m.time_offset = found.head.time_offset;
     m.cache = found.head.cache;
     m.count = found.head.count;
-    pa = proxy_at_later(a, v.since[a->body], since, m.ahead, dt, &turned[0]);
-    pb = proxy_at_later(b, v.since[b->body], since, m.ahead, dt, &turned[1]);
+    pa = proxy_at_later(a, v.since[a->body], since, m.time_offset, dt, &turned[0]);
+    pb = proxy_at_later(b, v.since[b->body], since, m.time_offset, dt, &turned[1]);
     rotate_to_world(pb->R, m.normal, normal);
-    pair_motion_of(pa, pb, normal, m.ahead, dt, &motion);
+    pair_motion_of(pa, pb, normal, m.time_offset, dt, &motion);
     const double friction = contact_friction(v.c.friction_pairs, v.c.friction_values, v.c.friction_count, own.a, own.b,
                                              pa, pb);
     const int32_t first = pair->first;
-    contact_emit_pair(own.a, own.b, own.child, pa, pb, &m, normal, friction, first, pair);
+    contact_emit_pair(own.a, own.b, own.subshape, pa, pb, &m, normal, friction, first, pair);
     for (int k = 0; k < m.count; ++k) {
         const struct manifold_point point = {found.points[k].position, found.points[k].separation,
                                              found.features[k / FOUND_FEATURES].of[k % FOUND_FEATURES]};
         struct sadmm_contact_point *out = &v.c.after.points[first + k];
         contact_emit_point(pa, pb, &motion, &point, out);
-        open_gap(pa, pb, since, normal, out);
+        open_separation(pa, pb, since, normal, out);
         if (before) contact_carry(before, v.c.before.points, k, normal, friction, ratio, out);
     }
 }
@@ -192,17 +194,17 @@ static __device__ __forceinline__ bool is_followed(const hits_view &v, int32_t b
            !(gives_up(v, body, mark) && v.marks[body].passes == mark);
 }
 
-/* As sadmm_world_open_gaps on the host. */
-static __device__ __forceinline__ void open_gaps(const hits_view &v, const struct candidate &own,
-                                                 const struct sadmm_contact_pair *pair)
+/* As sadmm_world_open_separations on the host. */
+static __device__ __forceinline__ void open_separations(const hits_view &v, const struct candidate &own,
+                                                        const struct sadmm_contact_pair *pair)
 {
     const struct sadmm_proxy *a = &v.c.proxies[own.a], *b = &v.c.proxies[own.b];
     if (b->geometry.type == SADMM_SHAPE_MESH || !is_followed(v, a->body) || !is_followed(v, b->body)) return;
     const struct swept_body *of_a = &v.swept_bodies[a->body], *of_b = &v.swept_bodies[b->body];
     if (!(pair->restitution > 0 || of_a->hits > 0 || of_b->hits > 0)) return;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
-        swept_bodies_open_gap(pair, &of_a->flight, &of_b->flight, min_of(a->thin, b->thin), v.step.settings,
-                              &v.c.after.points[k]);
+        swept_bodies_open_separation(pair, &of_a->flight, &of_b->flight, min_of(a->thin, b->thin), v.step.settings,
+                                     &v.c.after.points[k]);
 }
 
 static __global__ void __launch_bounds__(HIT_THREADS) reopen_kernel(const __grid_constant__ hits_view v)
@@ -220,7 +222,7 @@ static __global__ void __launch_bounds__(HIT_THREADS) reopen_kernel(const __grid
         struct sadmm_contact_pair *pair = &v.c.after.pairs[v.c.pair_of[i]];
         const double since = quiet ? 0 : since_of(v, &v.c.proxies[own.a], &v.c.proxies[own.b]);
         if (since > 0) emit_later(v, i, own, since, dt, pair);
-        open_gaps(v, own, pair);
+        open_separations(v, own, pair);
     }
 }
 

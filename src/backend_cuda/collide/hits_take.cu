@@ -51,7 +51,8 @@ static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_c
     for (int64_t i = thread; i < candidates; i += stride) {
         const struct candidate own = candidate_of(v.c, v.c.candidates[i]);
         const struct sadmm_proxy &a = v.c.proxies[own.a], &b = v.c.proxies[own.b];
-        if (own.child > 0 || b.geometry.type == SADMM_SHAPE_MESH || !pair_is_fast(&a, &b, threshold, step.gravity, step.dt))
+        if (own.subshape > 0 || b.geometry.type == SADMM_SHAPE_MESH ||
+            !pair_is_fast(&a, &b, threshold, step.gravity, step.dt))
             continue;
         v.c.candidate_count[COUNT_FAST] = 1;
         v.listed[atomicAdd(&v.state->listed, 1ull)] = (int32_t)i;

@@ -31,8 +31,8 @@ static sadmm_status upload_input(struct sadmm_cuda_collision *c, int name, const
     return SADMM_OK;
 }
 
-/* A slot's revision changes with everything that matters, its geometry included; where a hull lies in the pool may change
- * without it. */
+/* A slot's revision changes with everything that matters, its geometry included; where a hull is in the shape data may
+ * change without it. */
 static bool shapes_changed(const struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input)
 {
     const struct sadmm_shape *before = in<struct sadmm_shape>(c, PINNED_SHAPES);
@@ -76,17 +76,17 @@ static sadmm_status measure_candidates(struct sadmm_cuda_collision *c, const str
             ++v->mesh_count;
             triangles = std::max(triangles, triangles_of(input, geometry));
         } else {
-            most = std::max(most, (uint64_t)geometry.children);
+            most = std::max(most, (uint64_t)geometry.subshapes);
         }
     }
     v->slot_bits = std::max(bits_of(input->shape_count), 1);
     const uint64_t last = std::max(most * most, triangles) - 1;
-    v->child_bits = v->mesh_count > 0 ? std::max(bits_of(last), 1) : bits_of(last);
-    if (2 * v->slot_bits + v->child_bits > 64)
+    v->subshape_bits = v->mesh_count > 0 ? std::max(bits_of(last), 1) : bits_of(last);
+    if (2 * v->slot_bits + v->subshape_bits > 64)
         return sadmm_fail(error, SADMM_ERROR_LIMIT,
-                          "%zu shapes of up to %llu children: their pairs take %d bits, at most 64 can be indexed",
+                          "%zu shapes of up to %llu subshapes: their pairs take %d bits, at most 64 can be indexed",
                           input->shape_count, (unsigned long long)std::max(most, triangles),
-                          2 * v->slot_bits + v->child_bits);
+                          2 * v->slot_bits + v->subshape_bits);
     return SADMM_OK;
 }
 

@@ -59,7 +59,7 @@ static __device__ __forceinline__ emit_in_place emit_source_of(const collision_v
     const found_head found = load_wide(&m.head);
     struct manifold head;
     head.normal = found.normal;
-    head.ahead = found.ahead;
+    head.time_offset = found.time_offset;
     head.cache = found.cache;
     head.count = found.count;
     const uint32_t feature = m.features[lane / FOUND_FEATURES].of[lane % FOUND_FEATURES];
@@ -97,7 +97,7 @@ template <class Source>
 static __device__ __forceinline__ bool is_general(const emit_start &start, const Source &source, double dt)
 {
     const struct sadmm_proxy *a = &source.a, *b = &source.b;
-    if (!is_midway(source.head.ahead, dt)) return true;
+    if (!is_midpoint(source.head.time_offset, dt)) return true;
     if (start.count > ROLLING_POINTS) return false;
     return contact_is_curved(a, b, start.count) ||
            (start.match >= 0 && contact_kind_rolls(a, b, &source.old, start.count));
@@ -111,7 +111,7 @@ static __device__ __forceinline__ void emit_pair(const collision_view &v, const 
 {
     const struct candidate own = start.own;
     struct sadmm_contact_pair pair;
-    contact_emit_pair(own.a, own.b, own.child, &source.a, &source.b, &source.head, normal, friction, first, &pair);
+    contact_emit_pair(own.a, own.b, own.subshape, &source.a, &source.b, &source.head, normal, friction, first, &pair);
     store_wide(pair, &v.after.pairs[at]);
     v.after.keys[at] = ordered_key(own.a, own.b);
 }
@@ -130,7 +130,7 @@ static __device__ __forceinline__ void place_point(const Source &source, double 
 {
     struct pair_motion motion;
     rotate_to_world(source.b.R, source.head.normal, normal);
-    pair_motion_halfway(&source.a, &source.b, normal, source.head.ahead, dt, &motion);
+    pair_motion_halfway(&source.a, &source.b, normal, source.head.time_offset, dt, &motion);
     contact_emit_point(&source.a, &source.b, &motion, &source.point, point);
 }
 
@@ -268,13 +268,13 @@ static __device__ __forceinline__ void emit_general(const collision_view &v, con
     const double friction = friction_of(v, start.own, source), ratio = step_ratio(dt.now, dt.before);
     double normal[3];
     struct sadmm_contact_point point;
-    if (is_midway(source.head.ahead, dt.now)) {
+    if (is_midpoint(source.head.time_offset, dt.now)) {
         place_point(source, dt.now, normal, &point);
         if (contact_may_migrate(pa, pb, before, v.before.points, start.count))
             migrate(v, pa, pb, before, dt, ordered_key(start.own.a, start.own.b), start.count, lane, first + lane,
                     normal, &point);
     } else {
-        contact_emit_turned(pa, pb, source.head.normal, source.head.ahead, dt.now, &source.point, normal, &point);
+        contact_emit_turned(pa, pb, source.head.normal, source.head.time_offset, dt.now, &source.point, normal, &point);
     }
     if (before) contact_carry(before, wide_at(v.before.points, 0), lane, normal, friction, ratio, &point);
     if (lane == 0) emit_pair(v, start, source, normal, friction, at, first);

@@ -87,7 +87,7 @@ static __device__ bool triangle_now(const collision_view &v, const struct collis
     struct mesh mesh;
     mesh_at(v.hulls, b.geometry.hull, &mesh);
     mesh_reach(&a, &b, &own, step.margin, step.gravity, step.dt, step.dt, &box);
-    return mesh_triangle_near(&mesh, (int32_t)c.child, &box);
+    return mesh_triangle_near(&mesh, (int32_t)c.subshape, &box);
 }
 
 /* When the pair of a candidate first touches any triangle: of its candidates the least. */
@@ -97,7 +97,7 @@ static __device__ double first_touch(const collision_view &v, const struct candi
     const int64_t count = usable_candidates(v);
     double least = HUGE_VAL;
     for (int64_t i = lower_bound(v.candidates, count, first);
-         i < count && v.candidates[i] >> v.child_bits == first >> v.child_bits; ++i)
+         i < count && v.candidates[i] >> v.subshape_bits == first >> v.subshape_bits; ++i)
         least = smaller_of(v.touches[i], least);
     return least;
 }
@@ -116,8 +116,8 @@ static __device__ int64_t search_pair(const collision_view &v, const struct cand
 {
     const uint64_t shapes = ordered_key(c.a, c.b);
     int64_t before = find_key_in_eighths(v.before.keys, count, shapes);
-    if (before >= 0 && c.child > 0) {
-        before = contact_lower_bound(v.before.pairs, before, count, shapes, c.child);
+    if (before >= 0 && c.subshape > 0) {
+        before = contact_lower_bound(v.before.pairs, before, count, shapes, c.subshape);
         if (before == count || contact_shapes(&v.before.pairs[before]) != shapes) before = -1;
     }
     return before;
@@ -129,7 +129,7 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
     if (m.count == 0) return;
     v.matches[i] = (int32_t)before;
     struct found_manifold *out = &v.manifolds[i];
-    const found_head head = {m.normal, m.ahead, m.cache, m.count};
+    const found_head head = {m.normal, m.time_offset, m.cache, m.count};
     store_wide(head, &out->head);
     for (int first = 0; first < m.count; first += FOUND_FEATURES) {
         found_features features = {};
@@ -177,7 +177,7 @@ static __device__ bool hulls_at_once(const collision_view &v, const struct colli
 {
     walk->end = GJK_FAR;
     if (start.moves_on) return false;
-    m->ahead = start.ahead;
+    m->time_offset = start.time_offset;
     m->count = 0;
     m->cache = 0;
     if (a->geometry.type == SADMM_SHAPE_PLANE)
@@ -194,7 +194,7 @@ static __device__ void hulls_from(const collision_view &v, const struct collisio
                                   const struct pair_start &start, uint32_t cache, const struct gjk_walk *walk,
                                   struct manifold *m)
 {
-    m->ahead = start.ahead;
+    m->time_offset = start.time_offset;
     hull_manifold_from(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk, m);
     if (pair_asks_balls(a, b, v.hulls, 0, &start, step.gravity, step.dt, m))
         inner_balls_add(a, b, v.hulls, 0, cache != 0, start.touch, step.gravity, step.dt, m);
@@ -208,7 +208,7 @@ static __device__ __forceinline__ bool plain_at_once(const struct collision_step
     if (start.moves_on) return false;
     const struct pair_pose pose = start.pose; /* as in find_manifold */
     pair_manifold(&a->geometry, &b->geometry, nullptr, 0, &pose, (real)start.limit, cache, m);
-    m->ahead = start.ahead;
+    m->time_offset = start.time_offset;
     return !pair_asks_balls(a, b, nullptr, 0, &start, step.gravity, step.dt, m);
 }
 
@@ -225,7 +225,7 @@ static __device__ bool smooth_at_once(const collision_view &v, const struct coll
                                       const struct pair_start &start, struct manifold *m)
 {
     if (start.moves_on || a->geometry.type != SADMM_SHAPE_PLANE) return false;
-    m->ahead = start.ahead;
+    m->time_offset = start.time_offset;
     m->count = 0;
     m->cache = 0;
     convex_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
@@ -238,29 +238,30 @@ static __device__ bool smooth_at_once(const collision_view &v, const struct coll
 template <int HOW>
 static __device__ bool narrow_triangle(const collision_view &v, const struct collision_step &step,
                                        const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                       const struct pair_start &start, bool missed, uint32_t child, uint32_t cache,
+                                       const struct pair_start &start, bool missed, uint32_t subshape, uint32_t cache,
                                        struct gjk_walk *walk, struct manifold *m)
 {
-    m->ahead = start.ahead;
+    m->time_offset = start.time_offset;
     m->count = 0;
     m->cache = 0;
     if (is_at_once(HOW)) {
         walk->end = GJK_FAR;
         if ((start.moves_on && !missed) || (with_smooth(HOW) && geometry_is_smooth(&a->geometry))) return false;
-        if (!mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache,
+        if (!mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, subshape, &start.pose, (real)start.limit, cache,
                                    walk, m))
             return false;
         walk->end = GJK_FAR;
-        if (pair_sinks(a, b, v.hulls, child, &start, step.gravity, step.dt, m)) return false;
+        if (pair_sinks(a, b, v.hulls, subshape, &start, step.gravity, step.dt, m)) return false;
         if (start.moves_on) inner_on_surface(a, b, m);
         return true;
     }
     if (walk->end != GJK_FAR)
-        mesh_manifold_from(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, walk, m);
+        mesh_manifold_from(&a->geometry, &b->geometry, v.hulls, subshape, &start.pose, (real)start.limit, cache, walk,
+                           m);
     else
-        triangle_manifold(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
-    if (pair_asks_balls(a, b, v.hulls, child, &start, step.gravity, step.dt, m))
-        inner_balls_add(a, b, v.hulls, child, cache != 0, start.touch, step.gravity, step.dt, m);
+        triangle_manifold(&a->geometry, &b->geometry, v.hulls, subshape, &start.pose, (real)start.limit, cache, m);
+    if (pair_asks_balls(a, b, v.hulls, subshape, &start, step.gravity, step.dt, m))
+        inner_balls_add(a, b, v.hulls, subshape, cache != 0, start.touch, step.gravity, step.dt, m);
     return true;
 }
 
@@ -291,7 +292,7 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     int64_t before = had_points ? hint : -1;
     /* where pairs have several manifolds, keys come more than once */
     const bool known = find == NARROW_AGAIN || ((int)find_key_near(near, ordered_key(own.a, own.b), &before) &
-                                               (int)(v.child_bits == 0));
+                                               (int)(v.subshape_bits == 0));
     struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
     if (is_at_once(HOW) && v.threshold) note_fast(v, step, pair_way(&a, &b, step.gravity, step.dt), pa, pb);
     const bool on_mesh = with_meshes(HOW) && b.geometry.type == SADMM_SHAPE_MESH;
@@ -309,11 +310,11 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     if (!known) before = search_pair(v, own, count);
     if (before >= 0 && before != likely) old = load_wide(&v.before.pairs[before]);
     const uint32_t cache = contact_memory(&old, &a, &b);
-    if (!contact_goes_on(&old, own.child, &a, &b)) before = -1;
+    if (!contact_goes_on(&old, own.subshape, &a, &b)) before = -1;
     struct manifold m;
     if (on_mesh) {
         const bool missed = start.moves_on && !(v.touches[i] < HUGE_VAL);
-        if (!narrow_triangle<HOW>(v, step, pa, pb, start, missed, own.child, before >= 0 ? cache : 0, walk, &m))
+        if (!narrow_triangle<HOW>(v, step, pa, pb, start, missed, own.subshape, before >= 0 ? cache : 0, walk, &m))
             return false;
     } else if (with_hulls(HOW) && is_at_once(HOW) && b.geometry.type == SADMM_SHAPE_HULL) {
         if (!hulls_at_once(v, step, pa, pb, start, before >= 0 ? cache : 0, walk, &m)) return false;
@@ -324,8 +325,8 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     } else if (is_at_once(HOW)) {
         if (!plain_at_once(step, pa, pb, start, before >= 0 ? cache : 0, &m)) return false;
     } else {
-        find_manifold(pa, pb, with_hulls(HOW) ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt, &start,
-                      before >= 0 ? cache : 0, &m);
+        find_manifold(pa, pb, with_hulls(HOW) ? v.hulls : nullptr, own.subshape, step.margin, step.gravity, step.dt,
+                      &start, before >= 0 ? cache : 0, &m);
     }
     store_manifold(v, i, m, before);
     return true;

@@ -8,7 +8,7 @@ static __device__ __forceinline__ struct manifold load_manifold(const collision_
     const found_head head = load_wide(&from.head);
     struct manifold m;
     m.normal = head.normal;
-    m.ahead = head.ahead;
+    m.time_offset = head.time_offset;
     m.cache = head.cache;
     m.count = head.count;
     for (int k = 0; k < head.count; ++k) {
@@ -31,7 +31,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) seam_kernel(const __gri
                    b_end = first[own.b + 1];
     if (a == a_end && b == b_end) return;
     const struct manifold m = load_manifold(v, i);
-    if (seam_hides(&v.seams, v.proxies, v.hulls, own.a, own.b, own.child, &m)) v.sizes[i] = 0;
+    if (seam_hides(&v.seams, v.proxies, v.hulls, own.a, own.b, own.subshape, &m)) v.sizes[i] = 0;
 }
 
 void COLLISION(seam_kernels)(struct collision_kernels *kernels)

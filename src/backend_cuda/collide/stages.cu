@@ -149,7 +149,7 @@ static sadmm_status sort_candidates(struct sadmm_cuda_collision *c, struct sadmm
     v->candidates = keys[1];
     if (ranked(c)) return launch(c, c->kernels.rank, (int64_t)v->candidate_capacity * RANK_SHARES, error);
     c->kernel = "candidate sort";
-    const int bits = 2 * v->slot_bits + v->child_bits;
+    const int bits = 2 * v->slot_bits + v->subshape_bits;
     CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, nullptr, v->candidate_capacity, bits, &at, c->stream),
               c->kernel);
     v->candidates = keys[at];

@@ -19,7 +19,7 @@ static __global__ void __launch_bounds__(MESH_THREADS) touch_kernel(const __grid
     if (!start.moves_on) return;
     v.touches[i] = narrow_find<FOR>(v) != NARROW_ONE && !triangle_now(v, step, own, a, b)
                        ? HUGE_VAL
-                       : mesh_first_touch(&a, &b, v.hulls, own.child, step.gravity, step.dt);
+                       : mesh_first_touch(&a, &b, v.hulls, own.subshape, step.gravity, step.dt);
 }
 
 static void touch_kernels(struct narrow_kernels *k)

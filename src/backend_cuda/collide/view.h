@@ -5,7 +5,7 @@
  *   tree     Morton codes, radix sort, Karras' hierarchy, boxes bottom up          (few shapes: not needed)
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
  *            (a pair with a mesh is listed; a warp of `expand` finds its triangles: meshes.cu)
- *   sort     candidates by (slot of a, slot of b, child), the host's order
+ *   sort     candidates by (slot of a, slot of b, subshape), the host's order
  *   hits     where they are planned: swept bodies hit each other, and the candidates are searched for again: hits.h
  *   narrow   the last step's pair (a hint or a search), manifold by candidate     a thread a candidate
  *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
@@ -30,10 +30,9 @@
  * takes all of it; unused candidates are all ones and go to the end. What takes the time is one load that waits for
  * another: kernels ask at once for all that they may need, before it is known whether they do, and only then test.
  *
- * A candidate is a child of a pair of shapes (sadmm_geometry): where every shape has one child, a pair. Triangles are
- * the children of a mesh. Shapes are
- * checked when they are taken over (input.cu), so that collision_table.h lists every pair that meets; one that it does
- * not list would have no contacts.
+ * A candidate is a pair of subshapes of a pair of shapes (sadmm_geometry): where every shape has one subshape, a pair.
+ * Triangles are the subshapes of a mesh. Shapes are checked when they are taken over (input.cu), so that
+ * collision_table.h lists every pair that meets; one that it does not list would have no contacts.
  *
  * Double throughout, with the host pipeline's own inline formulas (proxy.h, pair_manifold.h, contact_match.h,
  * contact_emit.h): the same operations in the same order, compiled without contraction of a * b + c, so that the
@@ -90,7 +89,7 @@ struct alignas(16) collision_leaf {
     struct sadmm_box3 box;
     double velocity[3], thin;      /* as the proxy's */
     struct collision_filter filter;
-    int32_t slot, children;
+    int32_t slot, subshapes;
     int32_t group_low, group_high; /* a leaf that meets every group spans all */
 };
 
@@ -138,7 +137,7 @@ struct alignas(16) found_point {
 };
 struct alignas(16) found_head {
     vec3 normal;
-    double ahead;
+    double time_offset;
     uint32_t cache;
     int32_t count;
 };
@@ -164,7 +163,8 @@ struct collision_set {
 struct collision_view {
     const struct sadmm_shape *shapes;              /* by slot */
     const struct sadmm_geometry *geometries;       /* by handle */
-    const double *hulls;                           /* the pool (collision/hull_data.h); NULL: no shape is a hull, or a mesh */
+    const double *hulls;                           /* shape data (collision/hull_data.h); NULL: no shape is a hull, or a
+                                                      mesh */
     const struct sadmm_collision_body *bodies;     /* by body slot */
     const uint32_t *present;                       /* slots: leaves, then planes */
     const uint64_t *planes;                        /* (group + 1) << 32 | slot, sorted */
@@ -207,7 +207,8 @@ struct collision_view {
     uint64_t *found;                               /* candidates as they come, packed (candidate_of) */
     uint64_t *candidates;                          /* sorted */
     int32_t candidate_capacity;
-    int32_t slot_bits, child_bits;                 /* of a candidate; child_bits is 0 where every shape has one child */
+    int32_t slot_bits, subshape_bits;              /* of a candidate; subshape_bits is 0 where every shape has one
+                                                      subshape */
     struct found_manifold *manifolds;              /* by candidate; not written where there are no points */
     int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
     int32_t *pair_of;                              /* by candidate: its pair in the new set; without: the next one */
@@ -237,25 +238,25 @@ static __device__ __forceinline__ double time_of_candidates(const collision_view
     return step.dt * v.substeps;
 }
 
-/* A candidate, unpacked from slot of a, slot of b, child. */
+/* A candidate, unpacked from slot of a, slot of b, subshape. */
 struct candidate {
-    uint32_t a, b, child;
+    uint32_t a, b, subshape;
 };
 static __device__ __forceinline__ candidate candidate_of(const collision_view &v, uint64_t key)
 {
-    const uint64_t shapes = key >> v.child_bits;
+    const uint64_t shapes = key >> v.subshape_bits;
     const candidate c = {(uint32_t)(shapes >> v.slot_bits), (uint32_t)(shapes & ((UINT64_C(1) << v.slot_bits) - 1)),
-                         (uint32_t)(key & ((UINT64_C(1) << v.child_bits) - 1))};
+                         (uint32_t)(key & ((UINT64_C(1) << v.subshape_bits) - 1))};
     return c;
 }
 static __device__ __forceinline__ uint64_t first_candidate(const collision_view &v, uint32_t a, uint32_t b)
 {
-    return ((uint64_t)a << v.slot_bits | b) << v.child_bits;
+    return ((uint64_t)a << v.slot_bits | b) << v.subshape_bits;
 }
-/* Candidates of a pair: they follow the first one; 0: it is one with a mesh. children: of the two shapes. */
+/* Candidates of a pair: they follow the first one; 0: it is one with a mesh. subshapes: of the two shapes. */
 static __device__ __forceinline__ uint32_t candidates_of(const collision_view &v, int32_t a, int32_t b)
 {
-    return v.child_bits > 0 ? (uint32_t)a * (uint32_t)b : 1;
+    return v.subshape_bits > 0 ? (uint32_t)a * (uint32_t)b : 1;
 }
 
 /* Counters. */

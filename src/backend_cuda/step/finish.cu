@@ -151,12 +151,12 @@ static __device__ __noinline__ void finish_free(const cuda_view &v, double dt, i
 /* ---- contacts -------------------------------------------------------------------------------------------------- */
 
 struct point_before {
-    double impulse[3], gap;
+    double impulse[3], separation;
 };
 
 static __device__ __forceinline__ point_before fetch_before(const struct sadmm_contact_point *point)
 {
-    const point_before before = {{point->impulse[0], point->impulse[1], point->impulse[2]}, point->gap};
+    const point_before before = {{point->impulse[0], point->impulse[1], point->impulse[2]}, point->separation};
     return before;
 }
 
@@ -189,7 +189,7 @@ static __device__ __forceinline__ bool store_impulses(const contact_view &contac
         /* one record after the other: stores to both in turn would not be joined to wider ones */
         for (int j = 0; j < 3; ++j) start[j] = before.impulse[j];
         for (int j = 0; j < 3; ++j) point->impulse[j] = impulse[j];
-        *depth = max_of(*depth, -before.gap);
+        *depth = max_of(*depth, -before.separation);
     }
     return finite;
 }

@@ -68,7 +68,7 @@ static __device__ __forceinline__ void store_row(const cuda_view &v, const struc
     row.lambda = start;
     const_cast<struct raw_row *>(v.raw.rows)[slot] = row;
     const struct sadmm_joint_source source = {joint,    (int8_t)law.role, (int8_t)law.coordinate, (int8_t)law.sign,
-                                              law.gap, law.slack, law.prescribed};
+                                              law.separation, law.slack, law.prescribed};
     v.joints.sources[slot] = source;
 }
 

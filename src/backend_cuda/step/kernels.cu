@@ -243,8 +243,8 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
             const double *arm = side ? point->arm_b : point->arm_a;
             rolling_owe(pair->normal, arm, halfway.normal, side ? halfway.arm_b : halfway.arm_a, point->impulse,
                         side ? 1 : -1, owed);
-            rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->gap), v.raw.migrations[k].radius,
-                            sadmm_normal_impulse(pair, point), dt, stiffness);
+            rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->separation),
+                            v.raw.migrations[k].radius, sadmm_normal_impulse(pair, point), dt, stiffness);
         }
     }
     sum_lanes<13>(sums);

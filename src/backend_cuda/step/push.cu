@@ -27,10 +27,10 @@ static __global__ void push_report_kernel(const __grid_constant__ cuda_view v, c
 {
     const int32_t p = thread_index();
     const bool live = p < live_pairs(v.model);
-    double gap = 0;
+    double separation = 0;
     for (int32_t k = 0; live && k < v.raw.pairs[p].count; ++k)
-        gap = min_of(gap, v.raw.points[v.raw.pairs[p].first + k].gap);
-    report_push(v, live ? p : -1, gap);
+        separation = min_of(separation, v.raw.points[v.raw.pairs[p].first + k].separation);
+    report_push(v, live ? p : -1, separation);
 }
 
 /* e of the step's problem: what overlaps is not to come nearer, and no more. A thread a pair, capacity included. */
@@ -43,7 +43,7 @@ static __global__ void push_hold_kernel(const __grid_constant__ cuda_view v, con
     v.push.points[p] = (uint8_t)(pushed ? pair->count : 0);
     for (int32_t k = 0; pushed && k < pair->count; ++k) {
         struct sadmm_contact_point *point = &v.step.points[pair->first + k];
-        point->error = push_speed(v.model.settings, point->gap);
+        point->error = push_speed(v.model.settings, point->separation);
     }
 }
 

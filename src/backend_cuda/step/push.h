@@ -31,9 +31,9 @@ static __device__ __forceinline__ int add_units_of(unsigned long long *to, int64
     return (before + units > 0) - (before > 0);
 }
 
-/* A pair, whose deepest point has this gap, to its island; -1: none. Lanes that speak of one island do it together.
- * Every lane of the warp comes here; by itself: the others should not pay in registers. */
-static __device__ __noinline__ void report_push(const cuda_view &v, int32_t p, double gap)
+/* A pair, whose deepest point has this separation, to its island; -1: none. Lanes that speak of one island do it
+ * together. Every lane of the warp comes here; by itself: the others should not pay in registers. */
+static __device__ __noinline__ void report_push(const cuda_view &v, int32_t p, double separation)
 {
     const unsigned all = (unsigned)ALL_LANES;
     struct push_share share = {};
@@ -41,9 +41,9 @@ static __device__ __noinline__ void report_push(const cuda_view &v, int32_t p, d
     if (p >= 0) {
         const struct sadmm_settings *s = v.model.settings;
         const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
-        const double speed = push_speed(s, gap),
+        const double speed = push_speed(s, separation),
                      pull = speed > 0 ? push_pull(v.raw.system.rigid, pair, size3(s->gravity), !v.model.fast) : 0;
-        share = push_share_of(pair, speed, s->baumgarte, pull * s->dt);
+        share = push_share_of(pair, speed, s->correction_factor, pull * s->dt);
         if (share.bits) label = label_of(v.graph, pair);
         if (label >= 0 && v.push.bits[label] & PUSH_ROWS) label = -1;
     }

@@ -228,8 +228,9 @@ static __device__ __forceinline__ void add_way(const cuda_view &v, const trapezo
                  speed = trapezoid_along(normal, sides[1].velocity, arm_b) -
                          trapezoid_along(normal, sides[0].velocity, arm_a);
     if (trapezoid_is_still(size, dt, slop)) return;
-    const struct trapezoid_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, migrates};
-    trapezoid_add_way(touch, gap, corrections, size, dt, slop);
+    const struct trapezoid_separation separation = {point->separation, speed,
+                                                    {size3(point->arm_a), size3(point->arm_b)}, migrates};
+    trapezoid_add_way(touch, separation, corrections, size, dt, slop);
 }
 
 /* Of the lane's points that roll. By itself, with all that it needs: few do, and the others should not pay in registers.

@@ -10,16 +10,16 @@
 
 /* ---- weights of the method `fast` -------------------------------------------------------------------------------- */
 
-/* The contacts of deep stacks close small gaps slowly. */
-static __device__ __forceinline__ void ease_gaps(const model_view &model, const contact_view &contacts, int32_t p,
-                                                 double stack_depth)
+/* The contacts of deep stacks close small separations slowly. */
+static __device__ __forceinline__ void ease_separations(const model_view &model, const contact_view &contacts,
+                                                        int32_t p, double stack_depth)
 {
     const double slop = model.settings->slop / model.settings->dt,
-                 share = weight_gap_share(stack_depth, model.settings->iterations);
+                 share = weight_separation_share(stack_depth, model.settings->iterations);
     const int32_t count = share < 1 ? (int32_t)contacts.difference[p].w : 0;
     for (int32_t k = 0; k < count; ++k) {
         solver_real *error = &contacts.arm[point_slot(contacts, p, k)].w;
-        *error = (solver_real)weight_gap_error((double)*error, share, slop);
+        *error = (solver_real)weight_separation_error((double)*error, share, slop);
     }
 }
 
@@ -61,7 +61,8 @@ static __device__ __forceinline__ double weigh_side(const model_view &model, con
     contacts.inv_s[p] = (solver_real)(both ? B / 2 : B);
     if (!(scale > 0)) weights.weight[p] = taken;
     if (first && bodies.rigid)
-        ease_gaps(model, contacts, p, island.weights.stack_depth); /* world level: gaps, a slop and a step */
+        ease_separations(model, contacts, p, island.weights.stack_depth); /* world level: separations, a slop and a
+                                                                             step */
     return B;
 }
 

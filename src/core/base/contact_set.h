@@ -23,7 +23,7 @@ SADMM_INLINE bool sadmm_body_is_kinematic(int32_t body) { return body < -1; }
 SADMM_INLINE int32_t sadmm_kinematic(int32_t body) { return -2 - body; }
 
 /* A manifold of a pair of shapes: one normal, up to SADMM_MAX_POINTS points. Two shapes may have several, distinguished
- * by `child` (collision/geometry.h). */
+ * by `subshape` (collision/geometry.h). */
 struct sadmm_contact_pair {
     int32_t body_a, body_b;   /* system body, -1: static, below: kinematic */
     int32_t shape_a, shape_b; /* world shape slot (world level), else -1 */
@@ -33,12 +33,12 @@ struct sadmm_contact_pair {
     double restitution;
     uint32_t cache;           /* narrow phase: axis and side of the last step (collision/manifold.h), 0 = none */
     uint32_t revision, placed; /* of the two shapes, and of their bodies' poses (collision/contact_match.h) */
-    uint32_t child;
+    uint32_t subshape;
 };
 
 struct sadmm_contact_point {
     double arm_a[3], arm_b[3]; /* from the centre of mass, m, world; arm_a is 0 when a is static (same for b) */
-    double gap;                /* m (world level) */
+    double separation;         /* m (world level) */
     double error;              /* e, m/s: given at the problem level; at the world level what is added to that of
                                   math/contact.h: a push that bodies are to be moved by alone (solve/push.h), mostly 0 */
     double impulse[3];         /* lambda on b, world frame, N s: warm start in, solution out */
@@ -63,7 +63,7 @@ struct sadmm_touching_shapes {
     int32_t a, b;
 };
 
-/* A pair touches if one of its points carries an impulse, or has a gap of 0 or less. `points`: its own. */
+/* A pair touches if one of its points carries an impulse, or has a separation of 0 or less. `points`: its own. */
 SADMM_INLINE double sadmm_normal_impulse(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point)
 {
     return pair->normal[0] * point->impulse[0] + pair->normal[1] * point->impulse[1] +
@@ -75,14 +75,14 @@ SADMM_INLINE struct sadmm_touching_shapes sadmm_touching_of(const struct sadmm_c
     struct sadmm_touching_shapes out = {-1, -1};
     int32_t k;
     for (k = 0; k < pair->count; ++k)
-        if (points[k].gap <= 0 || sadmm_normal_impulse(pair, &points[k]) > 0) {
+        if (points[k].separation <= 0 || sadmm_normal_impulse(pair, &points[k]) > 0) {
             out.a = pair->shape_a;
             out.b = pair->shape_b;
         }
     return out;
 }
 
-/* A contact set that grows. Order: pairs by (shape_a, shape_b, child), points in pair order: point index = contact
+/* A contact set that grows. Order: pairs by (shape_a, shape_b, subshape), points in pair order: point index = contact
  * index. */
 struct sadmm_contact_set {
     struct sadmm_contact_pair *pairs;
@@ -96,7 +96,7 @@ struct sadmm_contact_set {
 /* A point of a hit that a step has taken at its moment (world/hits.c). */
 struct sadmm_world_hit {
     int32_t shape_a, shape_b; /* slots */
-    uint32_t child, feature;
+    uint32_t subshape, feature;
     double position[3], normal[3];    /* m; unit, from a to b; world */
     double impulse[3];                /* on b, N s */
     double arm[2][3];                 /* from the centres of mass of a's and b's bodies, m */

@@ -41,7 +41,7 @@
     F(X, FLAG, PLAN, measure_residuals, false, 0, 1, ANY, "Report the residuals of the last iteration.")                \
     F(X, FLAG, PLAN, certify, false, 0, 1, ANY, "Report the true error of every step.")                                 \
     F(X, FLAG, PLAN, recover_wrenches, true, 0, 1, ANY, "Compute the contact wrench of every body.")                    \
-    F(X, REAL, NUMBER, baumgarte, 0.2, 0, 1, CLOSED, "Share of penetration beyond the slop removed a (sub-)step.")      \
+    F(X, REAL, NUMBER, correction_factor, 0.2, 0, 1, CLOSED, "Share of penetration that a (sub-)step removes.")      \
     F(X, REAL, NUMBER, slop, 1e-5, 0, 1, CLOSED, "Penetration left alone, m.")                                          \
     F(X, REAL, NUMBER, correction_speed, 1, 0, 1e3, CLOSED, "Cap of the corrective speed, m/s.")                        \
     F(X, REAL, NUMBER, restitution_threshold, 0.1, 0, 0, FROM,                                                          \

@@ -292,18 +292,19 @@ SADMM_INLINE double swept_bodies_approach(const struct sadmm_contact_pair *pair,
     return speed;
 }
 
-/* Gaps are opened by so much more, and by no more than this share of the thinner shape: nothing goes through where the
- * touch of thin shapes is lost in rounding. */
+/* Separations are opened by so much more, and by no more than this share of the thinner shape: nothing goes through
+ * where the touch of thin shapes is lost in rounding. */
 #define SWEPT_OPEN        1e-6
 #define SWEPT_OPENED_MOST 0.25
-SADMM_INLINE void swept_bodies_open_gap(const struct sadmm_contact_pair *pair, const struct sadmm_flight *a,
-                                        const struct sadmm_flight *b, double thinner,
-                                        const struct sadmm_settings *settings, struct sadmm_contact_point *point)
+SADMM_INLINE void swept_bodies_open_separation(const struct sadmm_contact_pair *pair, const struct sadmm_flight *a,
+                                               const struct sadmm_flight *b, double thinner,
+                                               const struct sadmm_settings *settings, struct sadmm_contact_point *point)
 {
     const double speed = swept_bodies_approach(pair, point, a, b, settings->dt),
                  way = (1 + SWEPT_OPEN) * speed * settings->dt;
-    if (speed > settings->restitution_threshold && way > point->gap && way - point->gap <= SWEPT_OPENED_MOST * thinner)
-        point->gap = way;
+    if (speed > settings->restitution_threshold && way > point->separation &&
+        way - point->separation <= SWEPT_OPENED_MOST * thinner)
+        point->separation = way;
 }
 
 #endif

@@ -4,29 +4,31 @@
 
 #include "vec3.h"
 
-/* e of a contact from its gap (m), in m/s. Apart: the bodies may close the gap in one step and no more. Overlapping
- * beyond the slop: Baumgarte's share of it is pushed out each step, with a capped speed. */
-SADMM_INLINE double contact_error(double gap, double dt, double baumgarte, double slop, double correction_speed)
+/* e of a contact from its separation (m), in m/s. Apart: the bodies may close the separation in one step and no more.
+ * Overlapping beyond the slop: each step removes a share of it (Baumgarte), with a capped speed. */
+SADMM_INLINE double contact_error(double separation, double dt, double correction_factor, double slop,
+                                  double correction_speed)
 {
-    const double depth = -gap - slop;
-    const double speed = (gap >= 0 ? gap : baumgarte * depth) / dt; /* one division: which one is not known before */
+    const double depth = -separation - slop;
+    const double speed = (separation >= 0 ? separation : correction_factor * depth) / dt; /* one division: which one is
+                                                                                             not known before */
     const double pushed = depth > 0 ? -min_of(speed, correction_speed) : 0.0;
-    return gap >= 0 ? speed : pushed;
+    return separation >= 0 ? speed : pushed;
 }
 
 /* How much of gravity, which gives `pull` m/s a step, takes back the velocity that a push of this speed leaves. The push
  * shrinks by a share of itself each step, as the overlap does. Up to 1 gravity slows bodies down by as much: they follow
  * it, and have no velocity when nothing overlaps any more; what friction alone slows down ends within d / (2 mu), d the
  * overlap. */
-SADMM_INLINE double contact_push_takes(double speed, double baumgarte, double pull)
+SADMM_INLINE double contact_push_takes(double speed, double correction_factor, double pull)
 {
-    return pull > 0 ? baumgarte * speed / pull : INFINITY;
+    return pull > 0 ? correction_factor * speed / pull : INFINITY;
 }
 
 /* Does a contact that approaches (negative) touch within the step, faster than the threshold of restitution? */
-SADMM_INLINE int contact_hits(double gap, double approach, double dt, double threshold)
+SADMM_INLINE int contact_hits(double separation, double approach, double dt, double threshold)
 {
-    return approach < -threshold && gap + approach * dt <= 0;
+    return approach < -threshold && separation + approach * dt <= 0;
 }
 
 /* ---- the law ------------------------------------------------------------------------------------------------------

@@ -21,10 +21,10 @@ SADMM_INLINE void rolling_owe(const double normal[3], const double arm[3], const
     }
 }
 
-/* How far the body's centre of mass is from its surface, along the normal, m: points lie midway in an overlap. */
-SADMM_INLINE double rolling_height(const double normal[3], const double arm[3], double gap)
+/* How far the body's centre of mass is from its surface, along the normal, m: points lie halfway in an overlap. */
+SADMM_INLINE double rolling_height(const double normal[3], const double arm[3], double separation)
 {
-    return fabs(dot3(normal, arm)) + (gap < 0 ? -gap / 2 : 0);
+    return fabs(dot3(normal, arm)) + (separation < 0 ? -separation / 2 : 0);
 }
 
 /* Adds to `stiffness` of a body at this height. push: normal impulse, N s. */

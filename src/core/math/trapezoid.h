@@ -3,9 +3,9 @@
  *
  *     x <- x + dt (v - trapezoid correction),     trapezoid correction = (v - v before the step) / 2
  *
- * is exact for constant forces: gravity, friction that slides, rolling down a slope. But contacts bound v so that gaps
- * are right after x + dt v. Where taking leads back would close a contact of an island beyond that, all of its bodies
- * keep theirs, since those that hold on to each other would slip else; but for bodies that fly
+ * is exact for constant forces: gravity, friction that slides, rolling down a slope. But contacts bound v so that
+ * separations are right after x + dt v. Where taking leads back would close a contact of an island beyond that, all of
+ * its bodies keep theirs, since those that hold on to each other would slip else; but for bodies that fly
  * (docs/internals/algorithm.md, "Positions"). Double in every precision. */
 #ifndef SADMM_MATH_TRAPEZOID_H
 #define SADMM_MATH_TRAPEZOID_H
@@ -136,23 +136,23 @@ SADMM_INLINE bool trapezoid_is_still(const double size[2], double dt, double slo
     return dt * (size[0] + size[1]) <= TRAPEZOID_SLOP * slop / 2;
 }
 
-/* A contact as the step moves it: its gap at the start, m, the speed at which it opens, m/s, and the lengths of its
- * arms on a and b (size3), m. */
-struct trapezoid_gap {
+/* A contact as the step moves it: its separation at the start, m, the speed at which it opens, m/s, and the lengths of
+ * its arms on a and b (size3), m. */
+struct trapezoid_separation {
     double start, speed, arm[2];
     uint32_t migrates; /* enum contact_migrates: it may stay as deep as it is (model/rolling.h) */
 };
 
 /* Of a point whose corrections are not still: what those of a and b add to its speed. Each of the two bodies may close
  * half of the room that is left, whatever the other one does. */
-SADMM_INLINE void trapezoid_add_way(struct trapezoid_touch *touch, struct trapezoid_gap gap, const double correction[2],
-                                    const double size[2], double dt, double slop)
+SADMM_INLINE void trapezoid_add_way(struct trapezoid_touch *touch, struct trapezoid_separation separation,
+                                    const double correction[2], const double size[2], double dt, double slop)
 {
-    const double way = (dt * size[0] < gap.arm[0] ? dt * size[0] : gap.arm[0]) +
-                       (dt * size[1] < gap.arm[1] ? dt * size[1] : gap.arm[1]),
-                 share = gap.migrates >= MIGRATES_SOON ? TRAPEZOID_ROLLS : TRAPEZOID_SHARE,
-                 end = gap.start + dt * gap.speed,
-                 deep = gap.migrates != MIGRATES_NOT && gap.start < 0 ? -gap.start : 0,
+    const double way = (dt * size[0] < separation.arm[0] ? dt * size[0] : separation.arm[0]) +
+                       (dt * size[1] < separation.arm[1] ? dt * size[1] : separation.arm[1]),
+                 share = separation.migrates >= MIGRATES_SOON ? TRAPEZOID_ROLLS : TRAPEZOID_SHARE,
+                 end = separation.start + dt * separation.speed,
+                 deep = separation.migrates != MIGRATES_NOT && separation.start < 0 ? -separation.start : 0,
                  room = (end > -deep ? end + deep : 0) + max_of(share * way, TRAPEZOID_SLOP * slop);
     if (dt * (correction[0] + correction[1]) > room) touch->island |= TOUCH_PENETRATES;
     SADMM_UNROLL
@@ -161,12 +161,12 @@ SADMM_INLINE void trapezoid_add_way(struct trapezoid_touch *touch, struct trapez
 }
 
 /* Both. */
-SADMM_INLINE void trapezoid_add_point(struct trapezoid_touch *touch, struct trapezoid_gap gap, double push,
-                                      const double correction[2], const double size[2], const double moves[2],
-                                      const double rest[2], double dt, double slop)
+SADMM_INLINE void trapezoid_add_point(struct trapezoid_touch *touch, struct trapezoid_separation separation,
+                                      double push, const double correction[2], const double size[2],
+                                      const double moves[2], const double rest[2], double dt, double slop)
 {
     trapezoid_add_push(touch, push, moves, rest);
-    if (!trapezoid_is_still(size, dt, slop)) trapezoid_add_way(touch, gap, correction, size, dt, slop);
+    if (!trapezoid_is_still(size, dt, slop)) trapezoid_add_way(touch, separation, correction, size, dt, slop);
 }
 
 #endif

@@ -116,11 +116,11 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
 }
 
 /* Deep stacks in steps that start warm. Contacts that are solved in part, step by step, are springs of stiffness
- * B iterations / dt^2, on which a tall pile buckles; and gaps, closed in one step, act on them as an integral
+ * B iterations / dt^2, on which a tall pile buckles; and separations, closed in one step, act on them as an integral
  * controller that excites them. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is
  * twice the number of bodies that a load passes on its way to the ground. */
 #define WEIGHT_DEEP 20.0
-#define WEIGHT_GAP_LEAST 0.001
+#define WEIGHT_SEPARATION_LEAST 0.001
 
 /* 1 and more. */
 SADMM_INLINE double weight_stack_depth(double speed, double push, double mass)
@@ -164,19 +164,19 @@ SADMM_INLINE void weight_update_speed(struct weight_island *island, const struct
     island->speed = weight_speed_warm(speed, island->stack_depth, under_iterated, sums->kinetic, mass);
 }
 
-/* The share of a gap within the slop that a step closes; and e with that, `slop` over dt, m/s. Contacts as springs are
- * as stiff as there are iterations, and the depth at which a stack buckles on them grows with the root of these: beyond
- * a number of them depth counts for less, and solves that go on until they are done are of e itself. The number is
- * the most that a scene's steps have, which need the rule as it is. */
-#define WEIGHT_GAP_ITERATIONS 200.0
+/* The share of a separation within the slop that a step closes; and e with that, `slop` over dt, m/s. Contacts as
+ * springs are as stiff as there are iterations, and the depth at which a stack buckles on them grows with the root of
+ * these: beyond a number of them depth counts for less, and solves that go on until they are done are of e itself. The
+ * number is the most that a scene's steps have, which need the rule as it is. */
+#define WEIGHT_SEPARATION_ITERATIONS 200.0
 
-SADMM_INLINE double weight_gap_share(double stack_depth, int iterations)
+SADMM_INLINE double weight_separation_share(double stack_depth, int iterations)
 {
-    const double square = stack_depth * stack_depth * min_of(WEIGHT_GAP_ITERATIONS / iterations, 1.0);
-    return min_of(max_of(1 / (square * square * square), WEIGHT_GAP_LEAST), 1.0);
+    const double square = stack_depth * stack_depth * min_of(WEIGHT_SEPARATION_ITERATIONS / iterations, 1.0);
+    return min_of(max_of(1 / (square * square * square), WEIGHT_SEPARATION_LEAST), 1.0);
 }
 
-SADMM_INLINE double weight_gap_error(double error, double share, double slop)
+SADMM_INLINE double weight_separation_error(double error, double share, double slop)
 {
     double eased = share * error, beyond = error - (1 - share) * slop;
     return error <= 0 ? error : eased > beyond ? eased : beyond;

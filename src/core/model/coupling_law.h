@@ -7,15 +7,15 @@
 #include "system.h"
 
 struct sadmm_coupling_memory {
-    struct sadmm_rigid target; /* its pose and velocity alone */
-    double felt[6], body[6];   /* as in sadmm_coupling_state; in the step at hand: sums over its sub-steps */
+    struct sadmm_rigid target;   /* its pose and velocity alone */
+    double reaction[6], body[6]; /* as in sadmm_coupling_state; in the step at hand: sums over its sub-steps */
 };
 
 /* A step begins. */
 SADMM_INLINE void coupling_begin(struct sadmm_coupling_memory *memory)
 {
     int k;
-    for (k = 0; k < 6; ++k) memory->felt[k] = memory->body[k] = 0;
+    for (k = 0; k < 6; ++k) memory->reaction[k] = memory->body[k] = 0;
 }
 
 /* The target is still where the (sub-)step began. wrench: on the body, about `point`; arm: from the body's centre of
@@ -25,14 +25,14 @@ SADMM_INLINE void coupling_keep(struct sadmm_coupling_memory *memory, const doub
 {
     const vec3 force = v3_load(wrench), torque = v3_load(wrench + 3),
                target = rigid_move(v3_load(memory->target.position), v3_load(memory->target.velocity), dt / 2);
-    double own[6], felt[6];
+    double own[6], reaction[6];
     int k;
-    v3_store(v3_neg(force), felt);
-    v3_store(v3_neg(v3_add(torque, v3_cross(v3_sub(point, target), force))), felt + 3);
+    v3_store(v3_neg(force), reaction);
+    v3_store(v3_neg(v3_add(torque, v3_cross(v3_sub(point, target), force))), reaction + 3);
     v3_store(force, own);
     v3_store(v3_add(torque, v3_cross(arm, force)), own + 3);
     for (k = 0; k < 6; ++k) {
-        memory->felt[k] += felt[k];
+        memory->reaction[k] += reaction[k];
         memory->body[k] += own[k];
     }
 }
@@ -49,7 +49,7 @@ SADMM_INLINE void coupling_end(struct sadmm_coupling_memory *memory, int substep
 {
     int k;
     for (k = 0; k < 6; ++k) {
-        memory->felt[k] /= substeps;
+        memory->reaction[k] /= substeps;
         memory->body[k] /= substeps;
     }
 }

@@ -55,10 +55,11 @@ struct sadmm_resident_joint {
 struct sadmm_joint_source {
     int32_t joint;
     int8_t role, coordinate, sign;
-    double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step.
-                          Of any row, slack: INFINITY where the step does not resolve its turning. Of springs, gap:
-                          the way to where a steep part of a table stops the coordinate, INFINITY: none does */
-    double prescribed; /* the row's rate due to sides of prescribed motion; it is in the bias */
+    double separation, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a
+                                 step. Of any row, slack: INFINITY where the step does not resolve its turning. Of
+                                 springs, separation: the way to where a steep part of a table stops the coordinate,
+                                 INFINITY: none does */
+    double prescribed;        /* the row's rate due to sides of prescribed motion; it is in the bias */
 };
 
 /* A radial joint's coordinate 0 is a distance. */
@@ -237,7 +238,7 @@ SADMM_INLINE double joint_response(const struct joint_side *side, const double r
 struct joint_law {
     int role, coordinate, sign;
     double gain, bias, compliance, lo, hi;
-    double gap, slack, prescribed; /* sadmm_joint_source */
+    double separation, slack, prescribed; /* sadmm_joint_source */
 };
 
 /* Two limits, drive, friction, spring and armature of a coordinate that is free. */
@@ -264,13 +265,13 @@ struct joint_moving {
 };
 
 SADMM_INLINE void joint_add_law(struct joint_laws *laws, const struct joint_moving *m, int role, int k, int sign,
-                                double gain, double bias, double compliance, double lo, double hi, double gap)
+                                double gain, double bias, double compliance, double lo, double hi, double separation)
 {
     struct joint_law *law = &laws->law[laws->count++];
     law->role = role, law->coordinate = k, law->sign = sign;
     law->gain = gain, law->bias = bias, law->compliance = compliance;
     law->lo = lo, law->hi = hi;
-    law->gap = gap;
+    law->separation = separation;
     law->prescribed = sign * m->prescribed;
     law->slack = m->turns ? INFINITY
                : role == SADMM_ROLE_LOWER || role == SADMM_ROLE_UPPER ? 2 * m->dt * fabs(m->turning) : 0;
@@ -372,13 +373,14 @@ SADMM_INLINE void joint_add_limits(struct joint_laws *laws, const struct joint_m
     int upper;
     for (upper = 0; upper < 2; ++upper) {
         const int role = upper ? SADMM_ROLE_UPPER : SADMM_ROLE_LOWER, sign = upper ? -1 : 1;
-        const double gap = upper ? c->upper - m->value : m->value - c->lower;
+        const double separation = upper ? c->upper - m->value : m->value - c->lower;
         const bool pressed = m->memory->force[role][k] != 0;
         double speed;
-        if (gap > m->reach && !pressed) continue;
+        if (separation > m->reach && !pressed) continue;
         /* it may close what is left in the step; once it presses it is held as what is locked is */
-        speed = gap >= 0 && !pressed ? gap / m->dt : joint_feedback(gap, m->dt, m->most);
-        if (isfinite(speed)) joint_add_law(laws, m, role, k, sign, 1, sign * m->turned + speed, 0, 0, INFINITY, gap);
+        speed = separation >= 0 && !pressed ? separation / m->dt : joint_feedback(separation, m->dt, m->most);
+        if (isfinite(speed))
+            joint_add_law(laws, m, role, k, sign, 1, sign * m->turned + speed, 0, 0, INFINITY, separation);
     }
 }
 

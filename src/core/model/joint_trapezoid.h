@@ -75,8 +75,9 @@ SADMM_INLINE void joint_contact_touches(const double normal[3], const struct sad
         rest[s] = trapezoid_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
                                        body->rigid->mass, settings->dt);
     }
-    const struct trapezoid_gap gap = {point->gap, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
-    trapezoid_add_point(touch, gap, dot3(normal, point->impulse), correction, size, moves, rest, settings->dt,
+    const struct trapezoid_separation separation = {point->separation, speed,
+                                                    {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
+    trapezoid_add_point(touch, separation, dot3(normal, point->impulse), correction, size, moves, rest, settings->dt,
                         settings->slop);
 }
 SADMM_INLINE bool joint_contacts_hold(const struct trapezoid_touch *touch, const struct joint_trapezoid bodies[2])
@@ -95,7 +96,7 @@ SADMM_INLINE bool joint_limit_penetrates(const struct sadmm_joint_source *source
                                          const double row_b[6], const struct joint_trapezoid bodies[2],
                                          const struct sadmm_settings *settings)
 {
-    const bool table = source->role == SADMM_ROLE_SPRING && source->gap < INFINITY;
+    const bool table = source->role == SADMM_ROLE_SPRING && source->separation < INFINITY;
     const double margin = source->slack + TRAPEZOID_SLOP * settings->slop;
     double correction = 0, speed = source->prescribed, way;
     int s, j;
@@ -109,8 +110,8 @@ SADMM_INLINE bool joint_limit_penetrates(const struct sadmm_joint_source *source
         }
     }
     way = settings->dt * (speed - correction);
-    if (!table) return source->gap + way < (source->gap < 0 ? source->gap : 0) - margin;
-    return lambda < 0 ? way > max_of(source->gap, 0) + margin : -way > max_of(-source->gap, 0) + margin;
+    if (!table) return source->separation + way < (source->separation < 0 ? source->separation : 0) - margin;
+    return lambda < 0 ? way > max_of(source->separation, 0) + margin : -way > max_of(-source->separation, 0) + margin;
 }
 
 /* The coordinate in which a row holds a body to what does not move by itself, as a bit. */

@@ -26,10 +26,10 @@ SADMM_INLINE bool push_is_apart(bool cuda, int32_t bodies, int32_t kinematic)
 
 /* ---- which islands ----------------------------------------------------------------------------------------------- */
 
-/* How fast a contact with this gap is pushed, m/s. */
-SADMM_INLINE double push_speed(const struct sadmm_settings *s, double gap)
+/* How fast a contact with this separation is pushed, m/s. */
+SADMM_INLINE double push_speed(const struct sadmm_settings *s, double separation)
 {
-    const double e = contact_error(gap, s->dt, s->baumgarte, s->slop, s->correction_speed);
+    const double e = contact_error(separation, s->dt, s->correction_factor, s->slop, s->correction_speed);
     return e < 0 ? -e : 0;
 }
 
@@ -60,8 +60,8 @@ struct push_share {
 };
 
 /* What a pair adds to its island. speed: of its deepest point; pull: in m/s a step, counts where there is a speed. */
-SADMM_INLINE struct push_share push_share_of(const struct sadmm_contact_pair *pair, double speed, double baumgarte,
-                                             double pull)
+SADMM_INLINE struct push_share push_share_of(const struct sadmm_contact_pair *pair, double speed,
+                                             double correction_factor, double pull)
 {
     struct push_share share = {0, 0};
     if (pair->body_a < 0 || pair->body_b < 0) {
@@ -69,7 +69,7 @@ SADMM_INLINE struct push_share push_share_of(const struct sadmm_contact_pair *pa
         share.units = -PUSH_GRAVITY;
     }
     if (speed > 0) {
-        const double takes = contact_push_takes(speed, baumgarte, pull);
+        const double takes = contact_push_takes(speed, correction_factor, pull);
         share.bits |= takes > 1 ? PUSH_SOME | PUSH_MORE : PUSH_SOME;
         share.units += (int64_t)(min_of(takes, 1.0) * PUSH_GRAVITY);
     }

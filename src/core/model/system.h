@@ -62,7 +62,7 @@ struct sadmm_system {
     const double *support_motion;    /* (body_count x 6): velocities are relative to this, the motion of an island's
                                         support (core/world/kinematic.c); NULL: as they are */
     struct sadmm_contact_set *contacts;
-    bool errors_given;               /* points carry e (problem level) instead of a gap */
+    bool errors_given;               /* points carry e (problem level) instead of a separation */
     bool first;                      /* no step came before: where there are no impulses, none are known */
     struct sadmm_rows *rows;         /* constraints given by Jacobian rows; NULL: none */
     const int32_t *islands;          /* (body_count) as sadmm_islands finds them; NULL: not known yet */

@@ -249,7 +249,7 @@ SADMM_RARE double sadmm_impact_e(const struct sadmm_system *system, const struct
             approach = closing;
             ahead = v3_dot(normal, v3_sub(v3_cross(body[1].ahead, arm[1]), v3_cross(body[0].ahead, arm[0])));
         }
-        if (!contact_hits(points[k].gap, closing, dt, threshold)) continue;
+        if (!contact_hits(points[k].separation, closing, dt, threshold)) continue;
         hits += 1;
         for (int side = 0; side < 2; ++side) middle[side] = v3_add(middle[side], arm[side]);
     }
@@ -257,7 +257,7 @@ SADMM_RARE double sadmm_impact_e(const struct sadmm_system *system, const struct
         for (int side = 0; side < 2; ++side) middle[side] = v3_scale(middle[side], 1 / hits);
         restitution = sadmm_impact_restitution(body, pair, middle);
     }
-    if (contact_hits(points[at].gap, approach, dt, threshold)) return min_of(e, restitution * approach - ahead);
+    if (contact_hits(points[at].separation, approach, dt, threshold)) return min_of(e, restitution * approach - ahead);
     return approach > 0 ? max_of(e, restitution * approach - ahead) : e;
 }
 
@@ -266,8 +266,8 @@ SADMM_INLINE double sadmm_contact_e_plain(const struct sadmm_system *system, con
                                            const struct sadmm_contact_point *point)
 {
     return system->errors_given ? point->error
-                                : contact_error(point->gap, settings->dt, settings->baumgarte, settings->slop,
-                                                settings->correction_speed) +
+                                : contact_error(point->separation, settings->dt, settings->correction_factor,
+                                                settings->slop, settings->correction_speed) +
                                       point->error;
 }
 

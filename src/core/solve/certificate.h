@@ -25,8 +25,8 @@ extern "C" {
 #endif
 
 /* Certify system->velocity, ->contacts' impulses and ->rows' multipliers. `settings` gives dt, gravity and
- * stabilisation for systems with rigid bodies or gaps; may be NULL when A, b and e are given. Errors: OUT_OF_MEMORY,
- * INVALID_ARGUMENT (a body's A is not positive definite), NON_FINITE; *certificate is unchanged then. */
+ * stabilisation for systems with rigid bodies or separations; may be NULL when A, b and e are given. Errors:
+ * OUT_OF_MEMORY, INVALID_ARGUMENT (a body's A is not positive definite), NON_FINITE; *certificate is unchanged then. */
 sadmm_status sadmm_certify(const struct sadmm_system *system, const struct sadmm_settings *settings,
                            sadmm_certificate *certificate, struct sadmm_error *error);
 

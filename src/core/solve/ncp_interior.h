@@ -2,7 +2,7 @@
  *
  * De Saxce's form of the laws: with s = mu |u_t|, lambda is in Coulomb's cone, (u_n + s, u_t) in its dual, and the two are
  * orthogonal; rows with bounds likewise, bound by bound. Both are kept inside of their cones by Nesterov and Todd's
- * scaling, and the complementarity gap goes to zero (Mehrotra's predictor and corrector; Acary, Armand, Nguyen,
+ * scaling, and the complementarity separation goes to zero (Mehrotra's predictor and corrector; Acary, Armand, Nguyen,
  * Shpakovych, "Second-order cone programming for frictional contact mechanics using interior point algorithm", 2023, from
  * which this differs by s being part of a step's equations). It ends in the middle of the impulses that are solutions:
  * contacts that can stick do so with some to spare, so that the piece of their law is plain to see. */

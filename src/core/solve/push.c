@@ -68,11 +68,12 @@ static void find_pair(const struct choosing *c, size_t index)
     const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[index];
     struct push_pair *found = &c->push->pairs[index];
     const struct sadmm_contact_point *points = &c->system->contacts->points[pair->first];
-    double gap = points[0].gap; /* the deepest point is pushed fastest */
-    for (int32_t k = 1; k < pair->count; ++k) gap = points[k].gap < gap ? points[k].gap : gap;
-    const double speed = push_speed(s, gap),
+    double separation = points[0].separation; /* the deepest point is pushed fastest */
+    for (int32_t k = 1; k < pair->count; ++k)
+        separation = points[k].separation < separation ? points[k].separation : separation;
+    const double speed = push_speed(s, separation),
                  pull = speed > 0 ? push_pull(c->system->rigid, pair, c->gravity, s->method == SADMM_METHOD_PAPER) : 0;
-    found->share = push_share_of(pair, speed, s->baumgarte, pull * s->dt);
+    found->share = push_share_of(pair, speed, s->correction_factor, pull * s->dt);
     found->label = c->push->label[pair->body_a >= 0 ? pair->body_a : pair->body_b];
 }
 
@@ -146,7 +147,7 @@ static void hold_back(const struct choosing *c)
         if (!pair_is_pushed(c->push, pair)) continue;
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             struct sadmm_contact_point *point = &c->system->contacts->points[k];
-            point->error = push_speed(c->settings, point->gap);
+            point->error = push_speed(c->settings, point->separation);
         }
     }
 }

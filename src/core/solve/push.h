@@ -1,8 +1,8 @@
 /* What overlaps is pushed apart by moving bodies, without a velocity that stays.
  *
- * Baumgarte's push is a speed that contacts ask for. As part of a step's velocities it stays when the overlap has gone:
- * bodies fly apart, the faster the shorter the step. So a step of an island with such pushes has two problems, which
- * differ in e alone:
+ * Baumgarte stabilisation is a separation speed of contacts. As part of a step's velocities it stays when the overlap
+ * has gone: bodies fly apart, the faster the shorter the step. So a step of an island with such pushes has two
+ * problems, which differ in e alone:
  *
  *     e_0 = 0 where bodies overlap      v_0, lambda_0: the step's velocities, impulses, forces, next warm start
  *     e_1 = -push there                 v_1, from v_0 and lambda_0 on: bodies move by dt (v_1 - v_0) besides

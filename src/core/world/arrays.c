@@ -201,9 +201,9 @@ static sadmm_status set_target(sadmm_world *world, size_t slot, const double *ro
     return sadmm_world_set_coupling_target(world, coupling_id(world, slot), row, row + 3, row + 7);
 }
 
-static sadmm_status get_felt(sadmm_world *world, size_t slot, double *row)
+static sadmm_status get_reaction(sadmm_world *world, size_t slot, double *row)
 {
-    memcpy(row, world->couplings[slot].last.felt, 6 * sizeof *row);
+    memcpy(row, world->couplings[slot].last.reaction, 6 * sizeof *row);
     return SADMM_OK;
 }
 
@@ -222,7 +222,7 @@ static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
                                            set_target_position},
     [SADMM_ARRAY_JOINT_TARGET_SPEED] = {6, OF_JOINT, get_target_speed, check_target_speed, set_target_speed},
     [SADMM_ARRAY_COUPLING_TARGET] = {13, OF_COUPLING, get_target, check_target, set_target},
-    [SADMM_ARRAY_COUPLING_FELT] = {6, OF_COUPLING, get_felt, NULL, NULL},
+    [SADMM_ARRAY_COUPLING_REACTION] = {6, OF_COUPLING, get_reaction, NULL, NULL},
 };
 
 static const struct array_kind *kind_of(sadmm_array array)

@@ -36,11 +36,11 @@ static size_t pair_of(const struct sadmm_contact_set *contacts, int32_t point)
 }
 
 /* As the caller numbers them. shape: b of the pair. */
-static int32_t triangle_of(const sadmm_world *world, int32_t shape, uint32_t child)
+static int32_t triangle_of(const sadmm_world *world, int32_t shape, uint32_t subshape)
 {
     if (world->geometries[world->shapes[shape].geometry].type != SADMM_SHAPE_MESH) return -1;
     const int32_t *source = world->block_shapes[shape].mesh->source;
-    return source ? source[child] : (int32_t)child;
+    return source ? source[subshape] : (int32_t)subshape;
 }
 
 void sadmm_world_contact_position(const sadmm_world *world, const struct sadmm_contact_pair *pair,
@@ -80,10 +80,10 @@ static void read_hit(const sadmm_world *world, const struct sadmm_world_hit *hit
 {
     read_common(world, hit->shape_a, hit->shape_b, hit->normal, hit->impulse, dt, out);
     memcpy(out->position, hit->position, sizeof out->position);
-    out->gap = 0;
+    out->separation = 0;
     out->friction = hit->friction;
     out->feature = hit->feature;
-    out->triangle = triangle_of(world, hit->shape_b, hit->child);
+    out->triangle = triangle_of(world, hit->shape_b, hit->subshape);
 }
 
 static void read_contact(const sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t index,
@@ -92,10 +92,10 @@ static void read_contact(const sadmm_world *world, const struct sadmm_contact_pa
     const struct sadmm_contact_point *point = &world->contacts.points[index];
     read_common(world, pair->shape_a, pair->shape_b, pair->normal, point->impulse, dt, out);
     sadmm_world_contact_position(world, pair, point, out->position);
-    out->gap = point->gap;
+    out->separation = point->separation;
     out->friction = pair->friction;
     out->feature = point->feature;
-    out->triangle = triangle_of(world, pair->shape_b, pair->child);
+    out->triangle = triangle_of(world, pair->shape_b, pair->subshape);
 }
 
 static sadmm_status check_range(sadmm_world *world, int32_t first, int32_t count)

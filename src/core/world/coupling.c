@@ -273,8 +273,8 @@ sadmm_status sadmm_world_coupling_state(sadmm_world *world, sadmm_coupling_id id
     const struct sadmm_coupling_memory *last = &coupling->last;
     const struct sadmm_world_joint *joint = &world->joints[coupling->joint];
     const struct joint_end end = joint_end_on(&joint->frame[1], &world->bodies[joint->body[1]].rigid);
-    memcpy(state->felt_force, last->felt, sizeof state->felt_force);
-    memcpy(state->felt_torque, last->felt + 3, sizeof state->felt_torque);
+    memcpy(state->reaction_force, last->reaction, sizeof state->reaction_force);
+    memcpy(state->reaction_torque, last->reaction + 3, sizeof state->reaction_torque);
     memcpy(state->body_force, last->body, sizeof state->body_force);
     memcpy(state->body_torque, last->body + 3, sizeof state->body_torque);
     v3_store(v3_sub(v3_load(last->target.position), end.point), state->position_error);

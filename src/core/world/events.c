@@ -191,7 +191,8 @@ static void describe(const sadmm_world *world, size_t at, sadmm_event *event)
             const struct sadmm_contact_point *point = &contacts->points[k];
             const double impulse = sadmm_normal_impulse(pair, point);
             for (int i = 0; i < 3; ++i) event->impulse[i] += point->impulse[i];
-            if (strongest && !(impulse > most || (impulse == most && point->gap < strongest->gap))) continue;
+            if (strongest && !(impulse > most || (impulse == most && point->separation < strongest->separation)))
+                continue;
             strongest = point;
             most = impulse;
             of = pair;

@@ -26,7 +26,7 @@
 /* A hit that is foreseen. */
 struct foreseen {
     uint64_t key; /* shapes, in the order of pairs */
-    uint32_t child;
+    uint32_t subshape;
     int32_t swept_body[2];
     uint32_t hits[2];
     struct sadmm_flight_touch touch;
@@ -139,7 +139,7 @@ static bool foresee(struct taking *t, uint64_t key, double from)
     if (!sadmm_grow(&h->foreseen, &h->foreseen_capacity, h->foreseen_count, h->foreseen_count + 1, sizeof *h->foreseen))
         return false;
     h->foreseen[h->foreseen_count] =
-        (struct foreseen){key, pair.child, {number[0], number[1]}, {a->hits, b->hits}, touch};
+        (struct foreseen){key, pair.subshape, {number[0], number[1]}, {a->hits, b->hits}, touch};
     return add_to_queue(h, (int32_t)h->foreseen_count++);
 }
 
@@ -192,7 +192,7 @@ static bool record(struct taking *t, const struct foreseen *item, const struct h
         memset(out, 0, sizeof *out);
         out->shape_a = (int32_t)(item->key >> 32);
         out->shape_b = (int32_t)(uint32_t)item->key;
-        out->child = item->child;
+        out->subshape = item->subshape;
         out->feature = item->touch.feature[k];
         memcpy(out->position, item->touch.point[k], sizeof out->position);
         memcpy(out->normal, item->touch.normal, sizeof out->normal);
@@ -302,7 +302,7 @@ static void write_back(struct taking *t)
     }
     if (!any) return;
     world->hit_since = h->since;
-    sadmm_collision_look_again(world->collision);
+    sadmm_collision_drop_candidates(world->collision);
 }
 
 /* May both be hit once more? */
@@ -371,14 +371,14 @@ static bool leave_out(struct taking *t)
 }
 
 /* The sub-step's candidates and which of them are fast. */
-static sadmm_status look_ahead(struct taking *t)
+static sadmm_status find_candidates(struct taking *t)
 {
     sadmm_world *world = t->world;
-    TRY(sadmm_collision_look_ahead(world->collision, &t->input, &world->error));
+    TRY(sadmm_collision_find_candidates(world->collision, &t->input, &world->error));
     if (sadmm_collision_list_fast(world->collision, &t->input, t->settings.restitution_threshold,
                                   world->bouncing_count > 0, &t->hits->fast))
         return SADMM_OK;
-    sadmm_collision_look_again(world->collision);
+    sadmm_collision_drop_candidates(world->collision);
     return sadmm_fail_memory(&world->error, "hits");
 }
 
@@ -389,11 +389,11 @@ static sadmm_status take_most(struct taking *t)
     sadmm_world *world = t->world;
     for (int times = 0; times < MOST_TIMES; ++times) {
         world->start.hit_count = world->start.hit_first;
-        TRY(look_ahead(t));
+        TRY(find_candidates(t));
         if (t->hits->fast.count == 0) return SADMM_OK;
         if (times == 0) mark_bodies(t);
         if (!take_all(t)) {
-            sadmm_collision_look_again(world->collision);
+            sadmm_collision_drop_candidates(world->collision);
             return sadmm_fail_memory(&world->error, "hits");
         }
         if (!leave_out(t)) {
@@ -403,7 +403,7 @@ static sadmm_status take_most(struct taking *t)
         forget(world);
     }
     world->start.hit_count = world->start.hit_first;
-    sadmm_collision_look_again(world->collision);
+    sadmm_collision_drop_candidates(world->collision);
     return SADMM_OK;
 }
 
@@ -444,7 +444,7 @@ static double thinner_of(const sadmm_world *world, const struct sadmm_contact_pa
                 geometry_thickness(&world->geometries[world->shapes[pair->shape_b].geometry]));
 }
 
-void sadmm_world_open_gaps(sadmm_world *world)
+void sadmm_world_open_separations(sadmm_world *world)
 {
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
     if (!world->hits || world->hits->count == 0) return;
@@ -454,7 +454,7 @@ void sadmm_world_open_gaps(sadmm_world *world)
         if (!is_followed(world, pair, a, b)) continue;
         const double thinner = thinner_of(world, pair);
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
-            swept_bodies_open_gap(pair, &a->flight, &b->flight, thinner, &settings, &world->contacts.points[k]);
+            swept_bodies_open_separation(pair, &a->flight, &b->flight, thinner, &settings, &world->contacts.points[k]);
     }
 }
 

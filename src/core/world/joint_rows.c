@@ -61,7 +61,8 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
         rows->lambda[r] = world->start.multiplier[r] =
             law->sign * joint->next.force[law->role][law->coordinate] * dt;
         world->joint_sources[r] = (struct sadmm_joint_source){slot, (int8_t)law->role, (int8_t)law->coordinate,
-                                                              (int8_t)law->sign, law->gap, law->slack, law->prescribed};
+                                                              (int8_t)law->sign, law->separation, law->slack,
+                                                              law->prescribed};
     }
     return true;
 }

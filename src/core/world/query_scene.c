@@ -47,7 +47,7 @@ void sadmm_world_place_shape(const sadmm_world *world, uint32_t slot, struct sad
     placed_pose(shape->position, shape->orientation, body->rigid.position, body->rigid.orientation, placed);
     placed->geometry = world->geometries[shape->geometry];
     const bool has_block = placed->geometry.type == SADMM_SHAPE_HULL || placed->geometry.type == SADMM_SHAPE_MESH;
-    placed->blocks = has_block ? world->block_pool.blocks : world->query.prelude;
+    placed->blocks = has_block ? world->shape_data.blocks : world->query.prelude;
     placed->slot = slot;
     placed->body = shape->body;
     placed->environment = body->environment;

@@ -64,9 +64,9 @@ static bool planes_overlap(const struct sadmm_placed *a, const struct sadmm_plac
 
 static bool overlaps(const struct sadmm_placed *a, const struct sadmm_placed *b)
 {
-    struct sadmm_gap gap;
+    struct sadmm_separation separation;
     if (!sadmm_closest_is_known(a->geometry.type, b->geometry.type)) return planes_overlap(a, b);
-    return sadmm_closest(a, b, 0, &gap) && gap.distance <= 0;
+    return sadmm_closest(a, b, 0, &separation) && separation.distance <= 0;
 }
 
 sadmm_status sadmm_world_list_overlaps(sadmm_world *world, const struct sadmm_box3 *box,
@@ -149,22 +149,22 @@ static sadmm_status find_closest(sadmm_world *world, const struct sadmm_placed *
                                  sadmm_closest_points *closest)
 {
     const int type_a = a->geometry.type, type_b = b->geometry.type;
-    struct sadmm_gap gap;
+    struct sadmm_separation separation;
     if (!sadmm_closest_is_known(type_a, type_b))
         return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "both shapes are %s: one must be another",
                           type_a == SADMM_SHAPE_PLANE ? "planes" : "meshes");
-    if (!sadmm_closest(a, b, HUGE_VAL, &gap)) /* numbers so large that nothing is known of them */
+    if (!sadmm_closest(a, b, HUGE_VAL, &separation)) /* numbers so large that nothing is known of them */
         return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE, "the distance of the two shapes is no number");
     memset(closest, 0, sizeof *closest);
-    closest->distance = gap.distance;
-    v3_store(gap.normal, closest->normal);
-    v3_store(gap.a, closest->a);
-    v3_store(gap.b, closest->b);
-    closest->triangle = gap.triangle;
-    if (gap.triangle >= 0) {
+    closest->distance = separation.distance;
+    v3_store(separation.normal, closest->normal);
+    v3_store(separation.a, closest->a);
+    v3_store(separation.b, closest->b);
+    closest->triangle = separation.triangle;
+    if (separation.triangle >= 0) {
         const uint32_t slot = type_a == SADMM_SHAPE_MESH ? a->slot : b->slot;
         const int32_t *source = world->block_shapes[slot].mesh->source;
-        if (source) closest->triangle = source[gap.triangle];
+        if (source) closest->triangle = source[separation.triangle];
     }
     return SADMM_OK;
 }

@@ -18,7 +18,7 @@ static void keep_rolling(sadmm_world *world, const struct sadmm_contact_pair *pa
         rolling_begin(next);
         if (point->migrates >= MIGRATES_SOON) next->rolls |= ROLLING_TURNS_ON; /* on a round surface */
         rolling_owe(pair->normal, arm, at.normal, s ? at.arm_b : at.arm_a, point->impulse, s ? 1 : -1, next->owed);
-        rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->gap), migration->radius, push, dt,
+        rolling_stiffen(pair->normal, rolling_height(pair->normal, arm, point->separation), migration->radius, push, dt,
                         next->stiffness);
     }
 }

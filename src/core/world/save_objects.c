@@ -533,7 +533,8 @@ static bool coupling_fits(const sadmm_world *world, size_t slot, struct sadmm_er
     return joint->alive && joint->coupling == (int32_t)slot + 1 && joint->body[0] == -1 &&
            side_fits(world, joint->body[1], coupling->def.body) &&
            sadmm_world_check_coupling(&coupling->def, error) == SADMM_OK &&
-           target_fits(&coupling->last.target, error) && sadmm_all_finite(coupling->last.felt, 6) && sadmm_all_finite(coupling->last.body, 6);
+           target_fits(&coupling->last.target, error) && sadmm_all_finite(coupling->last.reaction, 6) &&
+           sadmm_all_finite(coupling->last.body, 6);
 }
 
 static void archive_coupling(struct sadmm_archive *archive, sadmm_world *world, size_t slot)
@@ -561,7 +562,7 @@ static void archive_coupling(struct sadmm_archive *archive, sadmm_world *world, 
     SADMM_ARCHIVE(archive, coupling->last.target.position);
     SADMM_ARCHIVE(archive, coupling->last.target.orientation);
     SADMM_ARCHIVE(archive, coupling->last.target.velocity);
-    SADMM_ARCHIVE(archive, coupling->last.felt);
+    SADMM_ARCHIVE(archive, coupling->last.reaction);
     SADMM_ARCHIVE(archive, coupling->last.body);
     if (!archive->reading) return;
     coupling->joint = (size_t)joint;

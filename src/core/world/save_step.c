@@ -18,12 +18,12 @@ static bool shape_fits(const sadmm_world *world, int32_t slot)
 }
 
 /* A triangle of a mesh: read-outs look it up. */
-static bool child_fits(const sadmm_world *world, const struct sadmm_contact_pair *pair)
+static bool subshape_fits(const sadmm_world *world, const struct sadmm_contact_pair *pair)
 {
     if (!world->contacts_readable) return true;
     const struct sadmm_geometry *geometry = &world->geometries[world->shapes[pair->shape_b].geometry];
     if (geometry->type != SADMM_SHAPE_MESH) return true;
-    return (int64_t)pair->child < sadmm_mesh_triangle_count(world->block_shapes[pair->shape_b].mesh);
+    return (int64_t)pair->subshape < sadmm_mesh_triangle_count(world->block_shapes[pair->shape_b].mesh);
 }
 
 static bool migration_fits(const struct sadmm_contact_migration *m)
@@ -39,7 +39,7 @@ static bool contacts_fit(const sadmm_world *world)
     for (size_t k = 0; k < set->pair_count; ++k) {
         const struct sadmm_contact_pair *pair = &set->pairs[k], *before = k > 0 ? pair - 1 : NULL;
         if (pair->count < 1 || pair->count > SADMM_MAX_POINTS || (size_t)pair->first != points ||
-            !shape_fits(world, pair->shape_a) || !shape_fits(world, pair->shape_b) || !child_fits(world, pair) ||
+            !shape_fits(world, pair->shape_a) || !shape_fits(world, pair->shape_b) || !subshape_fits(world, pair) ||
             !side_fits(world, pair->body_a) || !side_fits(world, pair->body_b) ||
             (pair->body_a < 0 && pair->body_b < 0) || !sadmm_all_finite(pair->normal, 3) || !(pair->friction >= 0) ||
             !(pair->restitution >= 0))
@@ -47,7 +47,7 @@ static bool contacts_fit(const sadmm_world *world)
         if (before && (before->shape_a > pair->shape_a ||
                        (before->shape_a == pair->shape_a &&
                         (before->shape_b > pair->shape_b ||
-                         (before->shape_b == pair->shape_b && before->child >= pair->child)))))
+                         (before->shape_b == pair->shape_b && before->subshape >= pair->subshape)))))
             return false;
         points += (size_t)pair->count;
     }
@@ -55,7 +55,7 @@ static bool contacts_fit(const sadmm_world *world)
     for (size_t k = 0; k < points; ++k) {
         const struct sadmm_contact_point *point = &set->points[k];
         if (!sadmm_all_finite(point->impulse, 3) || !sadmm_all_finite(point->arm_a, 3) || !sadmm_all_finite(point->arm_b, 3) ||
-            !isfinite(point->gap) || !isfinite(point->error) || point->migrates > MIGRATES_ON ||
+            !isfinite(point->separation) || !isfinite(point->error) || point->migrates > MIGRATES_ON ||
             (point->migrates && !migration_fits(&set->migrations[k])))
             return false;
     }
@@ -95,8 +95,8 @@ static bool hits_fit(const sadmm_world *world)
     if (world->start.hit_first > world->start.hit_count) return false;
     for (size_t k = 0; k < world->start.hit_count; ++k) {
         const struct sadmm_world_hit *hit = &world->start.hits[k];
-        const struct sadmm_contact_pair pair = {.shape_b = hit->shape_b, .child = hit->child};
-        if (!shape_fits(world, hit->shape_a) || !shape_fits(world, hit->shape_b) || !child_fits(world, &pair) ||
+        const struct sadmm_contact_pair pair = {.shape_b = hit->shape_b, .subshape = hit->subshape};
+        if (!shape_fits(world, hit->shape_a) || !shape_fits(world, hit->shape_b) || !subshape_fits(world, &pair) ||
             !sadmm_all_finite(hit->position, 3) || !sadmm_all_finite(hit->normal, 3) ||
             !sadmm_all_finite(hit->impulse, 3))
             return false;

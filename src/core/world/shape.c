@@ -58,23 +58,24 @@ static void release_hull(const void *hull) { sadmm_hull_release((const sadmm_hul
 static void retain_mesh(const void *mesh) { sadmm_mesh_retain((const sadmm_mesh *)mesh); }
 static void release_mesh(const void *mesh) { sadmm_mesh_release((const sadmm_mesh *)mesh); }
 
-static struct sadmm_block_owner block_owner(const sadmm_shape_def *def)
+static struct sadmm_shape_data_owner block_owner(const sadmm_shape_def *def)
 {
     if (def->type == SADMM_SHAPE_HULL)
-        return (struct sadmm_block_owner){def->hull, def->hull->block, def->hull->doubles, retain_hull, release_hull};
-    return (struct sadmm_block_owner){def->mesh, def->mesh->block, def->mesh->doubles, retain_mesh, release_mesh};
+        return (struct sadmm_shape_data_owner){def->hull, def->hull->block, def->hull->doubles, retain_hull,
+                                               release_hull};
+    return (struct sadmm_shape_data_owner){def->mesh, def->mesh->block, def->mesh->doubles, retain_mesh, release_mesh};
 }
 
-/* Room for what a shape with a block in `slot` has beside it, and its block in the pool. Errors leave the world as it
- * is. */
+/* Room for what a shape with a block in `slot` has beside it, and its block in the shape data. Errors leave the world
+ * as it is. */
 static sadmm_status add_block(sadmm_world *world, size_t slot, const sadmm_shape_def *def, uint32_t *offset,
                               struct sadmm_error *error)
 {
-    const struct sadmm_block_owner owner = block_owner(def);
+    const struct sadmm_shape_data_owner owner = block_owner(def);
     if (!sadmm_grow(&world->block_shapes, &world->block_shape_capacity, world->block_shape_slots, slot + 1,
                     sizeof *world->block_shapes))
         return sadmm_fail_memory(error, "a shape");
-    TRY(sadmm_block_pool_add(&world->block_pool, &owner, offset, error));
+    TRY(sadmm_shape_data_add(&world->shape_data, &owner, offset, error));
     if (slot >= world->block_shape_slots) world->block_shape_slots = slot + 1;
     return SADMM_OK;
 }
@@ -111,7 +112,7 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     TRY(check_def(body, def, orientation, error));
     const struct sadmm_geometry geometry = sadmm_shape_form_geometry(def);
     if (has_block(def->type)) TRY(add_block(world, slot, def, &offset, error));
-    else if (geometry_is_smooth(&geometry)) TRY(sadmm_block_pool_hold(&world->block_pool, error));
+    else if (geometry_is_smooth(&geometry)) TRY(sadmm_shape_data_hold(&world->shape_data, error));
 
     struct sadmm_shape *shape = &world->shapes[slot];
     memset(shape, 0, sizeof *shape);
@@ -170,14 +171,14 @@ static void remove_block(sadmm_world *world, size_t slot)
     const struct sadmm_world_block_shape *kept = &world->block_shapes[slot];
     const void *owner = kept->hull ? (const void *)kept->hull : kept->mesh;
     world->geometries[world->shapes[slot].geometry].hull = 0;
-    sadmm_block_pool_remove(&world->block_pool, owner, world->geometries, world->shape_slots);
+    sadmm_shape_data_remove(&world->shape_data, owner, world->geometries, world->shape_slots);
 }
 
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
 {
     const struct sadmm_geometry *geometry = &world->geometries[world->shapes[slot].geometry];
     if (has_block(geometry->type)) remove_block(world, slot);
-    else if (geometry_is_smooth(geometry)) sadmm_block_pool_let_go(&world->block_pool);
+    else if (geometry_is_smooth(geometry)) sadmm_shape_data_release(&world->shape_data);
     world->shapes[slot].alive = false;
     sadmm_world_reshaped(world);
     ++world->shape_generations[slot];

@@ -37,7 +37,7 @@ sadmm_status sadmm_shape_form_check(const sadmm_shape_def *def, double orientati
 
 struct sadmm_geometry sadmm_shape_form_geometry(const sadmm_shape_def *def)
 {
-    struct sadmm_geometry geometry = {.type = (int32_t)def->type, .children = def->type == SADMM_SHAPE_MESH ? 0 : 1};
+    struct sadmm_geometry geometry = {.type = (int32_t)def->type, .subshapes = def->type == SADMM_SHAPE_MESH ? 0 : 1};
     const double *size = def->hull ? def->hull->half : def->mesh ? def->mesh->half : def->size;
     memcpy(geometry.size, size, sizeof geometry.size);
     return geometry;

@@ -52,7 +52,8 @@ static void keep_share(void *argument, int thread, int threads)
     sadmm_share(world->contacts.point_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) {
         memcpy(world->start.impulse + 3 * k, points[k].impulse, 3 * sizeof *world->start.impulse);
-        const double own = points[k].gap < 0 ? -points[k].gap : 0; /* a gap of 0 is 0 deep, not -0 */
+        const double own = points[k].separation < 0 ? -points[k].separation : 0; /* a separation of 0 is 0 deep, not
+                                                                                    -0 */
         deepest = own > deepest ? own : deepest;
     }
     keeping->deepest[thread] = deepest;
@@ -220,7 +221,7 @@ static sadmm_status find(struct host_step *step)
 {
     sadmm_world *world = step->world;
     TRY(find_contacts(world, step->stages.substep));
-    sadmm_world_open_gaps(world);
+    sadmm_world_open_separations(world);
     step->found = true;
     return SADMM_OK;
 }

@@ -65,7 +65,7 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_rows_free(&world->closing);
     for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
     sadmm_world_free_tables(world);
-    sadmm_block_pool_free(&world->block_pool);
+    sadmm_shape_data_free(&world->shape_data);
     sadmm_query_tree_free(&world->query.tree);
     sadmm_world_free_events(world);
     struct sadmm_slot_set *const taken[] = {&world->bodies_taken, &world->shapes_taken, &world->joints_taken,

@@ -1,6 +1,6 @@
 /* A world's insides, shared by the files of this folder. Each calls those before it alone:
  *
- *   slots, links, pair_table, block_pool, ids, report   lists and names
+ *   slots, links, pair_table, shape_data, ids, report   lists and names
  *   kinematic                        kinematic bodies in a step
  *   gather                           what a step reads
  *   hits                             hits of bodies in flight, each at its moment
@@ -19,7 +19,6 @@
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
 #define SADMM_CORE_WORLD_INTERNAL_H
 
-#include "block_pool.h"
 #include "collision/collision.h"
 #include "collision/query_tree.h"
 #include "core/base/check.h"
@@ -30,12 +29,13 @@
 #include "core/model/settings.h"
 #include "core/solve/articulation.h"
 #include "core/solve/certificate.h"
+#include "core/solve/kernels.h"
 #include "core/solve/ncp.h"
 #include "core/solve/push.h"
-#include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
 #include "links.h"
 #include "pair_table.h"
+#include "shape_data.h"
 #include "slots.h"
 #include "subadmm/arrays.h"
 #include "subadmm/coupling.h"
@@ -184,7 +184,7 @@ struct sadmm_world {
     struct sadmm_link *shape_links;    /* by slot: the shapes of a body */
     size_t shape_link_capacity;
     uint32_t shape_revisions;
-    struct sadmm_block_pool block_pool;
+    struct sadmm_shape_data shape_data;
     struct sadmm_world_block_shape *block_shapes; /* by slot, as far as there are hulls or meshes */
     size_t block_shape_slots, block_shape_capacity;
     struct sadmm_pair_table disabled_pairs, friction_pairs;
@@ -375,9 +375,9 @@ sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep);
 /* Dynamic bodies, by slot, that joints hold. */
 void sadmm_world_mark_held(const sadmm_world *world, unsigned char *bodies, unsigned char mark);
 /* Pairs that were followed to the end of the sub-step touch no more in it: planes laid through their contacts may say
- * that they do, where surfaces are round or turn. Their gaps are what the bodies close by themselves, at least, so that
- * such contacts act only on what others push together. After contacts are found. */
-void sadmm_world_open_gaps(sadmm_world *world);
+ * that they do, where surfaces are round or turn. Their separations are what the bodies close by themselves, at least,
+ * so that such contacts act only on what others push together. After contacts are found. */
+void sadmm_world_open_separations(sadmm_world *world);
 /* What the (sub-)step's hits give bodies, beside its contacts. */
 void sadmm_world_add_hit_wrenches(sadmm_world *world, const sadmm_settings *settings);
 

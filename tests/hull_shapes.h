@@ -1,55 +1,55 @@
-/* Hulls in a pool, as a world has them, made without what the library makes them by. */
-#ifndef SADMM_TESTS_HULL_POOL_H
-#define SADMM_TESTS_HULL_POOL_H
+/* Hulls in shape data, as a world has them, made without the library's own code. */
+#ifndef SADMM_TESTS_HULL_SHAPES_H
+#define SADMM_TESTS_HULL_SHAPES_H
 
 #include <check.h>
 
 #include "collision/collision.h"
 #include "hull_reference.h"
 
-enum { TEST_POOL = 200000 };
+enum { TEST_SHAPE_DATA = 200000 };
 
-/* A pool with hulls of the tests in it. */
-struct test_pool {
-    double numbers[TEST_POOL];
+/* Shape data with hulls of the tests. */
+struct test_shape_data {
+    double numbers[TEST_SHAPE_DATA];
     size_t used;
 };
 
-static inline struct test_pool *test_pool_new(void)
+static inline struct test_shape_data *test_shape_data_new(void)
 {
-    struct test_pool *pool = calloc(1, sizeof *pool);
+    struct test_shape_data *shape_data = calloc(1, sizeof *shape_data);
     static const double segment[2][3] = {{0, 0, -1}, {0, 0, 1}};
     struct test_hull h;
     double cube[8][3];
-    ck_assert_ptr_nonnull(pool);
+    ck_assert_ptr_nonnull(shape_data);
     for (int v = 0; v < 8; ++v)
         for (int k = 0; k < 3; ++k) cube[v][k] = v >> k & 1 ? 1 : -1;
     test_hull_of((const double(*)[3])cube, 8, 1e-9, &h);
     ck_assert_int_eq(h.faces, 6);
     ck_assert_int_eq(h.edges, 12);
-    test_hull_block(&h, pool->numbers + HULL_CUBE);
+    test_hull_data(&h, shape_data->numbers + HULL_CUBE);
     memset(&h, 0, sizeof h);
     h.vertices = 2;
     h.edges = 1;
     memcpy(h.x, segment, sizeof segment);
     h.edge[0][1] = 1;
-    test_hull_block(&h, pool->numbers + HULL_SEGMENT);
+    test_hull_data(&h, shape_data->numbers + HULL_SEGMENT);
     memset(&h, 0, sizeof h);
     h.vertices = 1;
-    test_hull_block(&h, pool->numbers + HULL_POINT);
-    pool->used = HULL_FIRST_OWN;
-    return pool;
+    test_hull_data(&h, shape_data->numbers + HULL_POINT);
+    shape_data->used = HULL_FIRST_OWN;
+    return shape_data;
 }
 
-/* A hull in the pool. */
-static inline struct sadmm_geometry test_pool_add(struct test_pool *pool, const struct test_hull *h)
+/* Add a hull. */
+static inline struct sadmm_geometry test_shape_data_add(struct test_shape_data *shape_data, const struct test_hull *h)
 {
-    struct sadmm_geometry geometry = {.type = SADMM_SHAPE_HULL, .children = 1, .hull = (uint32_t)pool->used};
-    ck_assert_uint_le(pool->used + (size_t)hull_doubles(h->vertices, h->faces, h->edges), TEST_POOL);
-    test_hull_block(h, pool->numbers + pool->used);
-    pool->used += (size_t)hull_doubles(h->vertices, h->faces, h->edges);
+    struct sadmm_geometry geometry = {.type = SADMM_SHAPE_HULL, .subshapes = 1, .hull = (uint32_t)shape_data->used};
+    ck_assert_uint_le(shape_data->used + (size_t)hull_doubles(h->vertices, h->faces, h->edges), TEST_SHAPE_DATA);
+    test_hull_data(h, shape_data->numbers + shape_data->used);
+    shape_data->used += (size_t)hull_doubles(h->vertices, h->faces, h->edges);
     for (int i = 0; i < h->vertices; ++i)
-        for (int k = 0; k < 3; ++k) geometry.size[k] = fmax(geometry.size[k], fabs(h->x[i][k]) + h->rounding);
+        for (int k = 0; k < 3; ++k) geometry.size[k] = fmax(geometry.size[k], fabs(h->x[i][k]) + h->convex_radius);
     return geometry;
 }
 

@@ -1,6 +1,6 @@
-/* Facing features of two convex bodies, seen along a normal: a flat of each, or, where that is too steep, a straight
- * line of its surface, or nothing. Where they overlap, the corners of the overlap make the points, each with the gap
- * along the normal there, as between two polytopes (polytope_face.h).
+/* Contact points of two convex bodies by clipping their features along a normal: a flat face of each, or, if that is
+ * too steep, a straight line of its surface, or nothing. The corners of the overlap of their projections become points,
+ * each with the separation along the normal, as between two polytopes (polytope_face.h).
  *
  * A disc's rim has no corners. Eight points of it stand for it, evenly spread from a direction that is not the disc's
  * own but the other body's: a side of the face, a plane's or a mesh's x axis, b's of two discs. So a disc that turns
@@ -8,8 +8,8 @@
  * mass is as near to the rim, one of the eight is the rim's point nearest to it, and a body tips over the rim where it
  * would in truth. Where rims cross sides, lines and each other the points are exact.
  */
-#ifndef SADMM_COLLISION_CONVEX_FACING_H
-#define SADMM_COLLISION_CONVEX_FACING_H
+#ifndef SADMM_COLLISION_CONVEX_CLIP_H
+#define SADMM_COLLISION_CONVEX_CLIP_H
 
 #include "convex_pair.h"
 #include "polytope_face.h"
@@ -20,12 +20,12 @@
 #define CONVEX_TIPS_TO   ((real)1.1)
 enum { CONVEX_RIM = 8, CONVEX_POINTS = 64, CONVEX_END = 16 /* features of ends: above those of a rim */ };
 
-enum convex_facing_kind { CONVEX_NOTHING, CONVEX_LINE, CONVEX_FACE, CONVEX_DISC };
+enum convex_feature_kind { CONVEX_NOTHING, CONVEX_LINE, CONVEX_FACE, CONVEX_DISC };
 
-struct convex_facing {
+struct convex_feature {
     int kind, count;
-    vec3 corner[FACING_CORNERS]; /* of a face counter-clockwise seen from outside; the ends of a line */
-    int vertex[FACING_CORNERS], edge[FACING_CORNERS];
+    vec3 corner[CLIP_CORNERS]; /* of a face counter-clockwise seen from outside; the ends of a line */
+    int vertex[CLIP_CORNERS], edge[CLIP_CORNERS];
     vec3 normal; /* of a flat, outward from its own body, with its offset; of a line, outward as well */
     real offset;
     vec3 centre; /* of a disc */
@@ -41,15 +41,15 @@ struct convex_meeting {
     const struct convex_pair *pair;
     vec3 n, x1, x2;
     real least, limit, tolerance;
-    real nearest; /* gap of all points that there are, those that are left out included */
+    real nearest; /* separation of all points that there are, those that are left out included */
     int count;
-    struct facing_corner at[CONVEX_POINTS];
-    real gap[CONVEX_POINTS];
+    struct clip_corner at[CONVEX_POINTS];
+    real separation[CONVEX_POINTS];
     uint32_t feature[CONVEX_POINTS];
 };
 
 /* A straight line of a smooth body that points along d (own frame) to within 8 degrees. */
-SADMM_INLINE bool convex_line(const struct convex *c, vec3 d, struct convex_facing *out)
+SADMM_INLINE bool convex_line(const struct convex *c, vec3 d, struct convex_feature *out)
 {
     const real r = real_sqrt(d.x * d.x + d.y * d.y);
     vec3 e;
@@ -82,14 +82,14 @@ SADMM_INLINE bool convex_line(const struct convex *c, vec3 d, struct convex_faci
 }
 
 /* Of a polytope, as polytope_face.h takes them. */
-SADMM_INLINE void convex_polytope_facing(const struct polytope *p, vec3 d, struct convex_facing *out)
+SADMM_INLINE void convex_polytope_feature(const struct polytope *p, vec3 d, struct convex_feature *out)
 {
-    const int face = facing_face(p, d);
+    const int face = clip_face(p, d);
     int ends[2], k;
     if (face >= 0) {
         const int first = p->face_first[face], all = p->face_first[face + 1] - first;
         out->kind = CONVEX_FACE;
-        out->count = all < FACING_CORNERS ? all : FACING_CORNERS;
+        out->count = all < CLIP_CORNERS ? all : CLIP_CORNERS;
         for (k = 0; k < out->count; ++k) {
             const int at = first + (all == out->count ? k : k * all / out->count);
             out->vertex[k] = p->corner_vertex[at];
@@ -98,7 +98,7 @@ SADMM_INLINE void convex_polytope_facing(const struct polytope *p, vec3 d, struc
         }
         out->normal = polytope_normal(p, face);
         out->offset = polytope_offset(p, face);
-    } else if (p->edges > 0 && facing_edge(p, d, ends) == 2) {
+    } else if (p->edges > 0 && clip_edge(p, d, ends) == 2) {
         out->kind = CONVEX_LINE;
         out->count = 2;
         for (k = 0; k < 2; ++k) {
@@ -113,13 +113,13 @@ SADMM_INLINE void convex_polytope_facing(const struct polytope *p, vec3 d, struc
 }
 
 /* What of c points along d (own frame). */
-SADMM_CALLED void convex_facing_of(const struct convex *c, vec3 d, struct convex_facing *out)
+SADMM_CALLED void convex_feature_of(const struct convex *c, vec3 d, struct convex_feature *out)
 {
     const int flat = convex_flat(c, d, MANIFOLD_COS_NEAR);
     out->kind = CONVEX_NOTHING;
     out->count = 0;
     if (c->form == CONVEX_POLYTOPE) {
-        convex_polytope_facing(&c->p, d, out);
+        convex_polytope_feature(&c->p, d, out);
     } else if (flat >= 0) {
         out->kind = CONVEX_DISC;
         out->normal = convex_flat_normal(c, flat);
@@ -132,7 +132,7 @@ SADMM_CALLED void convex_facing_of(const struct convex *c, vec3 d, struct convex
 }
 
 /* From a's frame to b's. */
-SADMM_INLINE void convex_facing_place(const struct convex_pair *pair, struct convex_facing *f)
+SADMM_INLINE void convex_feature_place(const struct convex_pair *pair, struct convex_feature *f)
 {
     int k;
     for (k = 0; k < f->count; ++k) f->corner[k] = v3_add(m3_mul(pair->R, f->corner[k]), pair->t);
@@ -144,13 +144,13 @@ SADMM_INLINE void convex_facing_place(const struct convex_pair *pair, struct con
 }
 
 /* The point of a flat's plane over x, along n. */
-SADMM_INLINE vec3 convex_over(const struct convex_facing *flat, vec3 n, vec3 x)
+SADMM_INLINE vec3 convex_over(const struct convex_feature *flat, vec3 n, vec3 x)
 {
     return v3_madd(x, (flat->offset - v3_dot(flat->normal, x)) / v3_dot(flat->normal, n), n);
 }
 
 /* Outward of side k of a face, unit, in its plane. */
-SADMM_INLINE vec3 convex_side_out(const struct convex_facing *face, int k)
+SADMM_INLINE vec3 convex_side_out(const struct convex_feature *face, int k)
 {
     const vec3 side = v3_sub(face->corner[k + 1 < face->count ? k + 1 : 0], face->corner[k]),
                out = v3_cross(side, face->normal);
@@ -159,7 +159,7 @@ SADMM_INLINE vec3 convex_side_out(const struct convex_facing *face, int k)
 }
 
 /* Is a point of a flat's plane on the flat, or beside it by no more than the tolerance? */
-SADMM_INLINE bool convex_is_on(const struct convex_facing *flat, vec3 x, real tolerance)
+SADMM_INLINE bool convex_is_on(const struct convex_feature *flat, vec3 x, real tolerance)
 {
     int k;
     if (flat->kind == CONVEX_DISC) {
@@ -186,27 +186,28 @@ SADMM_INLINE bool convex_leaves_out(const struct convex_pair *pair, uint32_t fea
 SADMM_CALLED void convex_meet(struct convex_meeting *m, vec3 on_a, vec3 on_b, uint32_t feature)
 {
     const struct convex_pair *pair = m->pair;
-    const real gap = real_max(v3_dot(m->n, v3_sub(on_b, on_a)) - convex_radii(pair), m->least);
+    const real separation = real_max(v3_dot(m->n, v3_sub(on_b, on_a)) - convex_radii(pair), m->least);
     const vec3 x = v3_madd(v3_scale(v3_add(on_a, on_b), (real)0.5), (pair->a.p.radius - pair->b.p.radius) / 2, m->n);
-    struct facing_corner at;
+    struct clip_corner at;
     int k;
-    m->nearest = real_min(m->nearest, gap);
-    if (!(gap <= m->limit + pair->slack) || m->count == CONVEX_POINTS || convex_leaves_out(pair, feature)) return;
+    m->nearest = real_min(m->nearest, separation);
+    if (!(separation <= m->limit + pair->slack) || m->count == CONVEX_POINTS || convex_leaves_out(pair, feature))
+        return;
     at.x = v3_dot(m->x1, x);
     at.y = v3_dot(m->x2, x);
     at.z = v3_dot(m->n, x);
     at.edge = 0;
     for (k = 0; k < m->count; ++k)
-        if (m->feature[k] == feature || (facing_near(&m->at[k], at.x, at.y, m->tolerance) &&
-                                         real_abs(m->gap[k] - gap) <= 2 * m->tolerance))
+        if (m->feature[k] == feature || (clip_near(&m->at[k], at.x, at.y, m->tolerance) &&
+                                         real_abs(m->separation[k] - separation) <= 2 * m->tolerance))
             return;
     m->at[m->count] = at;
-    m->gap[m->count] = gap;
+    m->separation[m->count] = separation;
     m->feature[m->count++] = feature;
 }
 
 /* x is a point of one of the two, of a where so said; the other is a flat. */
-SADMM_INLINE void convex_meet_flat(struct convex_meeting *m, vec3 x, bool of_a, const struct convex_facing *flat,
+SADMM_INLINE void convex_meet_flat(struct convex_meeting *m, vec3 x, bool of_a, const struct convex_feature *flat,
                                    uint32_t feature)
 {
     const vec3 over = convex_over(flat, m->n, x);
@@ -214,7 +215,7 @@ SADMM_INLINE void convex_meet_flat(struct convex_meeting *m, vec3 x, bool of_a, 
 }
 
 /* The k-th point of a disc's rim; e1, e2: axes in its plane. */
-SADMM_INLINE vec3 convex_rim(const struct convex_facing *disc, vec3 e1, vec3 e2, int k)
+SADMM_INLINE vec3 convex_rim(const struct convex_feature *disc, vec3 e1, vec3 e2, int k)
 {
     const real half = (real)0.70710678118654752;
     const real cosine = k % 4 == 2 ? 0 : k % 2 ? half : 1, sine = k % 4 == 0 ? 0 : k % 2 ? half : 1;
@@ -223,7 +224,7 @@ SADMM_INLINE vec3 convex_rim(const struct convex_facing *disc, vec3 e1, vec3 e2,
 }
 
 /* The direction in a disc's plane that is nearest to `along`, unit, and the one across it. */
-SADMM_INLINE void convex_rim_axes(const struct convex_facing *disc, vec3 along, vec3 *e1, vec3 *e2)
+SADMM_INLINE void convex_rim_axes(const struct convex_feature *disc, vec3 along, vec3 *e1, vec3 *e2)
 {
     const vec3 flat = v3_madd(along, -v3_dot(along, disc->normal), disc->normal);
     const real length2 = v3_norm2(flat);
@@ -237,7 +238,7 @@ SADMM_INLINE void convex_rim_axes(const struct convex_facing *disc, vec3 along, 
 
 /* Is a centre of mass near the rim, so that which points stand for it decides whether the body tips? To it from the
  * disc's centre; of two that are the outer one. 0: there is none. */
-SADMM_INLINE vec3 convex_tipping(const struct convex_facing *disc, const vec3 centre[2], const bool tips[2])
+SADMM_INLINE vec3 convex_tipping(const struct convex_feature *disc, const vec3 centre[2], const bool tips[2])
 {
     real most2 = CONVEX_TIPS_FROM * CONVEX_TIPS_FROM * disc->radius * disc->radius;
     vec3 way = v3(0, 0, 0);
@@ -257,8 +258,8 @@ SADMM_INLINE vec3 convex_tipping(const struct convex_facing *disc, const vec3 ce
 }
 
 /* What the points of a rim that faces `other` are spread from. */
-SADMM_INLINE vec3 convex_spread(const struct convex_pair *pair, const struct convex_facing *disc,
-                                const struct convex_facing *other)
+SADMM_INLINE vec3 convex_spread(const struct convex_pair *pair, const struct convex_feature *disc,
+                                const struct convex_feature *other)
 {
     const vec3 way = convex_tipping(disc, pair->centre, pair->tips);
     if (v3_norm2(way) > 0) return way;
@@ -267,8 +268,8 @@ SADMM_INLINE vec3 convex_spread(const struct convex_pair *pair, const struct con
 }
 
 /* Points of the rim that are over a flat of the other one. */
-SADMM_INLINE void convex_rim_over(struct convex_meeting *m, const struct convex_facing *disc, bool disc_is_a,
-                                  const struct convex_facing *flat)
+SADMM_INLINE void convex_rim_over(struct convex_meeting *m, const struct convex_feature *disc, bool disc_is_a,
+                                  const struct convex_feature *flat)
 {
     vec3 e1, e2;
     int k;
@@ -282,7 +283,7 @@ SADMM_INLINE void convex_rim_over(struct convex_meeting *m, const struct convex_
 }
 
 /* Where the line through p and q, in a disc's plane, crosses its rim: shares of the way from p to q. False: nowhere. */
-SADMM_INLINE bool convex_crossings(const struct convex_facing *disc, vec3 p, vec3 q, real share[2])
+SADMM_INLINE bool convex_crossings(const struct convex_feature *disc, vec3 p, vec3 q, real share[2])
 {
     const vec3 d = v3_sub(q, p), r = v3_sub(p, disc->centre);
     const real dd = v3_norm2(d), half = v3_dot(d, r), rest = v3_norm2(r) - disc->radius * disc->radius,
@@ -302,8 +303,8 @@ SADMM_INLINE uint32_t convex_crossing_feature(bool disc_is_a, int of_disc, int o
     return polytope_feature(FEATURE_CROSSING, disc_is_a ? of_disc : of_other, disc_is_a ? of_other : of_disc);
 }
 
-SADMM_INLINE void convex_disc_face(struct convex_meeting *m, const struct convex_facing *disc, bool disc_is_a,
-                                   const struct convex_facing *face)
+SADMM_INLINE void convex_disc_face(struct convex_meeting *m, const struct convex_feature *disc, bool disc_is_a,
+                                   const struct convex_feature *face)
 {
     int k, i;
     convex_rim_over(m, disc, disc_is_a, face);
@@ -325,8 +326,8 @@ SADMM_INLINE void convex_disc_face(struct convex_meeting *m, const struct convex
 /* Where the rim of b crosses that of a as seen along n: from the point where circles would, by Newton's method in the
  * angle about b's axis. Along n the rim of b is over p + c q + s r of a's plane, (c, s) on the unit circle, counted from
  * a's centre; there its length is to be a's radius. False: they do not cross there. */
-SADMM_CALLED bool convex_rim_crossing(const struct convex_meeting *m, const struct convex_facing *a,
-                                      const struct convex_facing *b, vec3 start, vec3 *on_b)
+SADMM_CALLED bool convex_rim_crossing(const struct convex_meeting *m, const struct convex_feature *a,
+                                      const struct convex_feature *b, vec3 start, vec3 *on_b)
 {
     enum { STEPS = 8 };
     const real tilt = v3_dot(a->normal, m->n), wanted = a->radius * a->radius,
@@ -362,8 +363,8 @@ SADMM_CALLED bool convex_rim_crossing(const struct convex_meeting *m, const stru
 
 /* Seen along n, which both are across to within 8 degrees, the discs are circles but for 1 - cosine of that, and their
  * rims cross beside where circles would. */
-SADMM_INLINE void convex_disc_disc(struct convex_meeting *m, const struct convex_facing *a,
-                                   const struct convex_facing *b)
+SADMM_INLINE void convex_disc_disc(struct convex_meeting *m, const struct convex_feature *a,
+                                   const struct convex_feature *b)
 {
     const vec3 to_b = v3_sub(convex_over(a, m->n, b->centre), a->centre);
     const real d2 = v3_norm2(to_b), d = real_sqrt(d2);
@@ -384,8 +385,8 @@ SADMM_INLINE void convex_disc_disc(struct convex_meeting *m, const struct convex
 }
 
 /* The part of a line that is over a flat. */
-SADMM_INLINE void convex_line_flat(struct convex_meeting *m, const struct convex_facing *line, bool line_is_a,
-                                   const struct convex_facing *flat)
+SADMM_INLINE void convex_line_flat(struct convex_meeting *m, const struct convex_feature *line, bool line_is_a,
+                                   const struct convex_feature *flat)
 {
     const vec3 p = convex_over(flat, m->n, line->corner[0]), q = convex_over(flat, m->n, line->corner[1]);
     const int own = line_is_a ? FEATURE_VERTEX_A : FEATURE_VERTEX_B;
@@ -429,7 +430,7 @@ SADMM_INLINE void convex_line_flat(struct convex_meeting *m, const struct convex
 
 /* x, moved along n to the surface of a cylinder or a cone that it is near. *beyond: how far that is beyond its ends, as a
  * share of the axis; 0: it is not. */
-SADMM_INLINE vec3 convex_onto_side(const struct convex_facing *line, vec3 n, vec3 x, real *beyond)
+SADMM_INLINE vec3 convex_onto_side(const struct convex_feature *line, vec3 n, vec3 x, real *beyond)
 {
     const vec3 axis = v3_sub(line->axis[1], line->axis[0]), w = v3_sub(x, line->axis[0]);
     const real length = v3_norm(axis), taper = (line->wide[1] - line->wide[0]) / length,
@@ -442,7 +443,7 @@ SADMM_INLINE vec3 convex_onto_side(const struct convex_facing *line, vec3 n, vec
 }
 
 /* x, moved along n to the ball around the edge's point there, which rounds it. u: along the edge, across n. */
-SADMM_INLINE vec3 convex_onto_edge(const struct convex_facing *line, real round, vec3 n, vec3 u, vec3 x)
+SADMM_INLINE vec3 convex_onto_edge(const struct convex_feature *line, real round, vec3 n, vec3 u, vec3 x)
 {
     const vec3 d = v3_sub(line->corner[1], line->corner[0]);
     const real share = real_clamp(v3_dot(u, v3_sub(x, line->corner[0])) / v3_dot(u, d), 0, 1);
@@ -453,15 +454,15 @@ SADMM_INLINE vec3 convex_onto_edge(const struct convex_facing *line, real round,
 
 /* Points near the two lines, one over the other along n, are moved to the surfaces that these are of, not beyond their
  * ends. u: along a's line, across n. */
-SADMM_CALLED void convex_onto_both(const struct convex_meeting *m, const struct convex_facing *a,
-                                   const struct convex_facing *b, vec3 u, vec3 *on_a, vec3 *on_b)
+SADMM_CALLED void convex_onto_both(const struct convex_meeting *m, const struct convex_feature *a,
+                                   const struct convex_feature *b, vec3 u, vec3 *on_a, vec3 *on_b)
 {
     enum { MOVES = 3 }; /* each leaves a fiftieth of what there was */
     int move, s;
     for (move = 0;; ++move) {
         real back = 0;
         for (s = 0; s < 2; ++s) {
-            const struct convex_facing *line = s ? b : a;
+            const struct convex_feature *line = s ? b : a;
             const vec3 n = s ? v3_neg(m->n) : m->n;
             vec3 *on = s ? on_b : on_a, axis;
             real beyond;
@@ -482,8 +483,8 @@ SADMM_CALLED void convex_onto_both(const struct convex_meeting *m, const struct 
 
 /* Two lines side by side, to within 8 degrees: both ends of the common stretch, where the round surfaces over them are
  * nearest to each other. */
-SADMM_INLINE void convex_line_line(struct convex_meeting *m, const struct convex_facing *a,
-                                   const struct convex_facing *b)
+SADMM_INLINE void convex_line_line(struct convex_meeting *m, const struct convex_feature *a,
+                                   const struct convex_feature *b)
 {
     const vec3 n = m->n;
     vec3 u = v3_sub(a->corner[1], a->corner[0]), w = v3_sub(b->corner[1], b->corner[0]);
@@ -523,23 +524,23 @@ SADMM_INLINE void convex_line_line(struct convex_meeting *m, const struct convex
     }
 }
 
-SADMM_INLINE real convex_slope(const struct convex_facing *f, vec3 n)
+SADMM_INLINE real convex_slope(const struct convex_feature *f, vec3 n)
 {
     const real c = f->kind == CONVEX_FACE || f->kind == CONVEX_DISC ? real_abs(v3_dot(f->normal, n)) : 1;
     return real_sqrt(real_max(0, 1 - c * c)) / c;
 }
 
-/* Do two points face each other along n that are as near as the planes across it are? Then no direction beside it is
- * better. What counts as over a flat must be over it here. */
-SADMM_INLINE bool convex_is_proof(const struct convex_meeting *m, const struct convex_facing *a,
-                                  const struct convex_facing *b)
+/* Is n a witness of the separation: two points opposite each other along n, as near as the planes across n? Then no
+ * direction beside n is better. Here points must be over the flats exactly. */
+SADMM_INLINE bool convex_is_witness(const struct convex_meeting *m, const struct convex_feature *a,
+                                    const struct convex_feature *b)
 {
     const struct convex_pair *pair = m->pair;
     const real within = 4 * pair->slack;
     int k;
     for (k = 0; k < m->count; ++k) {
         vec3 x;
-        if (m->gap[k] > m->least + pair->equal) continue;
+        if (m->separation[k] > m->least + pair->equal) continue;
         x = v3_madd(v3_madd(v3_scale(m->x1, m->at[k].x), m->at[k].y, m->x2), m->at[k].z, m->n);
         if ((a->kind == CONVEX_LINE || convex_is_on(a, convex_over(a, m->n, x), within)) &&
             (b->kind == CONVEX_LINE || convex_is_on(b, convex_over(b, m->n, x), within)))
@@ -549,24 +550,24 @@ SADMM_INLINE bool convex_is_proof(const struct convex_meeting *m, const struct c
 }
 
 /* Sets m's normal to n, and its points to those of what faces along it. least: the separation of the two along n. The
- * smallest gap of all that there are, those that are left out included; largest: there are none. *proven: no direction
- * beside n is better. */
-SADMM_RARE real convex_facing_manifold(const struct convex_pair *pair, vec3 n, real least, real limit,
-                                       struct manifold *m, bool *proven)
+ * smallest separation of all that there are, those that are left out included; largest: there are none. *witness: n is
+ * a separating axis witness, no direction beside it is better. */
+SADMM_RARE real convex_clip_manifold(const struct convex_pair *pair, vec3 n, real least, real limit,
+                                     struct manifold *m, bool *witness)
 {
-    struct convex_facing a, b;
+    struct convex_feature a, b;
     struct convex_meeting meeting;
     uint64_t chosen;
     real slope;
     int i;
     m->normal = n;
     m->count = 0;
-    *proven = false;
-    convex_facing_of(&pair->a, m3_tmul(pair->R, n), &a);
+    *witness = false;
+    convex_feature_of(&pair->a, m3_tmul(pair->R, n), &a);
     if (a.kind == CONVEX_NOTHING) return SADMM_REAL_MAX;
-    convex_facing_of(&pair->b, v3_neg(n), &b);
+    convex_feature_of(&pair->b, v3_neg(n), &b);
     if (b.kind == CONVEX_NOTHING) return SADMM_REAL_MAX;
-    convex_facing_place(pair, &a);
+    convex_feature_place(pair, &a);
 
     meeting.pair = pair;
     meeting.n = n;
@@ -575,11 +576,11 @@ SADMM_RARE real convex_facing_manifold(const struct convex_pair *pair, vec3 n, r
     meeting.nearest = SADMM_REAL_MAX;
     meeting.count = 0;
     slope = convex_slope(&a, n) + convex_slope(&b, n);
-    meeting.tolerance = MANIFOLD_SNAP / 2 * slope > FACING_GAP ? FACING_GAP / slope : MANIFOLD_SNAP / 2;
+    meeting.tolerance = MANIFOLD_SNAP / 2 * slope > CLIP_SEPARATION ? CLIP_SEPARATION / slope : MANIFOLD_SNAP / 2;
     meeting.tolerance *= pair->thin;
     /* axes that do not turn with a disc, as those of its rim */
     if (a.kind == CONVEX_DISC || b.kind == CONVEX_DISC) {
-        struct convex_facing across;
+        struct convex_feature across;
         const bool of_b = b.kind == CONVEX_DISC &&
                           (a.kind != CONVEX_DISC || v3_norm2(convex_tipping(&b, pair->centre, pair->tips)) > 0);
         across.normal = n;
@@ -594,13 +595,13 @@ SADMM_RARE real convex_facing_manifold(const struct convex_pair *pair, vec3 n, r
     else if (a.kind == CONVEX_LINE && b.kind == CONVEX_LINE) convex_line_line(&meeting, &a, &b);
     else if (a.kind == CONVEX_LINE) convex_line_flat(&meeting, &a, true, &b);
     else if (b.kind == CONVEX_LINE) convex_line_flat(&meeting, &b, false, &a);
-    *proven = convex_is_proof(&meeting, &a, &b);
-    chosen = facing_choice(meeting.at, meeting.gap, meeting.count);
+    *witness = convex_is_witness(&meeting, &a, &b);
+    chosen = clip_choice(meeting.at, meeting.separation, meeting.count);
     for (i = 0; i < meeting.count; ++i)
         if (chosen >> i & 1) {
-            const struct facing_corner *p = &meeting.at[i];
-            manifold_add(m, v3_madd(v3_madd(v3_scale(meeting.x1, p->x), p->y, meeting.x2), p->z, n), meeting.gap[i],
-                         meeting.feature[i]);
+            const struct clip_corner *p = &meeting.at[i];
+            manifold_add(m, v3_madd(v3_madd(v3_scale(meeting.x1, p->x), p->y, meeting.x2), p->z, n),
+                         meeting.separation[i], meeting.feature[i]);
         }
     return meeting.nearest;
 }

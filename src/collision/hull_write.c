@@ -1,4 +1,4 @@
-#include "hull_block.h"
+#include "hull_write.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -7,7 +7,7 @@
 #include "hull.h"
 #include "hull_data.h"
 
-size_t sadmm_hull_block_doubles(const struct hull_mesh *mesh)
+size_t sadmm_hull_data_doubles(const struct hull_mesh *mesh)
 {
     return (size_t)hull_doubles(mesh->vertex_count, mesh->face_count, mesh->edge_count);
 }
@@ -65,8 +65,8 @@ static bool has_flat_faces(const struct hull_mesh *mesh, const double *vertices,
 }
 
 /* Where `mesh` has no faces, `ends` has the vertices of its edges; else NULL. */
-static void write_block(const struct hull_mesh *mesh, const double *vertices, const double *planes, double rounding,
-                        const uint16_t *ends, double *block)
+static void write_block(const struct hull_mesh *mesh, const double *vertices, const double *planes,
+                        double convex_radius, const uint16_t *ends, double *block)
 {
     const struct sadmm_hull_header header = {
         .vertices = mesh->vertex_count,
@@ -74,9 +74,9 @@ static void write_block(const struct hull_mesh *mesh, const double *vertices, co
         .edges = mesh->edge_count,
         .vertex_stride = hull_stride(mesh->vertex_count),
         .face_stride = hull_stride(mesh->face_count),
-        .doubles = (int32_t)sadmm_hull_block_doubles(mesh),
+        .doubles = (int32_t)sadmm_hull_data_doubles(mesh),
         .climbs = has_flat_faces(mesh, vertices, planes),
-        .rounding = rounding,
+        .convex_radius = convex_radius,
     };
     memset(block, 0, (size_t)header.doubles * sizeof *block);
     memcpy(block, &header, sizeof header);
@@ -91,13 +91,13 @@ static void write_block(const struct hull_mesh *mesh, const double *vertices, co
     write_neighbours(&header, edge_vertex, vertex_first, vertex_next);
 }
 
-void sadmm_hull_block_write(const struct hull_mesh *mesh, const double *vertices, const double *planes,
-                            double rounding, double *block)
+void sadmm_hull_data_write(const struct hull_mesh *mesh, const double *vertices, const double *planes,
+                           double convex_radius, double *block)
 {
-    write_block(mesh, vertices, planes, rounding, NULL, block);
+    write_block(mesh, vertices, planes, convex_radius, NULL, block);
 }
 
-/* ---- blocks that every pool begins with ---- */
+/* ---- blocks that all shape data begins with ---- */
 
 /* Faces by axis, the positive side first. Counter-clockwise from outside, the lowest vertex first. */
 static void write_cube(double *block)
@@ -120,11 +120,11 @@ static void write_cube(double *block)
     write_block(&cube, vertices, planes, 0, NULL, block);
 }
 
-void sadmm_hull_prelude(double *pool)
+void sadmm_hull_prelude(double *data)
 {
     static const double segment[] = {0, 0, -1, 0, 0, 1}, point[] = {0, 0, 0};
     static const uint16_t ends[] = {0, 1};
-    write_cube(pool + HULL_CUBE);
-    write_block(&(struct hull_mesh){.vertex_count = 2, .edge_count = 1}, segment, NULL, 0, ends, pool + HULL_SEGMENT);
-    write_block(&(struct hull_mesh){.vertex_count = 1}, point, NULL, 0, NULL, pool + HULL_POINT);
+    write_cube(data + HULL_CUBE);
+    write_block(&(struct hull_mesh){.vertex_count = 2, .edge_count = 1}, segment, NULL, 0, ends, data + HULL_SEGMENT);
+    write_block(&(struct hull_mesh){.vertex_count = 1}, point, NULL, 0, NULL, data + HULL_POINT);
 }

@@ -1,5 +1,5 @@
-/* Where contacts are taken within a step (collision/midway.h, advance.h): halfway through it, or where what is fast
- * first touches. Gaps of turning bodies, what passes by, bullets, momentum of fast impacts. */
+/* Where contacts are taken within a step (collision/midpoint.h, advance.h): halfway through it, or where what is fast
+ * first touches. Separations of turning bodies, what passes by, bullets, momentum of fast impacts. */
 #include "momentum_worlds.h"
 
 static sadmm_world *empty_world(double dt, int iterations)
@@ -37,12 +37,13 @@ static sadmm_body_id add(sadmm_world *world, sadmm_shape_type type, const double
     return id;
 }
 
-/* ---- gaps ------------------------------------------------------------------------------------------------------ */
+/* ---- separations
+ * ------------------------------------------------------------------------------------------------------ */
 
-/* A box that spins about y over a floor, alone in the air: by gap and velocity the lowest corner ends up where it does,
- * but for its centripetal acceleration w^2 z over a quarter of the time twice, dt^2/8; taken at the start of the step
- * it is off by dt^2/2. */
-START_TEST(gaps_at_the_end_of_the_step)
+/* A box that spins about y over a floor, alone in the air: by separation and velocity the lowest corner ends up where
+ * it does, but for its centripetal acceleration w^2 z over a quarter of the time twice, dt^2/8; taken at the start of
+ * the step it is off by dt^2/2. */
+START_TEST(separations_at_the_end_of_the_step)
 {
     static const double half[3] = {0.1, 0.1, 0.1}, spins[] = {1, 5, 20};
     /* at the end the lowest corner is 3 mm up */
@@ -59,7 +60,7 @@ START_TEST(gaps_at_the_end_of_the_step)
         sadmm_contact c;
         MUST(world, sadmm_world_contacts(world, i, 1, &c));
         const double arm[3] = {c.position[0] - at[0], 0, c.position[2] - at[2]};
-        const double predicted = c.gap + dt * (v[2] - w * arm[0]);
+        const double predicted = c.separation + dt * (v[2] - w * arm[0]);
         /* which corner: by where it is halfway through the step, to 1 cm */
         for (int x = -1; x <= 1; x += 2)
             for (int z = -1; z <= 1; z += 2) {
@@ -249,9 +250,9 @@ END_TEST
 
 int main(void)
 {
-    Suite *suite = suite_create("midway");
-    TCase *tests = tcase_create("midway");
-    tcase_add_loop_test(tests, gaps_at_the_end_of_the_step, 0, 3);
+    Suite *suite = suite_create("midpoint");
+    TCase *tests = tcase_create("midpoint");
+    tcase_add_loop_test(tests, separations_at_the_end_of_the_step, 0, 3);
     tcase_add_loop_test(tests, what_passes_by_is_not_touched, 0, 15);
     tcase_add_loop_test(tests, bullets_stop, 0, (int)(sizeof bullets / sizeof *bullets));
     tcase_add_loop_test(tests, fast_impacts_keep_momentum, 0, 4);

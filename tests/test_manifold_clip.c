@@ -5,8 +5,8 @@
 #include "manifold_tools.h"
 #include "run_suite.h"
 
-/* Points within a thousandth of the half extent of a rim count as on it (MANIFOLD_SNAP); what that changes of a gap,
- * by both snaps and slopes of up to 0.3 between the faces, m. */
+/* Points within a thousandth of the half extent of a rim count as on it (MANIFOLD_SNAP); what that changes of a
+ * separation, by both snaps and slopes of up to 0.3 between the faces, m. */
 #define SNAP 1e-3
 #define SNAPPED 5e-4
 
@@ -63,7 +63,8 @@ static bool by_a_face_along(const struct solid *box, const double p[3], const do
     return along > 0.5;
 }
 
-/* The gap at a point of the manifold is the one that the two boxes have on the line along the normal through it. */
+/* The separation at a point of the manifold is the one that the two boxes have on the line along the normal through
+ * it. */
 START_TEST(points_are_on_both_surfaces)
 {
     struct random r = {UINT64_C(0x243F6A8885A308D3)};
@@ -102,11 +103,11 @@ END_TEST
 /* A vertex of one box faces the other where the line along the normal leaves, or enters, its own box there, and the
  * other by a face of that direction. */
 static bool faces(const struct solid *own, const struct solid *other, const double p[3], const double n[3], bool below,
-                  double *gap)
+                  double *separation)
 {
     double own0, own1, other0, other1;
     if (!line_in_box(own, p, n, &own0, &own1) || !line_in_box(other, p, n, &other0, &other1)) return false;
-    *gap = below ? other0 - own1 : own0 - other1;
+    *separation = below ? other0 - own1 : own0 - other1;
     return fabs(below ? own1 : own0) < 1e-6 && by_a_face_along(other, p, n, below ? other0 : other1);
 }
 
@@ -124,13 +125,13 @@ START_TEST(corners_in_reach_are_points)
         if (m.count == 0 || !is_edge_axis(m.cache)) continue;
         for (int vertex = 0; vertex < 16; ++vertex) {
             const struct solid *own = &pair[vertex / 8], *other = &pair[1 - vertex / 8];
-            double p[3], gap, nearest = HUGE_VAL;
+            double p[3], separation, nearest = HUGE_VAL;
             for (int k = 0; k < 3; ++k) {
                 p[k] = own->x[k];
                 for (int j = 0; j < 3; ++j) /* 1e-8 inside, so that rounding does not put it beside the box */
                     p[k] += own->R[3 * k + j] * own->size[j] * (vertex >> j & 1 ? 1 - 1e-8 : 1e-8 - 1);
             }
-            if (!faces(own, other, p, m.normal, own == &pair[0], &gap) || gap > limit - 1e-6) continue;
+            if (!faces(own, other, p, m.normal, own == &pair[0], &separation) || separation > limit - 1e-6) continue;
             ++corners;
             for (int i = 0; i < m.count; ++i) {
                 double d[3], along;
@@ -162,7 +163,7 @@ END_TEST
 
 int main(void)
 {
-    Suite *suite = suite_create("manifold facing");
+    Suite *suite = suite_create("manifold clip");
     TCase *tests = tcase_create("edges with faces beside them");
     tcase_add_test(tests, points_are_on_both_surfaces);
     tcase_add_test(tests, corners_in_reach_are_points);
