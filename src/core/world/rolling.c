@@ -27,7 +27,7 @@ static void keep_rolling(sadmm_world *world, const struct sadmm_contact_pair *pa
 static bool is_restored(const sadmm_world *world, const struct sadmm_contact_pair *pair)
 {
     return world->start.rows.constraint_count > 0 && pair->body_a >= 0 && pair->body_b >= 0 &&
-           joint_island_is_loose(world->joint_touch[world->joint_labels[pair->body_a]]);
+           joint_island_is_floating(world->joint_touch[world->joint_labels[pair->body_a]]);
 }
 
 static bool is_articulated(const sadmm_world *world, int32_t body)
