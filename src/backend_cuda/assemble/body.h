@@ -96,18 +96,25 @@ static __device__ __noinline__ struct cuda_articulation_body stiffened_body(cons
 }
 
 /* Force of joint j on the body at its side s. found: by the multipliers of the block direct solve, else by those that
- * the step starts with. */
+ * the step starts with. All that is asked of a constraint's rows is asked for together. */
 static __device__ __forceinline__ vec3 joint_force(const cuda_view &v, int32_t j, int s, bool found, double dt)
 {
     const int32_t first = v.joints.first[j], constraints = v.joints.joints[j].constraints;
     vec3 force = v3(0, 0, 0);
     for (int32_t c = first; c < first + constraints; ++c) {
         const int32_t count = v.raw.constraints[c].count;
-        for (int32_t r = 0; r < count; ++r) {
-            const size_t slot = (size_t)c * SADMM_MAX_ROWS + (size_t)r;
-            force = stiffening_add_row(force, v.joints.sources[slot].coordinate, v.raw.rows[slot].jacobian[s],
-                                       found ? v.joints.solution[slot] : v.raw.rows[slot].lambda, dt);
+        double jacobian[SADMM_MAX_ROWS][3], lambda[SADMM_MAX_ROWS];
+        int coordinate[SADMM_MAX_ROWS];
+#pragma unroll
+        for (int32_t r = 0; r < SADMM_MAX_ROWS; ++r) {
+            const size_t slot = (size_t)c * SADMM_MAX_ROWS + (size_t)(r < count ? r : 0);
+            coordinate[r] = v.joints.sources[slot].coordinate;
+            lambda[r] = found ? v.joints.solution[slot] : v.raw.rows[slot].lambda;
+            for (int k = 0; k < 3; ++k) jacobian[r][k] = v.raw.rows[slot].jacobian[s][k];
         }
+#pragma unroll
+        for (int32_t r = 0; r < SADMM_MAX_ROWS; ++r)
+            if (r < count) force = stiffening_add_row(force, coordinate[r], jacobian[r], lambda[r], dt);
     }
     return force;
 }

@@ -1,7 +1,7 @@
 /* Manifolds to contacts: world terms, and the last step's impulses by feature. Eight threads take a candidate, one a
- * point; the first one writes the pair as well. As if all were found halfway and stayed as they are; those that
- * roll, or were found elsewhere, are then made by a kernel of their own, since what they need would cost the others
- * registers. */
+ * point; the first one writes the pair as well. Few candidates are done with at once: a kernel more takes longer than
+ * what waits for the points that roll. Of many all are made as if they were found halfway and stayed as they are; those
+ * that roll, or were found elsewhere, are then made by a kernel of their own, and so is what slides over meshes. */
 #include "view.h"
 
 /* Time steps of this set and of the one before; fetched first, so that nothing waits for them later. */
@@ -134,25 +134,84 @@ static __device__ __forceinline__ void place_point(const Source &source, double 
     contact_emit_point(&source.a, &source.b, &motion, &source.point, point);
 }
 
-/* Point `lane` of candidate i as it is found halfway, and its pair into the new set by the first lane; place: pairs << 32 |
- * points before it. Points go out by the warp or by the lane, which the kernel knows. */
-template <class Source>
-static __device__ __forceinline__ struct sadmm_contact_point emit_point(const collision_view &v, const step_lengths &dt,
-                                                                        int64_t i, int32_t lane,
-                                                                        const emit_start &start, const Source &source,
-                                                                        uint64_t place)
+/* Point `lane` of candidate i as it is found halfway, and its pair into the new set by the first lane; at, first: the
+ * pair, and its first point. Points go out by the warp or by the lane, which the kernel knows. LISTS: candidates for
+ * emit_general are. */
+struct emitted {
+    struct sadmm_contact_point point;
+    double normal[3], friction; /* of the pair */
+};
+template <bool LISTS, class Source>
+static __device__ __forceinline__ emitted emit_halfway(const collision_view &v, const step_lengths &dt, int64_t i,
+                                                       int32_t lane, const emit_start &start, const Source &source,
+                                                       int32_t at, int32_t first)
 {
-    const double friction = friction_of(v, start.own, source);
+    emitted out;
+    out.friction = friction_of(v, start.own, source);
+    place_point(source, dt.now, out.normal, &out.point);
+    if (start.match >= 0)
+        contact_carry(&source.old, wide_at(v.before.points, 0), lane, out.normal, out.friction,
+                      step_ratio(dt.now, dt.before), &out.point);
+    if (lane > 0) return out;
+    if (LISTS && is_general(start, source, dt.now))
+        v.general[atomicAdd(v.candidate_count + COUNT_GENERAL, 1ull)] = (int32_t)i;
+    emit_pair(v, start, source, out.normal, out.friction, at, first);
+    return out;
+}
+
+/* ---- points that slide over a mesh ------------------------------------------------------------------------------ */
+
+/* Goes the point on from the old pair of its own triangle? */
+static __device__ __forceinline__ bool goes_on(const collision_view &v, int32_t match, int32_t lane, uint32_t feature)
+{
+    if (match < 0) return false;
+    const struct sadmm_contact_pair &old = v.before.pairs[match];
+    return contact_find_feature(v.before.points + old.first, old.count, feature, lane) >= 0;
+}
+
+/* A point in the new set goes on from other triangles' old pairs, where it is of a mesh and its own has none. By itself:
+ * others should not pay in registers. */
+static __device__ __noinline__ void carry_across(const collision_view &v, int64_t i, int32_t lane, vec3 normal,
+                                                 double friction, struct sadmm_contact_point *point)
+{
+    const struct candidate own = candidate_of(v, v.candidates[i]);
+    const struct sadmm_proxy &a = v.proxies[own.a], &b = v.proxies[own.b];
+    if (b.geometry.type != SADMM_SHAPE_MESH || goes_on(v, v.matches[i], lane, point->feature)) return;
+    const double along[3] = {normal.x, normal.y, normal.z};
+    const uint64_t shapes = ordered_key(own.a, own.b);
+    const int64_t count = v.before.counts->pairs, first = contact_lower_bound(v.before.pairs, 0, count, shapes, 0);
+    int64_t last = first;
+    while (last < count && contact_shapes(&v.before.pairs[last]) == shapes) ++last;
+    contact_carry_across(v.before.pairs, first, last, v.before.points, word_of_pair(a.revision, b.revision), lane,
+                         along, friction, step_ratio(step_of(v).dt, v.before.counts->dt), point);
+}
+
+/* ---- pairs that roll, or were found elsewhere than halfway -------------------------------------------------------- */
+
+/* Point `lane` of candidate i. By itself: others should not pay in registers. */
+static __device__ __noinline__ void emit_general(const collision_view &v, int64_t i, int32_t lane, int32_t at,
+                                                 int32_t first)
+{
+    const step_lengths dt = lengths_of(v);
+    const emit_start start = emit_start_of(v, i);
+    const emit_in_place source = emit_source_of(v, start, i, lane);
+    const struct sadmm_proxy *pa = &source.a, *pb = &source.b;
+    const struct sadmm_contact_pair *before = start.match >= 0 ? &source.old : nullptr;
+    const double friction = friction_of(v, start.own, source), ratio = step_ratio(dt.now, dt.before);
     double normal[3];
     struct sadmm_contact_point point;
-    place_point(source, dt.now, normal, &point);
-    if (start.match >= 0)
-        contact_carry(&source.old, wide_at(v.before.points, 0), lane, normal, friction,
-                      step_ratio(dt.now, dt.before), &point);
-    if (lane > 0) return point;
-    if (is_general(start, source, dt.now)) v.general[atomicAdd(v.candidate_count + COUNT_GENERAL, 1ull)] = (int32_t)i;
-    emit_pair(v, start, source, normal, friction, (int32_t)(place >> 32), (int32_t)(uint32_t)place);
-    return point;
+    if (is_midpoint(source.head.time_offset, dt.now)) {
+        place_point(source, dt.now, normal, &point);
+        if (contact_may_migrate(pa, pb, before, v.before.points, start.count))
+            migrate(v, pa, pb, before, dt, ordered_key(start.own.a, start.own.b), start.count, lane, first + lane,
+                    normal, &point);
+    } else {
+        contact_emit_turned(pa, pb, source.head.normal, source.head.time_offset, dt.now, &source.point, normal, &point);
+    }
+    if (before) contact_carry(before, wide_at(v.before.points, 0), lane, normal, friction, ratio, &point);
+    if (lane == 0) emit_pair(v, start, source, normal, friction, at, first);
+    store_wide(point, &v.after.points[first + lane]);
+    if (v.carries) carry_across(v, i, lane, v3_load(normal), friction, &v.after.points[first + lane]);
 }
 
 static __device__ __forceinline__ struct sadmm_contact_point *point_place(const collision_view &v, int32_t lane,
@@ -189,7 +248,8 @@ emit_kernel(const __grid_constant__ collision_view v)
     if (there && lane == 0) v.pair_of[i] = (int32_t)(place >> 32);
     struct sadmm_contact_point point, *to = nullptr;
     if (there && lane < start.count) {
-        point = emit_point(v, dt, i, lane, start, emit_source_of(v, start, i, lane), place);
+        const int32_t at = (int32_t)(place >> 32), before = (int32_t)(uint32_t)place;
+        point = emit_halfway<true>(v, dt, i, lane, start, emit_source_of(v, start, i, lane), at, before).point;
         to = point_place(v, lane, place);
     }
     store_of_warp(point, to, &shared.of[threadIdx.x / 32]);
@@ -204,6 +264,19 @@ static __device__ __forceinline__ uint64_t sum_sizes(uint32_t sizes)
 {
     const uint32_t any = (sizes | sizes >> 1 | sizes >> 2 | sizes >> 3) & 0x01010101u;
     return (uint64_t)(any * 0x01010101u >> 24) << 32 | sizes * 0x01010101u >> 24;
+}
+
+/* Point `lane` of candidate i, whatever it takes. */
+static __device__ __forceinline__ void emit_now(const collision_view &v, const step_lengths &dt, int64_t i,
+                                                int32_t lane, const emit_start &start, const emit_copy &source,
+                                                uint64_t place)
+{
+    const int32_t at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
+    if (is_general(start, source, dt.now)) return emit_general(v, i, lane, at, first);
+    const emitted out = emit_halfway<false>(v, dt, i, lane, start, source, at, first);
+    struct sadmm_contact_point *to = point_place(v, lane, place);
+    store_wide(out.point, to);
+    if (v.carries) carry_across(v, i, lane, v3_load(out.normal), out.friction, to);
 }
 
 struct emit_sums {
@@ -254,32 +327,10 @@ emit_few_kernel(const __grid_constant__ collision_view v)
         before += sum_sizes(i - k < SIZES_A_WORD ? word & ((UINT32_C(1) << 8 * (i - k)) - 1) : word);
     }
     if (lane == 0) v.pair_of[i] = (int32_t)(before >> 32);
-    if (has_point) store_wide(emit_point(v, dt, i, lane, start, source, before), point_place(v, lane, before));
+    if (has_point) emit_now(v, dt, i, lane, start, source, before);
 }
 
-/* ---- pairs that roll, or were found elsewhere than halfway -------------------------------------------------------- */
-
-static __device__ __forceinline__ void emit_general(const collision_view &v, const step_lengths &dt, int32_t lane,
-                                                  const emit_start &start, const emit_in_place &source, int32_t at,
-                                                  int32_t first)
-{
-    const struct sadmm_proxy *pa = &source.a, *pb = &source.b;
-    const struct sadmm_contact_pair *before = start.match >= 0 ? &source.old : nullptr;
-    const double friction = friction_of(v, start.own, source), ratio = step_ratio(dt.now, dt.before);
-    double normal[3];
-    struct sadmm_contact_point point;
-    if (is_midpoint(source.head.time_offset, dt.now)) {
-        place_point(source, dt.now, normal, &point);
-        if (contact_may_migrate(pa, pb, before, v.before.points, start.count))
-            migrate(v, pa, pb, before, dt, ordered_key(start.own.a, start.own.b), start.count, lane, first + lane,
-                    normal, &point);
-    } else {
-        contact_emit_turned(pa, pb, source.head.normal, source.head.time_offset, dt.now, &source.point, normal, &point);
-    }
-    if (before) contact_carry(before, wide_at(v.before.points, 0), lane, normal, friction, ratio, &point);
-    if (lane == 0) emit_pair(v, start, source, normal, friction, at, first);
-    store_wide(point, &v.after.points[first + lane]);
-}
+/* ---- the rest of many candidates: kernels of their own ------------------------------------------------------------ */
 
 static __global__ void __launch_bounds__(GENERAL_THREADS)
 emit_general_kernel(const __grid_constant__ collision_view v)
@@ -290,41 +341,20 @@ emit_general_kernel(const __grid_constant__ collision_view v)
     if (usable_candidates(v) == 0 || v.after.counts->points > v.point_capacity) return;
     for (int64_t j = thread; j < count * GENERAL_LANES; j += stride) {
         const int64_t i = v.general[j / GENERAL_LANES];
-        const step_lengths dt = lengths_of(v);
-        const emit_start start = emit_start_of(v, i);
-        const int32_t at = v.pair_of[i], first = v.after.pairs[at].first;
-        for (int32_t k = (int32_t)(j % GENERAL_LANES); k < start.count; k += GENERAL_LANES)
-            emit_general(v, dt, k, start, emit_source_of(v, start, i, k), at, first);
+        const int32_t at = v.pair_of[i], first = v.after.pairs[at].first, points = v.sizes[i];
+        for (int32_t k = (int32_t)(j % GENERAL_LANES); k < points; k += GENERAL_LANES) emit_general(v, i, k, at, first);
     }
 }
 
-/* ---- points that slide over a mesh: a kernel of its own where there are any ------------------------------------- */
-
-/* Goes the point on from the old pair of its own triangle? */
-static __device__ bool goes_on(const collision_view &v, int32_t match, int32_t lane, uint32_t feature)
-{
-    if (match < 0) return false;
-    const struct sadmm_contact_pair &old = v.before.pairs[match];
-    return contact_find_feature(v.before.points + old.first, old.count, feature, lane) >= 0;
-}
-
+/* Where there are meshes. */
 static __global__ void __launch_bounds__(COLLISION_THREADS) carry_kernel(const __grid_constant__ collision_view v)
 {
     pdl_wait_if(v.pdl);
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
     const int32_t lane = (int32_t)(thread % POINT_LANES);
     if (i >= usable_candidates(v) || lane >= v.sizes[i] || v.after.counts->points > v.point_capacity) return;
-    const struct candidate own = candidate_of(v, v.candidates[i]);
-    if (v.proxies[own.b].geometry.type != SADMM_SHAPE_MESH) return;
     const struct sadmm_contact_pair &pair = v.after.pairs[v.pair_of[i]];
-    struct sadmm_contact_point *point = &v.after.points[pair.first + lane];
-    if (goes_on(v, v.matches[i], lane, point->feature)) return;
-    const uint64_t shapes = ordered_key(own.a, own.b);
-    const int64_t count = v.before.counts->pairs, first = contact_lower_bound(v.before.pairs, 0, count, shapes, 0);
-    int64_t last = first;
-    while (last < count && contact_shapes(&v.before.pairs[last]) == shapes) ++last;
-    contact_carry_across(v.before.pairs, first, last, v.before.points, pair.revision, lane, pair.normal, pair.friction,
-                         step_ratio(step_of(v).dt, v.before.counts->dt), point);
+    carry_across(v, i, lane, v3_load(pair.normal), pair.friction, &v.after.points[pair.first + lane]);
 }
 
 void COLLISION(matching_kernels)(struct collision_kernels *kernels)

@@ -8,5 +8,4 @@ void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels)
     k->at_once = {at_once_kernel<NARROW_ONE, NARROW_PLAIN_AT_ONCE>, NARROW_THREADS, 0, "narrow phase"};
     k->at_once_first = {at_once_kernel<NARROW_FIRST, NARROW_PLAIN_AT_ONCE>, NARROW_THREADS, 0, "narrow phase"};
     k->at_once_again = {at_once_kernel<NARROW_AGAIN, NARROW_PLAIN_AT_ONCE>, NARROW_THREADS, 0, "narrow phase"};
-    k->listed = {listed_kernel<NARROW_ANY, NARROW_PLAIN_LISTED>, NARROW_THREADS, 0, "narrow phase of listed pairs"};
 }

@@ -191,34 +191,36 @@ static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_er
     if (v->mesh_count > 0)
         TRY(launch(c, one ? with->touch : first ? with->touch_first : with->touch_again, v->candidate_capacity, error));
     TRY(launch(c, one ? with->at_once : first ? with->at_once_first : with->at_once_again, candidates, error));
-    return launch(c, with->listed, v->candidate_capacity, error);
+    return v->hulls ? launch(c, with->listed, v->candidate_capacity, error) : SADMM_OK;
 }
 
 static sadmm_status emit_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
-    const int64_t lanes = (int64_t)v->candidate_capacity * POINT_LANES;
+    const int64_t lanes = (int64_t)v->candidate_capacity * POINT_LANES, general = GENERAL_BLOCKS * GENERAL_THREADS;
     size_t bytes = c->buffers[TEMP].capacity;
     if (ranked(c)) return launch(c, c->kernels.emit_few, lanes, error);
     c->kernel = "scan of the contacts";
     CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_capacity + 1, c->stream),
               c->kernel);
-    return launch(c, c->kernels.emit, lanes, error);
+    TRY(launch(c, c->kernels.emit, lanes, error));
+    return launch(c, c->kernels.emit_general,
+                  std::min<int64_t>((int64_t)v->candidate_capacity * GENERAL_LANES, general), error);
 }
 
-/* hits: what they change of the step; NULL: nothing. */
+/* hits: what they change of the step, between narrow phase and seams, and before points slide; NULL: nothing. */
 static sadmm_status make_contacts(struct sadmm_cuda_collision *c, const struct sadmm_cuda_hits *hits,
                                   struct sadmm_error *error)
 {
-    const struct collision_view *v = &c->view;
+    struct collision_view *v = &c->view;
+    v->hides = v->seams.first && !v->hulls && !hits;
+    v->carries = v->mesh_count > 0 && !hits && ranked(c);
     TRY(narrow_phase(c, error));
     if (hits) TRY(COLLISION(narrow_hits)(c, hits, error));
-    if (v->seams.first) TRY(launch(c, c->kernels.seams, v->candidate_capacity, error));
+    if (v->seams.first && !v->hides) TRY(launch(c, c->kernels.seams, v->candidate_capacity, error));
     TRY(emit_contacts(c, error));
-    TRY(launch(c, c->kernels.emit_general,
-               std::min<int64_t>((int64_t)v->candidate_capacity * GENERAL_LANES, GENERAL_BLOCKS * GENERAL_THREADS), error));
     if (hits) TRY(COLLISION(reopen_hits)(c, hits, error));
-    if (v->mesh_count == 0) return SADMM_OK;
+    if (v->mesh_count == 0 || v->carries) return SADMM_OK;
     return launch(c, c->kernels.carry, (int64_t)v->candidate_capacity * POINT_LANES, error);
 }
 

@@ -9,10 +9,11 @@
  *   hits     where they are planned: swept bodies hit each other, and the candidates are searched for again: hits.h
  *   narrow   the last step's pair (a hint or a search), manifold by candidate     a thread a candidate
  *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
- *   seams    where shapes have neighbours: manifolds that their union does not have  the same
+ *   seams    where shapes have neighbours: manifolds that their union does not have  the same (plain: by narrow itself)
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
- *   carry    where there are meshes: impulses from triangle to triangle            the same
+ *            (few candidates: with all that some need; many: kernels after it for points that roll, and for
+ *            impulses from triangle to triangle)
  *
  * In a step of several sub-steps the first one searches for candidates of the whole step (collision_reach); the others
  * go from `place`, which sees to it that these are enough, to `narrow` at once, and know the pair that a candidate goes
@@ -180,6 +181,8 @@ struct collision_view {
     double large;                                  /* radius from which a mover is large, m */
     int32_t body_count;                            /* slots */
     bool pdl;                                      /* kernels are launched with PDL (device/pdl.h) */
+    bool hides;                                    /* the narrow phase itself sees to seams */
+    bool carries;                                  /* what makes points also lets them slide over meshes */
     struct collision_grid *grid;                   /* of this step */
     int32_t *abort_code;                           /* not NULL and not 0: do nothing */
     const double *dt, *gravity;                    /* not NULL: of the step, in the place of step's (step_of) */
@@ -202,7 +205,7 @@ struct collision_view {
     uint64_t *mesh_pairs;                          /* first_candidate of pairs with a mesh, of which there may be as many as
                                                       candidates; as they come */
     double *touches;                               /* by candidate, of triangles and pairs that are fast: mesh_first_touch */
-    int32_t *listed;                               /* candidates that the narrow phase of hulls does by themselves */
+    int32_t *listed;                               /* candidates that the narrow phase does by themselves */
     struct gjk_walk *walks;                       /* as listed: what of each is done */
     uint64_t *found;                               /* candidates as they come, packed (candidate_of) */
     uint64_t *candidates;                          /* sorted */

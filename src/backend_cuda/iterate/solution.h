@@ -35,22 +35,33 @@ static __device__ __forceinline__ void move_body(const struct sadmm_rigid *body,
     spin_move_from(body, halfway, velocity, mean, kind != TRAPEZOID_OWN, dt, place, place + 3, place + 7);
 }
 
-/* Both places of a body that rests or moves by itself: one tumble is enough. */
+/* Once, for both places. */
+static __device__ __noinline__ quat turned_by(quat q, vec3 w, double dt) { return rigid_turn(q, w, dt); }
+
+/* Both places of a body that rests or moves by itself, as move_body finds them: one tumble is enough. */
 static __device__ __forceinline__ void move_body_both(const struct sadmm_rigid *body, const double halfway[4],
-                                                      const double velocity[6], double dt, const double gravity[3],
-                                                      double stays[PLACE], double own[PLACE])
+                                                      const double velocity[6], double dt, double stays[PLACE],
+                                                      double own[PLACE])
 {
-    move_body(body, halfway, velocity, dt, gravity, TRAPEZOID_OWN, own);
+    const vec3 x = v3_load(body->position);
+    const quat q = q_load(body->orientation), whole = turned_by(q, v3_load(velocity + 3), dt);
+    double correction[6], mean[6];
+    trapezoid_own(body->velocity, velocity, correction);
+    for (int k = 0; k < 6; ++k) {
+        mean[k] = velocity[k] - correction[k];
+        stays[7 + k] = own[7 + k] = velocity[k];
+    }
+    v3_store(rigid_move(x, v3_load(velocity), dt), stays);
+    v3_store(rigid_move(x, v3_load(mean), dt), own);
+    q_store(whole, stays + 3);
     if (rigid_is_isotropic(v3_load(body->inertia))) {
-        move_body(body, halfway, velocity, dt, gravity, TRAPEZOID_OFF, stays);
+        q_store(turned_by(q, v3_load(mean + 3), dt), own + 3);
         return;
     }
-    const struct rigid_spin end = {q_load(own + 3), v3_load(own + 10)},
-                            whole = spin_end_whole(body, velocity + 3, end, dt);
-    v3_store(rigid_move(v3_load(body->position), v3_load(velocity), dt), stays);
-    q_store(whole.orientation, stays + 3);
-    for (int k = 0; k < 3; ++k) stays[7 + k] = velocity[k];
-    v3_store(whole.angular, stays + 10);
+    const struct rigid_spin end = spin_end(body, q_load(halfway), velocity + 3, dt);
+    q_store(end.orientation, own + 3);
+    v3_store(end.angular, own + 10);
+    v3_store(spin_turned_whole(end, whole).angular, stays + 10);
 }
 
 static __device__ __forceinline__ void store_wrench(const double wrench[6], int32_t lane, double *out)

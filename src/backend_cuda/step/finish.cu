@@ -108,7 +108,7 @@ static __device__ __forceinline__ finish_move begin_move(const cuda_view &v, dou
     if (!m.live) return m;
     double velocity[6];
     load_end_velocity(v, m.body, velocity);
-    move_body_both(&m.before.body, halfway_of(v, m.body), velocity, dt, v.model.settings->gravity, m.stays, m.own);
+    move_body_both(&m.before.body, halfway_of(v, m.body), velocity, dt, m.stays, m.own);
     m.finite = finite_numbers(m.stays, PLACE) && finite_numbers(m.own, PLACE);
     return m;
 }

@@ -112,14 +112,19 @@ SADMM_INLINE struct rigid_spin spin_end(const struct sadmm_rigid *body, quat hal
 
 /* The same where the trapezoid correction is off (math/trapezoid.h): it has turned by that spin since the step began,
  * as its contacts assume. Its motion in its own frame is the one that ends at `end`, and so is its energy; but as it
- * did not turn like that before, its angular momentum turns with it, by dt times the correction. */
+ * did not turn like that before, its angular momentum turns with it, by dt times the correction. turned: by that
+ * spin. */
+SADMM_INLINE struct rigid_spin spin_turned_whole(struct rigid_spin end, quat turned)
+{
+    const vec3 own = m3_tmul(q_matrix(end.orientation), end.angular);
+    end.orientation = turned;
+    end.angular = m3_mul(q_matrix(end.orientation), own);
+    return end;
+}
 SADMM_INLINE struct rigid_spin spin_end_whole(const struct sadmm_rigid *body, const double spin[3],
                                               struct rigid_spin end, double dt)
 {
-    const vec3 own = m3_tmul(q_matrix(end.orientation), end.angular);
-    end.orientation = rigid_turn(q_load(body->orientation), v3_load(spin), dt);
-    end.angular = m3_mul(q_matrix(end.orientation), own);
-    return end;
+    return spin_turned_whole(end, rigid_turn(q_load(body->orientation), v3_load(spin), dt));
 }
 
 /* The pose and the velocity that the solution v leaves it with. mean: what it is moved by, and turned, where moments are

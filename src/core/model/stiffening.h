@@ -28,9 +28,9 @@
 #define STIFFENING_CHANGE 0.05
 
 /* A joint's force on a body with that of one more of its rows, of this coordinate. */
-SADMM_INLINE vec3 stiffening_add_row(vec3 force, int coordinate, const double jacobian[6], double lambda, double dt)
+SADMM_INLINE vec3 stiffening_add_row(vec3 force, int coordinate, const double along[3], double lambda, double dt)
 {
-    return coordinate < 3 ? v3_madd(force, lambda / dt, v3_load(jacobian)) : force;
+    return coordinate < 3 ? v3_madd(force, lambda / dt, v3_load(along)) : force;
 }
 
 /* K along a body's principal axes: xx, yy, zz, xy, xz, yz. force: along them, too; place: the arm. */
