@@ -9,6 +9,7 @@ enum { EMULATED = 0 };
 #include "bouncing.h"
 #include "collision/box_row.h"
 #include "collision/candidates.h"
+#include "collision/manifold.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "core/math/rigid.h"
@@ -981,6 +982,16 @@ static void throw_fast(sadmm_world *world)
     MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
 }
 
+/* Points of the last step's hits on what is static, or through a centre of mass. */
+static void count_hits(const sadmm_world *world, int *on_static, int *centred)
+{
+    for (size_t k = 0; k < world->start.hit_count; ++k) {
+        const struct sadmm_world_hit *hit = &world->start.hits[k];
+        *centred += hit->feature >= INNER_BALL_FEATURE;
+        for (int s = 0; s < 2; ++s) *on_static += hit->dynamic[s] < 0 && hit->driven[s] < 0;
+    }
+}
+
 /* What contacts and hits give bodies, kinematic ones as well: sums in another order. */
 static void expect_same_wrenches(sadmm_world *a, sadmm_world *b)
 {
@@ -1001,6 +1012,7 @@ START_TEST(host_and_device_agree)
         const int substeps = c == 1 || c == 5 ? 2 : 1;
         sadmm_world *worlds[2];
         size_t hits = 0;
+        int on_static = 0, centred = 0;
         for (int w = 0; w < 2; ++w) {
             sadmm_world *world = worlds[w] = new_world(_i, 0.02, 9.81);
             sadmm_settings settings = sadmm_world_settings(world);
@@ -1021,11 +1033,14 @@ START_TEST(host_and_device_agree)
             ck_assert_uint_eq(worlds[0]->start.hit_first, worlds[1]->start.hit_first);
             expect_same_wrenches(worlds[0], worlds[1]);
             hits += worlds[0]->start.hit_count;
+            count_hits(worlds[0], &on_static, &centred);
             if (c == 2) continue; /* one environment's after the other's */
             ck_assert(memcmp(worlds[0]->start.hits, worlds[1]->start.hits,
                              worlds[0]->start.hit_count * sizeof *worlds[0]->start.hits) == 0);
         }
         ck_assert_uint_gt(hits, c < 4 ? 2 * STEPS : 4);
+        ck_assert(c < 4 || on_static > 0);
+        ck_assert(c != 4 || centred > 0);
         for (int w = 0; w < 2; ++w) sadmm_world_destroy(worlds[w]);
     }
 }

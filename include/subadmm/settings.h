@@ -121,14 +121,13 @@ typedef struct sadmm_settings {
                                     along each coordinate, m/s or rad/s; in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
 
-    int hits;                    /* worlds: bodies in flight that hit something, faster than restitution_threshold and
-                                    with restitution (of either shape), or a body that moves so fast that they pass by
-                                    their own thickness in a step, do so at the moment of their first touch within the
-                                    (sub-)step, so many times each at most; one that would be hit more often is left to
-                                    the solve, and so is what rests on something, has joints, or hits a mesh
-                                    (docs/internals/algorithm.md, "Hits"; CUDA leaves more to it where there are very
-                                    many). In
-                                    [0, SADMM_MOST_HITS = 64]; 0: all is; default 16 */
+    int hits;                    /* worlds: the largest number of hits of a body within a (sub-)step that are solved at
+                                    their time of impact (continuous collision): of bodies in flight that are faster
+                                    than restitution_threshold with restitution of either shape, or so fast that they
+                                    would pass by their own thickness in a step. All other contacts are left to the
+                                    solve: more hits, bodies that rest on something or have joints, hits on a mesh
+                                    (docs/internals/algorithm.md, "Hits"), and on CUDA some more where there are very
+                                    many. In [0, SADMM_MOST_HITS = 64]; 0: none; default 16 */
 
     int threads;                 /* largest number of CPU threads, in [0, 1024]; 0 = no bound; default 0. The number
                                     used also depends on the size of the work, the number of processors (with 0:

@@ -135,6 +135,7 @@ static void touch_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
 /* The correction that the body takes, in place of its own. */
 static void choose_trapezoid(const struct sadmm_context *c, size_t i, struct sadmm_trapezoid *trapezoid)
 {
+    if (c->system->rigid[i].was_hit) return; /* as sadmm_find_trapezoids has it */
     trapezoid->kind = trapezoid_kind_of(atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
                                         atomic_load_explicit(&c->touch[i], memory_order_relaxed));
     switch (trapezoid->kind) {

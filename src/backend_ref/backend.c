@@ -115,6 +115,7 @@ static void touch(struct sadmm_context *c)
         body->touch = body->island_touch = 0;
         spin_before(&c->system->rigid[i], c->settings->dt, before);
         trapezoid_own(before, body->v, body->correction);
+        for (int k = 0; k < 3 && c->system->rigid[i].was_hit; ++k) body->correction[k] = 0;
     }
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
@@ -139,8 +140,9 @@ static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next,
     touch(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         const struct ref_body *from = &c->bodies[i];
-        const enum trapezoid_kind kind = trapezoid_kind_of(c->bodies[from->label].island_touch, from->touch);
         const struct sadmm_rigid *start = &c->system->rigid[i];
+        const enum trapezoid_kind kind =
+            start->was_hit ? TRAPEZOID_OWN : trapezoid_kind_of(c->bodies[from->label].island_touch, from->touch);
         double correction[6] = {0}, mean[6];
         if (kind == TRAPEZOID_SHARED) trapezoid_shared(c->settings->gravity, dt, correction);
         if (kind == TRAPEZOID_OWN) memcpy(correction, from->correction, sizeof correction);
@@ -149,6 +151,7 @@ static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next,
         spin_move(start, from->v, mean, kind != TRAPEZOID_OWN, dt, next[i].position, next[i].orientation,
                   next[i].velocity);
         rolling_forget(&next[i]);
+        next[i].was_hit = 0;
         next[i].mean = kind == TRAPEZOID_OWN;
     }
     return SADMM_OK;

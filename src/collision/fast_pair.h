@@ -13,22 +13,14 @@ SADMM_INLINE double pair_way(const struct sadmm_proxy *a, const struct sadmm_pro
            (both ? 0 : fall_of(gravity, dt));
 }
 
-/* The solve has such an impact with the way until then in the arms of the body that is harder to turn (contact_emit.h):
- * that lets the other one through unless it is so much lighter that the arms do not matter. */
-#define ARMS_MATTER 0.01
-/* And by the plane in which they touch: what turns by more than so many rad takes it away from what it hits. */
-#define TURNS_AWAY  0.3
-
-/* Might the solve let them through each other? way: pair_way. */
-SADMM_INLINE bool pair_passes(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double way, double dt)
+/* The solve has such an impact by the plane in which they touch, with the way until then in the arms of a dynamic body
+ * that is harder to turn (contact_emit.h), and iterations leave a share of it: what goes by its thickness in a step would
+ * get through. way: pair_way. */
+SADMM_INLINE bool pair_passes(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double way)
 {
-    const bool a_is_light = b->system_body < 0 || (a->system_body >= 0 && a->inertia < b->inertia);
-    const struct sadmm_proxy *light = a_is_light ? a : b, *heavy = a_is_light ? b : a;
-    if (!(way > smaller_of(a->thin, b->thin)) || light->system_body < 0 || !sadmm_body_moves(heavy->system_body))
-        return false;
-    const double size = length3(light->arm) + geometry_radius(&light->geometry);
-    return turning_rate(heavy->angular) * dt > TURNS_AWAY ||
-           (heavy->system_body >= 0 && way * way * light->inertia > ARMS_MATTER * size * size * heavy->inertia);
+    const double thin_a = sadmm_body_moves(a->system_body) ? a->thin : HUGE_VAL,
+                 thin_b = sadmm_body_moves(b->system_body) ? b->thin : HUGE_VAL;
+    return (a->system_body >= 0 || b->system_body >= 0) && way > smaller_of(thin_a, thin_b);
 }
 
 /* Are hits of the pair looked for? threshold: of restitution, m/s. */
@@ -37,7 +29,7 @@ SADMM_INLINE bool pair_is_fast(const struct sadmm_proxy *a, const struct sadmm_p
 {
     const double way = pair_way(a, b, gravity, dt);
     return way > threshold * dt &&
-           ((a->restitution > 0) | (b->restitution > 0) || pair_passes(a, b, way, dt));
+           ((a->restitution > 0) | (b->restitution > 0) || pair_passes(a, b, way));
 }
 
 #endif

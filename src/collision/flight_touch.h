@@ -19,11 +19,12 @@ extern "C" {
 /* A body's motion within a step: its centre of mass is at position + t velocity + t^2/2 acceleration, and it turns from
  * `orientation`, which it has at `at`, by the rate `turn`; `spin`: the angular velocity that impacts see. Where its moments
  * differ, by that as a body does that no torque acts on (math/rigid.h): `spin` is what it has at `at`, and `sway` what its
- * angular velocity differs from `turn` by at most. */
+ * angular velocity differs from `turn` by at most, `bend` what it changes by, rad/s^2. */
 struct sadmm_flight {
     double position[3], velocity[3], acceleration[3];
     double orientation[4], turn[3], spin[3];
-    double inertia[3], sway; /* 0: it turns by `turn` */
+    double inertia[3], sway, bend; /* 0: it turns by `turn` */
+    double rate;                   /* no faster than this, rad/s */
     double at, since;        /* s; before `since` the motion is another one */
 };
 

@@ -3,6 +3,7 @@
 #ifndef SADMM_COLLISION_FLIGHT_TOUCH_MATH_H
 #define SADMM_COLLISION_FLIGHT_TOUCH_MATH_H
 
+#include <float.h>
 #include <string.h>
 
 #include "core/math/array3.h"
@@ -11,7 +12,7 @@
 #include "pair_manifold.h"
 
 /* Most moves towards a touch; a pair that takes more is the solve's. */
-enum { TOUCH_MOVES = 128 };
+enum { TOUCH_MOVES = 256 };
 /* Nearer than this share of the thinner shape, points are followed. */
 #define TOUCH_NEAR        1e-3
 /* Points within this share of it touch together: what a rounded pose takes for a plane is one. */
@@ -138,6 +139,72 @@ SADMM_INLINE double touch_closing(const struct sadmm_swept_pair *p, const struct
            touch_turning(&at->b, p->b.flight, n);
 }
 
+/* ---- how long nothing comes through the plane between them --------------------------------------------------------- */
+
+/* What of a shape's points is round about others that it has, which are inspected in its place. */
+SADMM_INLINE double touch_round_of(const struct sadmm_geometry *g)
+{
+    return g->type == SADMM_SHAPE_SPHERE || g->type == SADMM_SHAPE_CAPSULE ? g->size[0] : 0;
+}
+
+/* How far a shape reaches from its body's centre of mass against `along` where its points move by `by` besides. */
+SADMM_CALLED double touch_lowest(const struct sadmm_swept_pair *p, const struct sadmm_swept_shape *s,
+                                 const struct placed_shape *at, vec3 along, vec3 by)
+{
+    const double round = touch_round_of(s->geometry);
+    const vec3 d = v3_add(along, by);
+    const mat3 R = {{v3_load(at->R), v3_load(at->R + 3), v3_load(at->R + 6)}};
+    const vec3 own = v3_scale(m3_tmul(R, d), -1 / v3_norm(d)),
+               x = m3_mul(R, v3_madd(geometry_farthest(s->geometry, p->hulls, own), -round, own)),
+               arm = v3_sub(v3_load(at->x), v3_load(at->body.position));
+    return v3_dot(d, v3_add(arm, x)) - round;
+}
+
+/* By what it turns by at that moment. */
+SADMM_INLINE vec3 touch_turned_by(const struct sadmm_swept_shape *s, const struct placed_shape *at, vec3 normal,
+                                  double t)
+{
+    const vec3 w = v3_load(s->flight->inertia[0] > 0 ? at->body.spin : s->flight->turn);
+    return v3_scale(v3_cross(normal, w), t);
+}
+
+/* How far ways of points that turn bend off a line, m/s^2. */
+SADMM_INLINE double touch_bending(const struct sadmm_swept_shape *s, const struct placed_shape *at)
+{
+    const double reach = at->reach - (s->geometry->type == SADMM_SHAPE_CAPSULE ? touch_round_of(s->geometry) : 0);
+    return reach * (s->flight->rate * s->flight->rate + s->flight->bend);
+}
+
+/* What is left between the two along the normal t seconds on, m, no more than it is. Concave in t: each point's height
+ * is a line less what its way bends. */
+SADMM_CALLED double touch_left_between(const struct sadmm_swept_pair *p, const struct touch_moment *at, double bends,
+                                       double t)
+{
+    const vec3 n = v3_load(at->normal), x = v3_sub(v3_load(at->b.body.position), v3_load(at->a.body.position)),
+               v = v3_sub(v3_load(at->b.body.velocity), v3_load(at->a.body.velocity)), back = v3_neg(n);
+    const double of_b = touch_lowest(p, &p->b, &at->b, n, touch_turned_by(&p->b, &at->b, n, t)),
+                 of_a = p->a.geometry->type == SADMM_SHAPE_PLANE
+                            ? v3_dot(back, v3_sub(v3_load(at->a.x), v3_load(at->a.body.position)))
+                            : touch_lowest(p, &p->a, &at->a, back, touch_turned_by(&p->a, &at->a, back, t));
+    return v3_dot(n, v3_madd(x, t, v)) + of_b + of_a - bends * t * t / 2;
+}
+
+/* How long they come no closer than `room` past the plane, s, at least, `most` at most. */
+SADMM_CALLED double touch_free_for(const struct sadmm_swept_pair *p, const struct touch_moment *at, double room,
+                                   double most)
+{
+    const vec3 acceleration = v3_sub(v3_load(p->b.flight->acceleration), v3_load(p->a.flight->acceleration));
+    const double bends = touch_bending(&p->a, &at->a) + touch_bending(&p->b, &at->b) +
+                         larger_of(-v3_dot(v3_load(at->normal), acceleration), 0),
+                 now = touch_left_between(p, at, bends, 0) + room;
+    if (!(now > 0)) return 0;
+    const double trial = bends * most * most > 2 * now ? sqrt(2 * now / bends) : most,
+                 then = touch_left_between(p, at, bends, trial) + room;
+    return then >= 0 ? trial : trial * now / (now - then);
+}
+
+/* ---- the touch ----------------------------------------------------------------------------------------------------- */
+
 SADMM_INLINE double touch_thinner(const struct sadmm_swept_pair *p)
 {
     return smaller_of(geometry_thickness(p->a.geometry), geometry_thickness(p->b.geometry));
@@ -157,6 +224,14 @@ SADMM_INLINE double touch_first_point(const struct sadmm_swept_pair *p, const st
     return first;
 }
 
+/* What a separation is off by. */
+SADMM_INLINE double touch_rounding(const struct touch_moment *at)
+{
+    double size = at->a.reach + at->b.reach;
+    for (int k = 0; k < 3; ++k) size += fabs(at->a.body.position[k]) + fabs(at->b.body.position[k]);
+    return 4 * DBL_EPSILON * size;
+}
+
 SADMM_INLINE void touch_keep(const struct touch_moment *at, double t, double together, struct sadmm_flight_touch *touch)
 {
     touch->time = t;
@@ -172,8 +247,7 @@ SADMM_INLINE void touch_keep(const struct touch_moment *at, double t, double tog
 /* How long the pair may go unseen where it is near, s. */
 SADMM_INLINE double touch_passed_at_once(const struct sadmm_swept_pair *p, double whole)
 {
-    const double rate = v3_norm(v3_load(p->a.flight->turn)) + p->a.flight->sway + v3_norm(v3_load(p->b.flight->turn)) +
-                        p->b.flight->sway;
+    const double rate = p->a.flight->rate + p->b.flight->rate;
     return rate * TOUCH_PASSED * whole > TOUCH_PASSED_TURN ? TOUCH_PASSED_TURN / rate : TOUCH_PASSED * whole;
 }
 
@@ -199,41 +273,72 @@ SADMM_INLINE bool touch_balls_meet(const struct sadmm_swept_pair *p, double from
     return length3(x) <= (1 + TOUCH_NEAR) * (reach + sags);
 }
 
-/* Of one subshape. */
-SADMM_RARE bool swept_touch_of(struct sadmm_swept_pair *p, double from, double to, struct sadmm_flight_touch *touch)
+/* A tumbling body's next look goes on from this one: it turns for long from where its flight has it. */
+SADMM_INLINE void touch_go_on_from(struct sadmm_flight *flight, const struct placed_shape *at, double t)
+{
+    if (!(flight->inertia[0] > 0)) return;
+    memcpy(flight->orientation, at->body.orientation, sizeof flight->orientation);
+    memcpy(flight->spin, at->body.spin, sizeof flight->spin);
+    flight->at = t;
+}
+
+/* flight: the pair's own, which are changed. */
+SADMM_RARE bool touch_find(struct sadmm_swept_pair *p, struct sadmm_flight flight[2], double from, double to,
+                           struct sadmm_flight_touch *touch)
 {
     const double thin = touch_thinner(p), passed = touch_passed_at_once(p, to - from);
     struct touch_moment at;
-    double t = from;
-    if (!touch_balls_meet(p, from, to)) return false;
+    double t = from, low = from; /* low: nothing that approaches fast is through by then */
     for (int move = 0; move < TOUCH_MOVES; ++move) {
         double separation = 0, next, most;
         touch_test(p, t, &at);
+        touch_go_on_from(&flight[0], &at.a, t);
+        touch_go_on_from(&flight[1], &at.b, t);
         most = touch_closing(p, &at, to - t);
         if (at.distance > TOUCH_NEAR * thin) {
             if (!(most > p->threshold)) return false;
-            t += at.distance / most;
+            low = t;
+            t += larger_of(at.distance / most, touch_free_for(p, &at, 0, to - t));
             if (!(t <= to)) return false;
             continue;
         }
         touch_test_closely(p, &at);
         most = touch_closing(p, &at, to - t); /* what touches has no distance to have a normal of */
         next = touch_first_point(p, &at, &separation);
-        if (next < HUGE_VAL &&
-            (fabs(separation) <= TOUCH_NONE * thin || (separation < 0 && t <= from) || (next != 0 && t + next == t))) {
+        if (next < HUGE_VAL && (fabs(separation) <= TOUCH_NONE * thin + touch_rounding(&at) || t + next == t ||
+                                (separation < 0 && t <= from) ||
+                                (separation < 0 && t + next <= low &&
+                                 smaller_of(-separation, (t - low) * most) <= TOUCH_NEAR * thin))) {
             touch_keep(&at, t, fabs(separation) + TOUCH_TOGETHER * thin, touch);
             return true;
         }
         if (next < HUGE_VAL && t + next <= to) {
-            t = larger_of(t + next, from);
+            /* it has begun to approach since it touched, slowly: where it is fast it is through already */
+            if (separation < 0) t = t + next > low ? t + next : (low + t) / 2;
+            else low = t, t += next;
             continue;
         }
         /* what is near parts, or is slow: on to where another point may touch */
         if (!(t < to) || !(most > p->threshold)) return false;
-        t = smaller_of(t + larger_of(at.distance / most, smaller_of(passed, TOUCH_PASSED_WAY * thin / most)), to);
+        low = t;
+        t = smaller_of(t + larger_of(at.distance / most, touch_free_for(p, &at, TOUCH_PASSED_WAY * thin, passed)), to);
     }
     p->lost = true;
     return false;
+}
+
+/* Of one subshape. */
+SADMM_CALLED bool swept_touch_of(struct sadmm_swept_pair *pair, double from, double to,
+                                 struct sadmm_flight_touch *touch)
+{
+    struct sadmm_flight flight[2] = {*pair->a.flight, *pair->b.flight};
+    struct sadmm_swept_pair own = *pair;
+    if (!touch_balls_meet(pair, from, to)) return false;
+    own.a.flight = &flight[0];
+    own.b.flight = &flight[1];
+    const bool found = touch_find(&own, flight, from, to, touch);
+    pair->lost = pair->lost || own.lost;
+    return found;
 }
 
 /* The earlier of the two. */

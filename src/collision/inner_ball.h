@@ -27,9 +27,6 @@
 #define INNER_ASKS_SIDE       0.5
 #define INNER_SINKS           0.05
 #define INNER_ROCKS           0.2
-/* Features of the two bodies' balls, and of a deepest point; no other has them. */
-#define INNER_BALL_FEATURE    0xfffffff0u
-#define INNER_DEEPEST_FEATURE 0xfffffff4u
 
 /* Is p's body one that the other's does not move much? Its mass goes by its inertia and size. */
 SADMM_INLINE bool inner_is_heavy(const struct sadmm_proxy *p, const struct sadmm_proxy *other)

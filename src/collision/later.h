@@ -43,20 +43,25 @@ SADMM_RARE const struct sadmm_proxy *proxy_at_later(const struct sadmm_proxy *p,
     return out;
 }
 
-/* Where points part (`opens`, m/s), a separation below 0 at the start is that at `since`, and none below 0 by then:
- * what it lacks is what forces and curvature add to the way. */
-#define SINCE_ROUNDING 1e-6
-SADMM_RARE void open_separation(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double since,
-                                const double normal[3], struct sadmm_contact_point *point)
+/* What gravity would be for it to add as much in what is left as it adds in the whole step: velocities are those of that
+ * one's start. */
+SADMM_INLINE double gravity_later(double gravity, double dt, double left)
+{
+    return gravity * (dt / left) * (dt / left);
+}
+
+/* Where points part, a separation below 0 at the start is none: it is how far they have come by since they were hit. */
+SADMM_RARE void open_separation(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
+                                struct sadmm_contact_point *point)
 {
     double opens = 0, across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0};
     int k;
-    if (!(point->separation < -SINCE_ROUNDING * smaller_of(a->thin, b->thin))) return;
+    if (!(point->separation < 0)) return;
     add_cross(normal, a->angular, 1, across_a);
     add_cross(normal, b->angular, 1, across_b);
     for (k = 0; k < 3; ++k) opens += normal[k] * (b->velocity[k] - a->velocity[k]);
     opens += dot3(across_b, point->arm_b) - dot3(across_a, point->arm_a);
-    if (opens > 0) point->separation = larger_of(point->separation + since * opens, DBL_MIN);
+    if (opens > 0) point->separation = DBL_MIN;
 }
 
 #endif

@@ -25,6 +25,10 @@
 
 enum { SADMM_MANIFOLD_POINTS = 8 };
 
+/* Features of the balls in two bodies, and of a deepest point (inner_ball.h); no other has them. */
+#define INNER_BALL_FEATURE    0xfffffff0u
+#define INNER_DEEPEST_FEATURE 0xfffffff4u
+
 struct manifold_point {
     vec3 position;   /* m, frame of b */
     real separation; /* m */

@@ -69,7 +69,7 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count];
         contact_emit_point(pa, pb, &motion, &m->points[i], point);
-        if (since > 0) open_separation(pa, pb, since, normal, point);
+        if (since > 0) open_separation(pa, pb, normal, point);
         const bool carried = before && contact_carry(before, old->points, i, rolling.normal, friction, ratio, point);
         if (!carried && beside.first < beside.last)
             contact_carry_across(old->pairs, beside.first, beside.last, old->points, pair->revision, i, rolling.normal,
@@ -168,13 +168,13 @@ static struct old_pairs find_beside(struct narrow_phase *n, uint64_t shapes)
 
 /* When a pair with a mesh that moves on first touches any triangle. */
 static double touch_any(const struct narrow_phase *n, const struct mesh *mesh, const struct sadmm_box3 *box,
-                        const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt)
+                        const struct sadmm_proxy *a, const struct sadmm_proxy *b, double gravity, double dt)
 {
     double first = HUGE_VAL;
     struct mesh_walk walk;
     mesh_walk_begin(mesh, box, &walk);
     for (int32_t triangle = mesh_walk_next(mesh, &walk); triangle >= 0; triangle = mesh_walk_next(mesh, &walk))
-        first = smaller_of(mesh_first_touch(a, b, n->input->hulls, (uint32_t)triangle, n->input->gravity, dt), first);
+        first = smaller_of(mesh_first_touch(a, b, n->input->hulls, (uint32_t)triangle, gravity, dt), first);
     return first;
 }
 
@@ -182,11 +182,11 @@ static double touch_any(const struct narrow_phase *n, const struct mesh *mesh, c
  * because all of find_manifold is inlined into it, and what keeps that. */
 __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uint32_t a, uint32_t b,
                                                      const struct sadmm_proxy *pa, const struct sadmm_proxy *pb,
-                                                     double since, double dt)
+                                                     double since, double gravity, double dt)
 {
     const struct sadmm_collision_input *input = n->input;
     const struct sadmm_proxy *whole_a = &n->candidates->proxies[a], *whole_b = &n->candidates->proxies[b];
-    struct pair_start start = pair_start_of(pa, pb, input->margin, input->gravity, dt);
+    struct pair_start start = pair_start_of(pa, pb, input->margin, gravity, dt);
     struct sadmm_box3 box;
     struct mesh_walk walk;
     struct mesh mesh;
@@ -195,8 +195,8 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
     mesh_reach(whole_a, whole_b, &n->candidates->boxes[a].box, input->margin, input->gravity, input->dt, input->dt,
                &box);
     if (start.moves_on) {
-        const double first = touch_any(n, &mesh, &box, pa, pb, dt);
-        mesh_start_at(pa, pb, first, input->margin, input->gravity, dt, &start);
+        const double first = touch_any(n, &mesh, &box, pa, pb, gravity, dt);
+        mesh_start_at(pa, pb, first, input->margin, gravity, dt, &start);
     }
     const struct old_pairs beside = find_beside(n, ordered_key(a, b));
     mesh_walk_begin(&mesh, &box, &walk);
@@ -208,8 +208,8 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
         triangle_manifold(&pa->geometry, &pb->geometry, input->hulls, (uint32_t)triangle, &start.pose,
                           (real)start.limit, cache, &m);
         m.time_offset = start.time_offset;
-        if (pair_asks_balls(pa, pb, input->hulls, (uint32_t)triangle, &start, input->gravity, dt, &m))
-            inner_balls_add(pa, pb, input->hulls, (uint32_t)triangle, cache != 0, start.touch, input->gravity, dt, &m);
+        if (pair_asks_balls(pa, pb, input->hulls, (uint32_t)triangle, &start, gravity, dt, &m))
+            inner_balls_add(pa, pb, input->hulls, (uint32_t)triangle, cache != 0, start.touch, gravity, dt, &m);
         m.time_offset += since;
         if (!keep_triangle(n, a, b, (uint32_t)triangle, &m, before, beside)) return false;
     }
@@ -220,18 +220,18 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
 __attribute__((noinline)) static bool find_later(struct narrow_phase *n, uint32_t a, uint32_t b, double since)
 {
     const struct sadmm_collision_input *input = n->input;
-    const double left = input->dt - since;
+    const double left = input->dt - since, gravity = gravity_later(input->gravity, input->dt, left);
     struct sadmm_proxy pa, pb;
     struct manifold m;
 
     begin_later(input, &n->candidates->proxies[a], since, &pa);
     begin_later(input, &n->candidates->proxies[b], since, &pb);
     const uint32_t subshapes = pair_subshapes(&pa.geometry, &pb.geometry);
-    if (subshapes == 0) return find_triangles(n, a, b, &pa, &pb, since, left);
+    if (subshapes == 0) return find_triangles(n, a, b, &pa, &pb, since, gravity, left);
     for (uint32_t subshape = 0; subshape < subshapes; ++subshape) {
         const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), subshape, &pa, &pb);
-        const struct pair_start start = pair_start_of(&pa, &pb, input->margin, input->gravity, left);
-        find_manifold(&pa, &pb, input->hulls, subshape, input->margin, input->gravity, left, &start,
+        const struct pair_start start = pair_start_of(&pa, &pb, input->margin, gravity, left);
+        find_manifold(&pa, &pb, input->hulls, subshape, input->margin, gravity, left, &start,
                       before ? contact_memory(before, &pa, &pb) : 0, &m);
         m.time_offset += since;
         if (!keep_triangle(n, a, b, subshape, &m, before, no_pairs)) return false;
@@ -249,7 +249,7 @@ static bool find_subshapes(struct narrow_phase *n, uint32_t a, uint32_t b)
     struct manifold m;
 
     if (since > 0) return find_later(n, a, b, since);
-    if (subshapes == 0) return find_triangles(n, a, b, pa, pb, 0, input->dt);
+    if (subshapes == 0) return find_triangles(n, a, b, pa, pb, 0, input->gravity, input->dt);
     for (uint32_t subshape = 0; subshape < subshapes; ++subshape) {
         const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), subshape, pa, pb);
         const struct pair_start start = pair_start_of(pa, pb, input->margin, input->gravity, input->dt);

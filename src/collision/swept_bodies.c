@@ -46,7 +46,7 @@ bool sadmm_collision_passes(const struct sadmm_collision *collision, const struc
 {
     const struct sadmm_proxy *a = &collision->candidates.proxies[key >> 32],
                              *b = &collision->candidates.proxies[key & UINT32_MAX];
-    return pair_passes(a, b, pair_way(a, b, input->gravity, input->dt), input->dt);
+    return pair_passes(a, b, pair_way(a, b, input->gravity, input->dt));
 }
 
 /* The longest way that any pair may go, and the least thickness of what moves: most worlds have no pair that is fast. */

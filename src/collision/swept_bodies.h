@@ -32,8 +32,8 @@ void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const
  * find_candidates. False: out of memory. */
 bool sadmm_collision_list_fast(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                                double threshold, bool bounces, struct sadmm_pair_list *list);
-/* Are they a dynamic body and one that moves that the solve might let through each other? Their way within the step is
- * longer than the thinner one is thick, and takes part in the impact, or the one that is harder to turn goes round. */
+/* Are they a dynamic body and another one that the solve might let through each other? Their way within the step is longer
+ * than what moves of them is thick. */
 bool sadmm_collision_passes(const struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                             uint64_t key);
 

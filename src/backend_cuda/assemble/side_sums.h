@@ -13,6 +13,8 @@
 /* Numbers of side_wrench: force and torque, then the force's size, and 1 where the pair anchors its island
  * (math/momentum.h), as a solve begins; ROW in all. */
 enum { SIDE_PUSH = 6, SIDE_ANCHORS };
+/* In place of that 1 where the pair rolls (sadmm_pair_rolls): the sums of fewer than 2^20 of them are less. */
+#define HOLDS_BY_ROLLING (1.0 / (1 << 20))
 /* Those of side_arms (device/view.h) are in this precision, and sums only where contacts have three rows: else C
  * depends on normals. */
 static_assert(sizeof(struct arm_sums) == SIDE_ARMS * sizeof(double), "numbers are taken one by one");
@@ -122,7 +124,8 @@ struct side_numbers {
 
 /* share: 1 / count. The response, which needs both sides, is stored by store_sides. */
 static __device__ __forceinline__ void store_side(const weight_view &weights, int32_t p, int32_t side, int32_t count,
-                                                  double share, bool first, bool anchors, const struct pair_sums *sums)
+                                                  double share, bool first, double anchors,
+                                                  const struct pair_sums *sums)
 {
     const double sign = side ? 1 : -1, *f = sums->force;
     const size_t at = (size_t)(2 * p + side);
@@ -183,7 +186,8 @@ static __device__ __forceinline__ void store_sides(const model_view &model, cons
     sum_pair<0, LOAD_SUMS>(contacts, sums);
     if (first && model.contact_rows == 3) sum_pair<LOAD_SUMS, ARM_END>(contacts, sums);
     if (first && model.contact_rows == 1) sum_pair<ARM_END, PAIR_SUMS>(contacts, sums);
-    const bool anchors = first && live && (rolls || pair_anchors(model, count, joined, friction, sums));
+    double anchors = first && live && rolls ? HOLDS_BY_ROLLING : 0;
+    if (first && live && !rolls) anchors = pair_anchors(model, count, joined, friction, sums);
 #pragma unroll
     for (int32_t side = 0; side < 2; ++side) {
         const int32_t body = side ? joined.body_b : joined.body_a;

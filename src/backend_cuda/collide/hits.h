@@ -125,10 +125,10 @@ static __device__ __forceinline__ uint64_t followed_mark(uint64_t epoch, int tim
     return epoch * TAKE_TIMES + (uint64_t)times;
 }
 
-/* Is the body followed no further? mark: followed_mark of the last time. */
+/* Is the body followed no further? What is not dynamic always is. mark: followed_mark of the last time. */
 static __device__ __forceinline__ bool gives_up(const hits_view &v, int32_t slot, uint64_t mark)
 {
-    return v.swept_bodies[slot].too_many || v.marks[slot].lost == mark;
+    return v.swept_bodies[slot].dynamic >= 0 && (v.swept_bodies[slot].too_many || v.marks[slot].lost == mark);
 }
 
 void COLLISION(hits_take_kernels)(struct hits_kernels *kernels);

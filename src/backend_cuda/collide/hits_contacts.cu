@@ -88,7 +88,7 @@ static __device__ __forceinline__ double since_of(const hits_view &v, const stru
  * of its triangles. They are neighbours in the list. */
 static __device__ __noinline__ void start_on_mesh(const hits_view &v, const struct collision_step &step,
                                                   const struct candidate &own, const struct sadmm_proxy *a,
-                                                  const struct sadmm_proxy *b, double left, struct pair_start *start)
+                                                  const struct sadmm_proxy *b, double gravity, double left, struct pair_start *start)
 {
     const uint64_t key = first_candidate(v.c, own.a, own.b);
     const int64_t count = usable_candidates(v.c);
@@ -96,23 +96,22 @@ static __device__ __noinline__ void start_on_mesh(const hits_view &v, const stru
     for (int64_t i = lower_bound(v.c.candidates, count, key);
          i < count && v.c.candidates[i] >> v.c.subshape_bits == key >> v.c.subshape_bits; ++i)
         least = smaller_of(
-            mesh_first_touch(a, b, v.c.hulls, candidate_of(v.c, v.c.candidates[i]).subshape, step.gravity, left),
-            least);
-    mesh_start_at(a, b, least, step.margin, step.gravity, left, start);
+            mesh_first_touch(a, b, v.c.hulls, candidate_of(v.c, v.c.candidates[i]).subshape, gravity, left), least);
+    mesh_start_at(a, b, least, step.margin, gravity, left, start);
 }
 
 static __device__ __noinline__ void find_on_mesh(const hits_view &v, const struct collision_step &step,
                                                  const struct candidate &own, const struct sadmm_proxy *a,
-                                                 const struct sadmm_proxy *b, double left, struct pair_start *start,
+                                                 const struct sadmm_proxy *b, double gravity, double left, struct pair_start *start,
                                                  uint32_t cache, struct manifold *m)
 {
-    if (start->moves_on) start_on_mesh(v, step, own, a, b, left, start);
+    if (start->moves_on) start_on_mesh(v, step, own, a, b, gravity, left, start);
     m->count = 0;
     m->cache = 0;
     triangle_manifold(&a->geometry, &b->geometry, v.c.hulls, own.subshape, &start->pose, (real)start->limit, cache, m);
     m->time_offset = start->time_offset;
-    if (pair_asks_balls(a, b, v.c.hulls, own.subshape, start, step.gravity, left, m))
-        inner_balls_add(a, b, v.c.hulls, own.subshape, cache != 0, start->touch, step.gravity, left, m);
+    if (pair_asks_balls(a, b, v.c.hulls, own.subshape, start, gravity, left, m))
+        inner_balls_add(a, b, v.c.hulls, own.subshape, cache != 0, start->touch, gravity, left, m);
 }
 
 /* As find_later on the host. */
@@ -126,23 +125,23 @@ static __global__ void __launch_bounds__(NARROW_THREADS) later_kernel(const __gr
     for (int64_t i = thread; i < found; i += stride) {
         const struct candidate own = candidate_of(v.c, v.c.candidates[i]);
         const struct sadmm_proxy *a = &v.c.proxies[own.a], *b = &v.c.proxies[own.b];
-        const double since = since_of(v, a, b), left = step.dt - since;
+        const double since = since_of(v, a, b), left = step.dt - since,
+                     gravity = gravity_later(step.gravity, step.dt, left);
         struct sadmm_proxy later_a, later_b;
         struct manifold m;
         if (!(since > 0)) continue;
         proxy_begin_later(a, v.since[a->body], since, step.dt, &later_a);
         proxy_begin_later(b, v.since[b->body], since, step.dt, &later_b);
-        struct pair_start start = pair_start_of(&later_a, &later_b, step.margin, step.gravity, left);
+        struct pair_start start = pair_start_of(&later_a, &later_b, step.margin, gravity, left);
         int64_t before = search_pair(v.c, own, count);
         uint32_t cache = 0;
         if (before >= 0 && contact_goes_on(&v.c.before.pairs[before], own.subshape, &later_a, &later_b))
             cache = contact_memory(&v.c.before.pairs[before], &later_a, &later_b);
         else before = -1;
         if (b->geometry.type == SADMM_SHAPE_MESH)
-            find_on_mesh(v, step, own, &later_a, &later_b, left, &start, cache, &m);
+            find_on_mesh(v, step, own, &later_a, &later_b, gravity, left, &start, cache, &m);
         else
-            find_manifold(&later_a, &later_b, v.c.hulls, own.subshape, step.margin, step.gravity, left, &start, cache,
-                          &m);
+            find_manifold(&later_a, &later_b, v.c.hulls, own.subshape, step.margin, gravity, left, &start, cache, &m);
         m.time_offset += since;
         store_manifold(v.c, i, m, before);
     }
@@ -179,7 +178,7 @@ static __device__ __noinline__ void emit_later(const hits_view &v, int64_t i, co
                                              found.features[k / FOUND_FEATURES].of[k % FOUND_FEATURES]};
         struct sadmm_contact_point *out = &v.c.after.points[first + k];
         contact_emit_point(pa, pb, &motion, &point, out);
-        open_separation(pa, pb, since, normal, out);
+        open_separation(pa, pb, normal, out);
         if (before) contact_carry(before, v.c.before.points, k, normal, friction, ratio, out);
     }
 }

@@ -153,7 +153,7 @@ static __device__ __forceinline__ void follow(const hits_view &v, const struct c
                                               const struct sadmm_proxy &a, const struct sadmm_proxy &b, uint64_t mark)
 {
     v.marks[a.body].followed = v.marks[b.body].followed = mark;
-    if (pair_passes(&a, &b, pair_way(&a, &b, step.gravity, step.dt), step.dt))
+    if (pair_passes(&a, &b, pair_way(&a, &b, step.gravity, step.dt)))
         v.marks[a.body].passes = v.marks[b.body].passes = mark;
 }
 
@@ -330,20 +330,20 @@ static __device__ bool record(const hits_view &v, const struct foreseen_hit &ite
     return true;
 }
 
-/* One thread: the hit happens, or would be one too many. */
-static __device__ __noinline__ void take_hit(const hits_view &v, struct take_shared *shared)
+/* One thread: the hit happens, or would be one too many; of what passes, one more through a centre of mass does. */
+static __device__ __noinline__ void take_hit(const hits_view &v, uint64_t mark, struct take_shared *shared)
 {
-    const struct foreseen_hit &item = shared->next;
+    struct foreseen_hit &item = shared->next;
     struct swept_body *const f[2] = {&v.swept_bodies[item.body[0]], &v.swept_bodies[item.body[1]]};
     const struct swept_body *const of[2] = {f[0], f[1]};
     struct sadmm_flight_pose pose[2];
     struct hit hit;
-    bool may = true;
+    bool may = true, last = false;
     shared->taken = 0;
     for (int side = 0; side < 2; ++side) {
         if (f[side]->hits < (uint32_t)v.step.most) continue;
-        f[side]->too_many = true;
-        may = false;
+        may = may && v.marks[item.body[side]].passes == mark && f[side]->hits == (uint32_t)v.step.most;
+        f[side]->too_many = last = true;
     }
     if (!may) {
         /* it does not hold; nor the next time, without one of them */
@@ -357,6 +357,7 @@ static __device__ __noinline__ void take_hit(const hits_view &v, struct take_sha
                                     (uint32_t)(item.key >> 32), (uint32_t)item.key, &a, &b);
     hit.restitution = larger_of(a.restitution, b.restitution);
     swept_bodies_hit(of, &item.touch, v.step.settings->restitution_threshold, pose, &hit);
+    if (last) swept_bodies_hit_centre(of, pose, &item.touch, &hit);
     hit_solve(&hit);
     if (!record(v, item, &hit, shared)) {
         shared->fails = true;
@@ -510,7 +511,7 @@ static __device__ void take_all(const hits_view &v, const struct taking_marks &m
         if (shared->item[0] < 0) return;
         if (threadIdx.x == 0) {
             shared->next = v.foreseen[shared->own.room_first + shared->item[0]];
-            take_hit(v, shared);
+            take_hit(v, marks.followed, shared);
         }
         __syncthreads();
         if (!shared->taken || shared->fails) continue;
@@ -528,8 +529,7 @@ static __device__ bool leave_out(const hits_view &v, uint64_t mark, struct take_
     __syncthreads();
     for (int32_t j = (int32_t)threadIdx.x; j < shared->own.body_count; j += TAKE_THREADS) {
         const int32_t slot = v.group_bodies[shared->own.body_first + j];
-        const struct swept_body &f = v.swept_bodies[slot];
-        if (f.dynamic < 0 || v.kinds[slot] == SADMM_SWEPT_NONE || !gives_up(v, slot, mark) ||
+        if (v.kinds[slot] == SADMM_SWEPT_NONE || !gives_up(v, slot, mark) ||
             v.marks[slot].passes == mark)
             continue;
         v.kinds[slot] = SADMM_SWEPT_NONE;
@@ -548,10 +548,7 @@ static __device__ __forceinline__ void write_back(const hits_view &v, int32_t sl
     double *velocity = v.step.velocity + 6 * (size_t)f.dynamic;
     struct sadmm_flight_pose pose;
     v.step.start[f.dynamic] = f.start;
-    for (int k = 0; k < 3; ++k) { /* it stays airborne: what contacts do not change is right from the start */
-        velocity[k] = f.start.velocity[k] + v.step.settings->dt * f.flight.acceleration[k];
-        velocity[3 + k] = f.flight.spin[k];
-    }
+    swept_body_end_velocity(&f, v.step.settings, velocity);
     flight_at(&f.flight, f.flight.since, &pose);
     memcpy(out->position, f.start.position, sizeof out->position);
     memcpy(out->velocity, f.start.velocity, sizeof out->velocity);

@@ -148,7 +148,7 @@ static __device__ __forceinline__ void note_fast(const collision_view &v, const 
                                                  const struct sadmm_proxy *a, const struct sadmm_proxy *b)
 {
     if (!(way > *v.threshold * step.dt)) return;
-    if (a->restitution > 0 || b->restitution > 0 || pair_passes(a, b, way, step.dt)) v.candidate_count[COUNT_FAST] = 1;
+    if (a->restitution > 0 || b->restitution > 0 || pair_passes(a, b, way)) v.candidate_count[COUNT_FAST] = 1;
 }
 
 /* What a kernel does for a candidate. */

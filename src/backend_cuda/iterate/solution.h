@@ -19,6 +19,19 @@ static __device__ __forceinline__ const double *halfway_of(const cuda_view &v, i
     return row_at(v.bodies.halfway, (size_t)i);
 }
 
+/* The trapezoid correction of a body: of one that was hit, its turning's alone (sadmm_rigid.was_hit). */
+static __device__ __forceinline__ enum trapezoid_kind body_trapezoid_kind(const struct sadmm_rigid *body, int island,
+                                                                          int own)
+{
+    return body->was_hit ? TRAPEZOID_OWN : trapezoid_kind_of(island, own);
+}
+static __device__ __forceinline__ void body_trapezoid(const struct sadmm_rigid *body, const double before[6],
+                                                      const double velocity[6], double correction[6])
+{
+    trapezoid_own(before, velocity, correction);
+    for (int k = 0; k < 3; ++k) correction[k] = body->was_hit ? 0 : correction[k];
+}
+
 /* Q: where a body for which `velocity` is solved gets to by that less its trapezoid correction (math/trapezoid.h):
  * position, orientation, and velocity at the end. halfway: its orientation then (spin.h); dt: the settings', fetched
  * early. */
@@ -30,7 +43,7 @@ static __device__ __forceinline__ void move_body(const struct sadmm_rigid *body,
     double correction[6] = {}, mean[6];
     if (kind == TRAPEZOID_SHARED) trapezoid_shared(gravity, dt, correction);
     /* turned by it only where moments are equal */
-    if (kind == TRAPEZOID_OWN) trapezoid_own(body->velocity, velocity, correction);
+    if (kind == TRAPEZOID_OWN) body_trapezoid(body, body->velocity, velocity, correction);
     for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - correction[k];
     spin_move_from(body, halfway, velocity, mean, kind != TRAPEZOID_OWN, dt, place, place + 3, place + 7);
 }

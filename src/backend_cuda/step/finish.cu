@@ -34,13 +34,12 @@ struct finish_shared {
 
 /* ---- bodies ---------------------------------------------------------------------------------------------------- */
 
-/* What its contacts say of a body; of its island where that is floating, so that what holds as a rule may not
- * (move.h). */
+/* What its contacts say of a body; of its island where that may not be as it is as a rule (move.h). */
 static __device__ __forceinline__ void report_touch(const island_view &islands, int32_t body, int32_t label,
-                                                    bool anchored, int touch)
+                                                    bool as_a_rule, int touch)
 {
-    add_touch(islands, body, label, anchored ? touch & TOUCH_OF_BODY : touch);
-    if (!anchored) islands.again[AGAIN] = 1;
+    add_touch(islands, body, label, as_a_rule ? touch & TOUCH_OF_BODY : touch);
+    if (!as_a_rule) islands.again[AGAIN] = 1;
     if (!(touch & TOUCH_SUPPORTED)) islands.again[AGAIN_UNPRESSED] = 1;
 }
 
@@ -70,12 +69,12 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     const int32_t label = touched ? v.graph.label[body] : 0;
     touching_begun begun = begin_touching(v, t.begin + t.lane, t.end);
     trapezoid_speeds own = {};
-    bool anchored = true;
+    bool as_a_rule = true;
     pdl_wait();
     pdl_trigger();
     if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
     if (touched) {
-        anchored = v.islands.info[label].anchored;
+        as_a_rule = v.islands.info[label].as_a_rule;
         own = load_trapezoid_speeds<true>(v, body);
     }
     contact_sums sums = sum_touching<true>(v, own, &begun);
@@ -83,7 +82,7 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     if (t.begin < t.end && v.model.wrenches) add_owed(v, body, t.lane, sums.wrench);
     if (t.begin < t.end && v.model.wrenches)
         add_wrench(sums.wrench, t.lane, v.step.substep, v.step.substeps, v.step.wrench + 6 * t.body);
-    if (touched && t.lane == 0) report_touch(v.islands, body, label, anchored, sums.touch);
+    if (touched && t.lane == 0) report_touch(v.islands, body, label, as_a_rule, sums.touch);
 }
 
 /* A body on its way: both places that there are as a rule. */
@@ -118,7 +117,7 @@ static __device__ __forceinline__ void end_move(const cuda_view &v, double dt, c
                                                 const struct finish_shared *shared)
 {
     const int touch = shared->touch[((int32_t)threadIdx.x - FINISH_SIDES) % FINISH_BODIES];
-    const bool keeps = trapezoid_kind_of(TOUCH_AS_A_RULE, touch) == TRAPEZOID_OFF;
+    const bool keeps = body_trapezoid_kind(&m.before.body, TOUCH_AS_A_RULE, touch) == TRAPEZOID_OFF;
     double place[PLACE];
     if (!m.live) return;
 #pragma unroll

@@ -198,11 +198,13 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
 static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
 {
     const int32_t label = v.graph.label[i];
-    const int island = v.islands.touch[label] | (v.islands.info[label].anchored ? TOUCH_AS_A_RULE : 0),
+    const int island = v.islands.touch[label] | (v.islands.info[label].as_a_rule ? TOUCH_AS_A_RULE : 0),
               own = v.islands.touch[i];
-    const enum trapezoid_kind kind = trapezoid_kind_of(island, own);
-    if (kind == TRAPEZOID_OWN) return; /* it was moved so: what more is known now can only turn the correction off */
+    if (trapezoid_kind_of(island, own) == TRAPEZOID_OWN) return; /* it was moved so: what more is known now can only
+                                                                    turn the correction off */
     const body_before before = fetch_body(v.step, i);
+    const enum trapezoid_kind kind = body_trapezoid_kind(&before.body, island, own);
+    if (kind == TRAPEZOID_OWN) return;
     const double dt = v.model.settings->dt;
     double velocity[6], place[PLACE];
     load_end_velocity(v, i, velocity);

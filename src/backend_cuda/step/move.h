@@ -68,6 +68,7 @@ static __device__ __forceinline__ void store_moved(const cuda_view &v, int32_t i
     for (int k = 0; k < 4; ++k) next.orientation[k] = place[3 + k];
     for (int k = 0; k < 6; ++k) next.velocity[k] = place[7 + k];
     rolling_forget(&next);
+    next.was_hit = 0;
     next.mean = mean;
     extrapolation_keep(&extrapolation, &before.body, &next, dt);
     store_first<offsetof(struct sadmm_rigid, owed)>(next, &v.step.after[i]); /* nothing is owed yet */

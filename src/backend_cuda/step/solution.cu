@@ -114,7 +114,7 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
         velocity[k] = (double)v.bodies.state[(size_t)i * ROW + (size_t)k];
         if (v.raw.system.support_motion) velocity[k] += v.raw.system.support_motion[6 * (size_t)i + (size_t)k];
     }
-    const enum trapezoid_kind kind = trapezoid_kind_of(island, own);
+    const enum trapezoid_kind kind = body_trapezoid_kind(&v.raw.system.rigid[i], island, own);
     move_body(&v.raw.system.rigid[i], halfway_of(v, i), velocity, v.model.settings->dt, v.model.settings->gravity, kind,
               out);
     out[PLACE] = kind == TRAPEZOID_OWN;
@@ -145,6 +145,7 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
         memcpy(next[i].orientation, from + 3, sizeof next[i].orientation);
         memcpy(next[i].velocity, from + 7, sizeof next[i].velocity);
         rolling_forget(&next[i]);
+        next[i].was_hit = 0;
         next[i].mean = from[PLACE] != 0;
     }
     return SADMM_OK;

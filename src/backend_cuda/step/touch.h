@@ -31,7 +31,7 @@ static __device__ __forceinline__ trapezoid_body load_trapezoid_body(const cuda_
         out.velocity[k] = (double)velocity[k];
         if (supported) out.velocity[k] += v.raw.system.support_motion[6 * (size_t)body + (size_t)k];
     }
-    trapezoid_own(before, out.velocity, out.correction);
+    body_trapezoid(rigid, before, out.velocity, out.correction);
     return out;
 }
 

@@ -53,16 +53,16 @@ static __device__ __noinline__ bool static_pair_anchors(const raw_view &raw, con
 static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const body_thread &t, double C[PACKED])
 {
     arm_sums sums = {};
-    bool anchors = t.begin == t.end; /* nothing touches it */
+    bool anchors = t.begin == t.end, rolls = false; /* nothing touches it */
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t record = v.graph.incident[at] / 2, side = v.graph.incident[at] & 1;
         if (record < v.contacts.pair_capacity) {
             const struct sadmm_contact_pair *pair = wide_at(v.raw.pairs, (size_t)record);
             add_pair(v.model, v.raw, pair, side, &sums, C);
-            if (!anchors && v.islands.info)
-                anchors = (side ? pair->body_a : pair->body_b) < 0 ? static_pair_anchors(v.raw, pair, side)
-                                                                   : sadmm_pair_rolls(pair, &v.raw.points[pair->first]);
+            if (anchors || !v.islands.info) continue;
+            if ((side ? pair->body_a : pair->body_b) < 0) anchors = static_pair_anchors(v.raw, pair, side);
+            else rolls = rolls || sadmm_pair_rolls(pair, &v.raw.points[pair->first]);
         } else {
             add_rows(v.rows, record - v.contacts.pair_capacity, side, C);
             anchors = true; /* left alone */
@@ -70,7 +70,8 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
             if (v.push.bits) v.push.bits[v.graph.label[t.body]] = PUSH_ROWS;
         }
     }
-    if (t.live && anchors && v.islands.info) v.islands.info[v.graph.label[t.body]].anchored = 1;
+    if (t.live && (anchors || rolls) && v.islands.info) v.islands.info[v.graph.label[t.body]].anchored = 1;
+    if (t.live && anchors && v.islands.info) v.islands.info[v.graph.label[t.body]].as_a_rule = 1;
     if (v.model.contact_rows == 1 || v.rows.count > 0) sum_lanes<PACKED>(C);
     sum_lanes<sizeof sums / sizeof(double)>(&sums.count);
     add_arm_sums(C, &sums);

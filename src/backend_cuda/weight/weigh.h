@@ -39,7 +39,8 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
     static_assert(sizeof(struct weight_sums) == TERMS * sizeof(double), "a term for each");
     const struct weight_sums sums = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5]};
     /* while there are no scales, the terms of these are others */
-    const cuda_island fresh = {weight_new_island(), 0, 1, !SCALES && sum[TERM_ANCHORED] > 0, 0, 0};
+    const cuda_island fresh = {weight_new_island(), 0, 1, !SCALES && sum[TERM_ANCHORED] > 0, 0, 0,
+                               !SCALES && sum[TERM_ANCHORED] >= 1};
     if (args.start) *island = fresh;
     weight_update_speed(&island->weights, &sums, args.warm, args.factor);
     if (!SCALES || island->rows) return;

@@ -10,6 +10,7 @@
 #include "collision/bounds.h"
 #include "collision/flight_touch.h"
 #include "collision/geometry.h"
+#include "collision/manifold.h"
 #include "core/math/hit.h"
 #include "core/math/rigid.h"
 #include "core/model/forces.h"
@@ -71,18 +72,20 @@ SADMM_INLINE void swept_body_turn_evenly(struct sadmm_flight *flight, quat q, ve
     q_store(q, flight->orientation);
     v3_store(after, flight->spin);
     v3_store(v3_sub(after, v3_scale(v3_sub(after, before), 0.5)), flight->turn);
+    flight->rate = length3(flight->turn);
     flight->at = at;
 }
 
-/* The most by which a body's angular velocity differs from that halfway: it changes by ((I_y - I_z) / I_x w_y w_z, ...)
- * in the body's frame, w no larger than rigid_rate2 says. */
-SADMM_INLINE double swept_body_sway(vec3 inertia, struct rigid_spin halfway, double dt)
+/* How fast it turns at most, and how fast that changes: by ((I_y - I_z) / I_x w_y w_z, ...) in the body's frame, w no
+ * larger than rigid_rate2 says. */
+SADMM_INLINE void swept_body_bound_turn(struct sadmm_flight *flight, vec3 inertia, struct rigid_spin halfway, double dt)
 {
     const vec3 w = m3_tmul(q_matrix(halfway.orientation), halfway.angular),
                share = v3((inertia.y - inertia.z) / inertia.x, (inertia.z - inertia.x) / inertia.y,
                           (inertia.x - inertia.y) / inertia.z);
-    const double rate2 = rigid_rate2(inertia, w);
-    return min_of(dt / 2 * v3_max_abs(share) * rate2, 2 * sqrt(rate2));
+    flight->rate = sqrt(rigid_rate2(inertia, w));
+    flight->bend = v3_max_abs(share) * flight->rate * flight->rate;
+    flight->sway = min_of(dt / 2 * flight->bend, 2 * flight->rate);
 }
 
 /* Of others: as the step turns it about the middle (core/model/spin.h). */
@@ -93,7 +96,7 @@ SADMM_INLINE void swept_body_turn_freely(struct sadmm_flight *flight, vec3 inert
     v3_store(halfway.angular, flight->spin);
     v3_store(halfway.angular, flight->turn);
     v3_store(inertia, flight->inertia);
-    flight->sway = swept_body_sway(inertia, halfway, dt);
+    swept_body_bound_turn(flight, inertia, halfway, dt);
     flight->at = dt / 2;
 }
 
@@ -142,6 +145,7 @@ SADMM_CALLED void swept_body_begin(struct swept_body *f, const struct sadmm_sett
     memcpy(flight->velocity, f->start.velocity, sizeof flight->velocity);
     memcpy(flight->turn, f->start.velocity + 3, sizeof flight->turn);
     memcpy(flight->spin, f->start.velocity + 3, sizeof flight->spin);
+    flight->rate = length3(flight->turn);
     if (f->dynamic < 0) return;
     swept_body_accelerate(&f->start, settings, flight->acceleration);
     swept_body_turn_from_start(f, settings->dt);
@@ -160,24 +164,27 @@ SADMM_CALLED void swept_body_leave(struct swept_body *f, const struct sadmm_sett
     for (j = 0; j < 3; ++j) gained[j] = dt * gained[j] - (k - 1) * start->velocity[j];
     v3_store(v3_scale(v3_madd(linear, -s, v3_load(gained)), 1 / share), start->velocity);
     swept_body_accelerate(start, settings, f->flight.acceleration);
-    for (j = 0; j < 3; ++j)
-        start->position[j] = pose->position[j] - t * (start->velocity[j] + t / 2 * f->flight.acceleration[j]);
+    for (j = 0; j < 3; ++j) {
+        f->flight.position[j] = pose->position[j] - t * (start->velocity[j] + t / 2 * f->flight.acceleration[j]);
+        start->position[j] = f->flight.position[j] - dt * dt / 2 * f->flight.acceleration[j];
+    }
+    start->was_hit = 1;
     swept_body_turn_from_hit(f, dt, t, hit);
-    memcpy(f->flight.position, start->position, sizeof f->flight.position);
     memcpy(f->flight.velocity, start->velocity, sizeof f->flight.velocity);
     f->flight.since = t;
 }
 
-/* Its start is another place. */
-SADMM_INLINE void swept_body_move_start(struct swept_body *f, vec3 way)
+/* What the step gives it by the time it ends: it stays airborne, and what contacts do not change is right from the
+ * start. */
+SADMM_INLINE void swept_body_end_velocity(const struct swept_body *f, const struct sadmm_settings *settings,
+                                          double velocity[6])
 {
-    double by[3];
+    double gained[3];
     int k;
-    if (f->dynamic < 0) return;
-    v3_store(way, by);
+    swept_body_accelerate(&f->start, settings, gained);
     for (k = 0; k < 3; ++k) {
-        f->start.position[k] += by[k];
-        f->flight.position[k] += by[k];
+        velocity[k] = f->start.velocity[k] + settings->dt * gained[k];
+        velocity[3 + k] = f->flight.spin[k];
     }
 }
 
@@ -237,22 +244,64 @@ SADMM_INLINE void swept_bodies_hit(const struct swept_body *const f[2], const st
     }
 }
 
-/* What the hit leaves together and forces press on each other stays together: their ways would part and overlap again
- * by what falls within the step. Apart by `along` at the start, along the normal. */
-SADMM_INLINE double swept_bodies_overlap_of_held(const struct sadmm_flight *a, const struct sadmm_flight *b,
-                                                 double time, double dt, const struct hit *hit, const vec3 linear[2],
-                                                 const vec3 spin[2])
+/* In place of where they touch, the body that is easier to turn through its centre of mass: however they turn on, that
+ * comes no nearer. hit: swept_bodies_hit's. */
+SADMM_INLINE void swept_bodies_hit_centre(const struct swept_body *const f[2], const struct sadmm_flight_pose pose[2],
+                                          struct sadmm_flight_touch *touch, struct hit *hit)
+{
+    const bool of_b = f[0]->dynamic < 0 || (f[1]->dynamic >= 0 && v3_max_abs(v3_load(f[1]->start.inertia)) <
+                                                                      v3_max_abs(v3_load(f[0]->start.inertia)));
+    int side;
+    touch->count = hit->count = 1;
+    touch->feature[0] = INNER_BALL_FEATURE + of_b;
+    memcpy(touch->point[0], pose[of_b].position, sizeof touch->point[0]);
+    hit->friction = hit->restitution = 0;
+    for (side = 0; side < 2; ++side)
+        hit->arm[side][0] = v3_sub(v3_load(pose[of_b].position), v3_load(pose[side].position));
+}
+
+/* What the hit leaves together and forces press on each other: how fast the points part that part least, m/s, and how much
+ * faster each second they come together again, within the step. */
+#define SWEPT_HELD_TURNS 0.25 /* rad: what turns on by more touches elsewhere */
+struct swept_bodies_held {
+    double parts, falls; /* falls: 0: they are not held */
+};
+
+SADMM_INLINE struct swept_bodies_held swept_bodies_held_by(const struct sadmm_flight *a, const struct sadmm_flight *b,
+                                                           double time, double dt, const struct hit *hit,
+                                                           const vec3 linear[2], const vec3 spin[2])
 {
     const double left = dt - time,
                  falls = -v3_dot(hit->frame.r[0], v3_sub(v3_load(b->acceleration), v3_load(a->acceleration)));
-    double parts = HUGE_VAL;
+    struct swept_bodies_held held = {HUGE_VAL, 0};
     int k;
     for (k = 0; k < hit->count; ++k) {
         const vec3 at_a = v3_add(linear[0], v3_cross(spin[0], hit->arm[0][k])),
                    at_b = v3_add(linear[1], v3_cross(spin[1], hit->arm[1][k]));
-        parts = min_of(parts, v3_dot(hit->frame.r[0], v3_sub(at_b, at_a)));
+        held.parts = min_of(held.parts, v3_dot(hit->frame.r[0], v3_sub(at_b, at_a)));
     }
-    return falls > 0 && parts < falls * left ? max_of(parts, 0.0) * time + falls * time * time / 2 : 0;
+    held.parts = max_of(held.parts, 0.0);
+    if (falls > 0 && 2 * held.parts < falls * left &&
+        (v3_norm(spin[0]) + v3_norm(spin[1])) * left < SWEPT_HELD_TURNS)
+        held.falls = falls;
+    return held;
+}
+
+/* They stay together: they begin the step at a separation of 0, and move on without what presses them. `along`: the
+ * normal, times the body's share. */
+SADMM_INLINE void swept_body_hold(struct swept_body *f, struct swept_bodies_held held, double t, double dt, vec3 along)
+{
+    const double apart = held.falls * (dt * dt - t * t) / 2 - t * held.parts;
+    double way[3];
+    int k;
+    v3_store(along, way);
+    for (k = 0; k < 3; ++k) {
+        const double kept = held.falls * way[k];
+        f->start.position[k] -= apart * way[k];
+        f->flight.acceleration[k] += kept;
+        f->flight.velocity[k] -= t * kept;
+        f->flight.position[k] += t * t / 2 * kept;
+    }
 }
 
 /* Both go on from the hit, which is solved. */
@@ -262,16 +311,16 @@ SADMM_INLINE void swept_bodies_part(struct swept_body *const f[2], const struct 
     vec3 linear[2], spin[2];
     int side;
     for (side = 0; side < 2; ++side) hit_apply(hit, side, &linear[side], &spin[side]);
-    const double overlap =
-                     swept_bodies_overlap_of_held(&f[0]->flight, &f[1]->flight, time, settings->dt, hit, linear, spin),
-                 mass = hit->body[0].inverse_mass + hit->body[1].inverse_mass;
+    const struct swept_bodies_held held =
+        swept_bodies_held_by(&f[0]->flight, &f[1]->flight, time, settings->dt, hit, linear, spin);
+    const double mass = hit->body[0].inverse_mass + hit->body[1].inverse_mass;
     for (side = 0; side < 2; ++side) {
         if (f[side]->dynamic < 0) continue;
         ++f[side]->hits;
         swept_body_leave(f[side], settings, time, &pose[side], linear[side], spin[side]);
-        swept_body_move_start(f[side],
-                              v3_scale(hit->frame.r[0],
-                                       (side ? 1 : -1) * overlap * hit->body[side].inverse_mass / mass));
+        if (held.falls > 0)
+            swept_body_hold(f[side], held, time, settings->dt,
+                            v3_scale(hit->frame.r[0], (side ? 1 : -1) * hit->body[side].inverse_mass / mass));
     }
 }
 

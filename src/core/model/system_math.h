@@ -253,7 +253,8 @@ SADMM_RARE double sadmm_impact_e(const struct sadmm_system *system, const struct
         hits += 1;
         for (int side = 0; side < 2; ++side) middle[side] = v3_add(middle[side], arm[side]);
     }
-    if (hits > 0 && pair->friction > 0) {
+    if (hits == 0) return e; /* no impact: what parted falls back as far as its separation lets it */
+    if (pair->friction > 0) {
         for (int side = 0; side < 2; ++side) middle[side] = v3_scale(middle[side], 1 / hits);
         restitution = sadmm_impact_restitution(body, pair, middle);
     }

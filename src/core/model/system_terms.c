@@ -54,6 +54,7 @@ void sadmm_find_trapezoids(size_t count, const struct sadmm_rigid *bodies, const
         struct sadmm_trapezoid *out = &trapezoids[i];
         trapezoid_own(bodies[i].velocity, velocity + 6 * i, out->correction);
         for (int k = 0; k < 3; ++k) out->correction[3 + k] = (velocity[6 * i + 3 + (size_t)k] - out->spin[k]) / 2;
+        for (int k = 0; k < 3 && bodies[i].was_hit; ++k) out->correction[k] = 0;
         out->kind = TRAPEZOID_OWN;
         out->linear = size3(out->correction);
         out->angular = size3(out->correction + 3);
@@ -75,6 +76,7 @@ static void advance(const struct sadmm_rigid *body, const double velocity[6], co
     spin_move_from(body, trapezoid->halfway, velocity, mean, trapezoid->kind != TRAPEZOID_OWN, dt, next->position,
                    next->orientation, next->velocity);
     rolling_forget(next);
+    next->was_hit = 0;
     next->mean = trapezoid->kind == TRAPEZOID_OWN;
 }
 

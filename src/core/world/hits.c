@@ -7,12 +7,13 @@
  * what the two come near from then on is searched for again. A body is then given the start from which it would be
  * where it is, with the velocity that it has:
  *
- *     x~ = x(t) - t v~ - t^2/2 a,      v~ = v(t)+ - t a
+ *     x~ = x(t) - t v~ - (t^2 + dt^2)/2 a,      v~ = v(t)+ - t a
  *
- * and what follows, contact finding, solve and motion, sees an ordinary state; a pair's motion begins at the last hit of
- * either (`since`, collision.h). What rests on something, or has joints, is left to the solve, and so is, from the
- * sub-step's start, what would be hit more often than settings.hits times in it; what passes, which would go through
- * then, is from its last hit on.
+ * and what follows, contact finding, solve and motion, sees an ordinary state: it moves by dt times the velocity that it
+ * ends with, as contacts' separations have it, and has no trapezoid correction (`was_hit`, core/model/system.h); a
+ * pair's motion begins at the last hit of either (`since`, collision.h). What rests on something, or has joints, is
+ * left to the solve, and so is, from the sub-step's start, what would be hit more often than settings.hits times in it;
+ * what passes, which would go through then, is hit through its centre of mass once more, and is the solve's from there.
  *
  * Order: by time, then by the pair's slots: results do not depend on threads. */
 #include <string.h>
@@ -115,8 +116,11 @@ static struct sadmm_swept_shape shape_of(const struct taking *t, uint32_t slot, 
     return out;
 }
 
-/* The body is followed no further. */
-static void give_up(struct swept_body *f) { *(f->passes ? &f->ended : &f->too_many) = true; }
+/* The body is followed no further. What is not dynamic always is. */
+static void give_up(struct swept_body *f)
+{
+    if (f->dynamic >= 0) *(f->passes ? &f->ended : &f->too_many) = true;
+}
 
 /* When do two shapes hit each other, from `from` on? False: out of memory. */
 static bool foresee(struct taking *t, uint64_t key, double from)
@@ -209,7 +213,8 @@ static bool record(struct taking *t, const struct foreseen *item, const struct h
     return true;
 }
 
-static bool take_hit(struct taking *t, const struct foreseen item)
+/* last: neither is followed any further. */
+static bool take_hit(struct taking *t, struct foreseen item, bool last)
 {
     struct swept_body *f[2] = {&t->hits->list[item.swept_body[0]], &t->hits->list[item.swept_body[1]]};
     const struct swept_body *const of[2] = {f[0], f[1]};
@@ -219,6 +224,7 @@ static bool take_hit(struct taking *t, const struct foreseen item)
     memset(&hit, 0, sizeof hit);
     sadmm_collision_pair_law(t->world->collision, &t->input, item.key, &hit.friction, &hit.restitution);
     swept_bodies_hit(of, &item.touch, t->settings.restitution_threshold, pose, &hit);
+    if (last) swept_bodies_hit_centre(of, pose, &item.touch, &hit);
     hit_solve(&hit);
     if (!record(t, &item, &hit)) return false;
     swept_bodies_part(f, &t->settings, item.touch.time, pose, &hit);
@@ -290,10 +296,7 @@ static void write_back(struct taking *t)
         struct sadmm_collision_body *out = &world->collision_bodies[f->slot];
         any = true;
         world->start.rigid[f->dynamic] = f->start;
-        for (int k = 0; k < 3; ++k) { /* it stays airborne: what contacts do not change is right from the start */
-            velocity[k] = f->start.velocity[k] + t->settings.dt * f->flight.acceleration[k];
-            velocity[3 + k] = f->flight.spin[k];
-        }
+        swept_body_end_velocity(f, &t->settings, velocity);
         memcpy(world->start.velocity + 6 * (size_t)f->dynamic, velocity, 6 * sizeof *velocity);
         memcpy(out->position, f->start.position, sizeof out->position);
         memcpy(out->velocity, f->start.velocity, sizeof out->velocity);
@@ -305,15 +308,17 @@ static void write_back(struct taking *t)
     sadmm_collision_drop_candidates(world->collision);
 }
 
-/* May both be hit once more? */
-static bool may_hit(struct taking *t, const struct foreseen *item)
+/* May both be hit once more? One that may not, but would go through the other one, is: `last`. */
+static bool may_hit(struct taking *t, const struct foreseen *item, bool *last)
 {
     bool may = true;
+    *last = false;
     for (int side = 0; side < 2; ++side) {
         struct swept_body *f = &t->hits->list[item->swept_body[side]];
         if (f->hits < (uint32_t)t->settings.hits) continue;
+        may = may && f->passes && f->hits == (uint32_t)t->settings.hits;
+        *last = true;
         give_up(f);
-        may = false;
     }
     return may;
 }
@@ -341,7 +346,8 @@ static bool take_all(struct taking *t)
             ok = foresee(t, h->fast.keys[k], 0);
     while (ok && h->queue_count > 0) {
         const struct foreseen *item = &h->foreseen[take_from_queue(h)];
-        if (holds(h, item) && may_hit(t, item)) ok = take_hit(t, *item);
+        bool last;
+        if (holds(h, item) && may_hit(t, item, &last)) ok = take_hit(t, *item, last);
     }
     return ok;
 }
@@ -363,7 +369,7 @@ static bool leave_out(struct taking *t)
 {
     bool any = false;
     for (size_t i = 0; i < t->hits->count; ++i) {
-        if (!t->hits->list[i].too_many || t->hits->list[i].dynamic < 0) continue;
+        if (!t->hits->list[i].too_many) continue;
         t->hits->kinds[t->hits->list[i].slot] = SADMM_SWEPT_NONE;
         any = true;
     }
