@@ -123,7 +123,7 @@ static sadmm_status read_line(struct obj *o)
 sadmm_status sadmm_mesh_file_read_obj(struct mesh_parts *parts)
 {
     struct obj o = {.parts = parts, .text = sadmm_text(parts->source->bytes, parts->source->size)};
-    o.text.comments = o.text.joined = true;
+    o.text.comments = o.text.continues = true;
     o.wanted = !parts->object;
     while (sadmm_text_next_line(&o.text)) TRY(read_line(&o));
     return SADMM_OK;

@@ -26,16 +26,16 @@ static size_t newline_length(const struct text *text, const char *at)
 }
 
 /* Where a line that is joined to the next one goes on; NULL: it is not. */
-static const char *joined_at(const struct text *text)
+static const char *continued_at(const struct text *text)
 {
-    if (!text->joined || *text->at != '\\' || text->end - text->at < 2 || !is_newline(text->at[1])) return NULL;
+    if (!text->continues || *text->at != '\\' || text->end - text->at < 2 || !is_newline(text->at[1])) return NULL;
     return text->at + 1 + newline_length(text, text->at + 1);
 }
 
 static void skip_blanks(struct text *text)
 {
     while (text->at < text->end) {
-        const char *const next = joined_at(text);
+        const char *const next = continued_at(text);
         if (!next && !is_blank(*text->at)) return;
         text->line += next != NULL;
         text->at = next ? next : text->at + 1;
@@ -47,7 +47,7 @@ bool sadmm_text_word(struct text *text, struct word *word)
     skip_blanks(text);
     if (text->at == text->end || is_newline(*text->at) || (text->comments && *text->at == '#')) return false;
     word->at = text->at;
-    while (text->at < text->end && !is_blank(*text->at) && !is_newline(*text->at) && !joined_at(text)) ++text->at;
+    while (text->at < text->end && !is_blank(*text->at) && !is_newline(*text->at) && !continued_at(text)) ++text->at;
     word->length = (size_t)(text->at - word->at);
     return true;
 }

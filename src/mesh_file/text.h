@@ -12,7 +12,7 @@ struct text {
     size_t line;   /* the current one, from 1 */
     bool begun;    /* a word of it has been found */
     bool comments; /* a word that begins with # ends its line */
-    bool joined;   /* a backslash at its end joins a line to the next */
+    bool continues;  /* a backslash at its end joins a line to the next */
 };
 
 struct word {

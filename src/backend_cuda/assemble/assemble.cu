@@ -141,20 +141,20 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     vec3 between = v3(0, 0, 0);
     if (a && b && count > 0 && (FAST || lane == 0))
         between = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
-    pair_bodies joined = {a ? pair->body_a : v.model.bodies, b ? pair->body_b : v.model.bodies, -1, -1};
+    pair_bodies ends = {a ? pair->body_a : v.model.bodies, b ? pair->body_b : v.model.bodies, -1, -1};
     if (v.raw.system.kinematic_count > 0 && live && sadmm_body_is_kinematic(a ? pair->body_b : pair->body_a))
-        *(a ? &joined.body_b : &joined.body_a) = store_kinematic(v, pair, p);
+        *(a ? &ends.body_b : &ends.body_a) = store_kinematic(v, pair, p);
     const real4 about = pack(normal, live ? solver_friction(v.model, pair->friction) : 0),
                 difference = pack(between, count);
     if (live && lane == 0) {
         v.contacts.normal[p] = about;
         v.contacts.difference[p] = difference;
-        v.contacts.bodies[p] = joined;
+        v.contacts.bodies[p] = ends;
     }
     struct pair_sums sums = {};
     rigid_inverse inverse = {};
     if (FAST && v.bodies.rigid && side_of_lane(v.contacts, lane) >= 0) { /* asked for early: it is from far away */
-        const int32_t body = lane == 0 ? joined.body_a : lane == 1 ? joined.body_b : v.model.bodies;
+        const int32_t body = lane == 0 ? ends.body_a : lane == 1 ? ends.body_b : v.model.bodies;
         if (body < v.model.bodies) inverse = inverse_of_body(v.bodies, body);
     }
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
@@ -167,10 +167,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const solver_real lambda[3] = {(solver_real)impulse.x, (solver_real)impulse.y, (solver_real)impulse.z};
         v.contacts.arm[slot] = arm;
         for (int j = 0; j < 3; ++j) v.contacts.lambda[(size_t)j * v.contacts.lambda_stride + slot] = lambda[j];
-        if (FAST) add_point(v.model, v.bodies, joined, about, difference, arm, lambda, true, &sums);
+        if (FAST) add_point(v.model, v.bodies, ends, about, difference, arm, lambda, true, &sums);
     }
     if (FAST)
-        store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, (double)about.w, difference,
+        store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, ends, (double)about.w, difference,
                     true, live && sadmm_pair_rolls(pair, points), inverse, &sums);
 }
 

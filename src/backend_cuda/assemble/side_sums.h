@@ -50,7 +50,7 @@ static __device__ __forceinline__ rigid_inverse inverse_of_body(const body_view 
 }
 
 static __device__ __forceinline__ void add_point(const model_view &model, const body_view &bodies,
-                                                 const pair_bodies &joined, const real4 &normal,
+                                                 const pair_bodies &ends, const real4 &normal,
                                                  const real4 &difference, const real4 &arm, const solver_real lambda[3],
                                                  bool first, struct pair_sums *sums)
 {
@@ -80,11 +80,11 @@ static __device__ __forceinline__ void add_point(const model_view &model, const 
     }
     double row[6];
     normal_row(n, r, row);
-    if (joined.body_a < model.bodies)
-        sums->row_response[0] += packed_form(bodies.A_inverse + (size_t)joined.body_a * PACKED, row);
+    if (ends.body_a < model.bodies)
+        sums->row_response[0] += packed_form(bodies.A_inverse + (size_t)ends.body_a * PACKED, row);
     normal_row(n, r_b, row);
-    if (joined.body_b < model.bodies)
-        sums->row_response[1] += packed_form(bodies.A_inverse + (size_t)joined.body_b * PACKED, row);
+    if (ends.body_b < model.bodies)
+        sums->row_response[1] += packed_form(bodies.A_inverse + (size_t)ends.body_b * PACKED, row);
 }
 
 /* Sums with arms r + d, of a pair of `count` points. */
@@ -160,11 +160,11 @@ static __device__ __forceinline__ int32_t side_of_lane(const contact_view &conta
 }
 
 /* Does the pair anchor its island, one of its bodies being static? */
-static __device__ __forceinline__ bool pair_anchors(const model_view &model, int32_t count, const pair_bodies &joined,
+static __device__ __forceinline__ bool pair_anchors(const model_view &model, int32_t count, const pair_bodies &ends,
                                                     double friction, const struct pair_sums *sums)
 {
     if (count < 3 || model.contact_rows == 1) return false;
-    if (joined.body_a < model.bodies && joined.body_b < model.bodies) return false;
+    if (ends.body_a < model.bodies && ends.body_b < model.bodies) return false;
     struct arm_sums arms = {(double)count, {sums->r[0], sums->r[1], sums->r[2]}, {}};
 #pragma unroll
     for (int j = 0; j < 6; ++j) arms.rr[j] = sums->rr[j];
@@ -175,7 +175,7 @@ static __device__ __forceinline__ bool pair_anchors(const model_view &model, int
  * `inverse`: of the body at the lane's side. Every lane of the warp comes here. */
 static __device__ __forceinline__ void store_sides(const model_view &model, const body_view &bodies,
                                                    const contact_view &contacts, const weight_view &weights, bool live,
-                                                   int32_t p, int32_t lane, int32_t count, const pair_bodies &joined,
+                                                   int32_t p, int32_t lane, int32_t count, const pair_bodies &ends,
                                                    double friction, const real4 &difference, bool first, bool rolls,
                                                    const rigid_inverse &inverse,
                                                    struct pair_sums *sums)
@@ -187,10 +187,10 @@ static __device__ __forceinline__ void store_sides(const model_view &model, cons
     if (first && model.contact_rows == 3) sum_pair<LOAD_SUMS, ARM_END>(contacts, sums);
     if (first && model.contact_rows == 1) sum_pair<ARM_END, PAIR_SUMS>(contacts, sums);
     double anchors = first && live && rolls ? HOLDS_BY_ROLLING : 0;
-    if (first && live && !rolls) anchors = pair_anchors(model, count, joined, friction, sums);
+    if (first && live && !rolls) anchors = pair_anchors(model, count, ends, friction, sums);
 #pragma unroll
     for (int32_t side = 0; side < 2; ++side) {
-        const int32_t body = side ? joined.body_b : joined.body_a;
+        const int32_t body = side ? ends.body_b : ends.body_a;
         if (side) shift_sums(sums, count, d);
         if (!live || body >= model.bodies || (own >= 0 && own != side)) continue;
         store_side(weights, p, side, count, share, first, anchors, sums);

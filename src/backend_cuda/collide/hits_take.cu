@@ -560,10 +560,10 @@ static __device__ __forceinline__ void write_back(const hits_view &v, int32_t sl
 /* Every thread of the block. */
 static __device__ void take_group(const hits_view &v, int32_t group, uint64_t epoch, struct take_shared *shared)
 {
-    const bool leads = threadIdx.x == 0;
+    const bool is_first = threadIdx.x == 0;
     const struct hit_group &own = shared->own;
     __syncthreads();
-    if (leads) {
+    if (is_first) {
         shared->group = group;
         shared->own = v.groups[group];
         shared->taken = 0;
@@ -572,7 +572,7 @@ static __device__ void take_group(const hits_view &v, int32_t group, uint64_t ep
     __syncthreads();
     struct taking_marks marks = {0, (int64_t)v.progress[group].foreseen};
     __syncthreads();
-    if (leads) /* what is sure to be more than it may take is not begun */
+    if (is_first) /* what is sure to be more than it may take is not begun */
         shared->fails = marks.initial > own.room ||
                         marks.initial * (own.leaf_count + v.shared_leaf_count + v.c.plane_count) > TAKE_TESTS;
     __syncthreads();
@@ -580,7 +580,7 @@ static __device__ void take_group(const hits_view &v, int32_t group, uint64_t ep
     for (int times = 0; times < TAKE_TIMES && !done && !shared->fails; ++times) {
         marks.followed = followed_mark(epoch, times);
         __syncthreads();
-        if (leads) {
+        if (is_first) {
             shared->count = marks.initial;
             shared->record_count = shared->hit_count = 0;
             v.progress[group].foreseen = (unsigned long long)marks.initial;
@@ -603,7 +603,7 @@ static __device__ void take_group(const hits_view &v, int32_t group, uint64_t ep
         begin_body(v, slot); /* none is taken, and none was foreseen */
         v.kinds[slot] = SADMM_SWEPT_NONE;
     }
-    if (!leads || !any) return;
+    if (!is_first || !any) return;
     v.progress[group].records = shared->record_count;
     v.state->quiet = 0;
 }

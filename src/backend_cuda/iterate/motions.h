@@ -74,8 +74,8 @@ static __device__ __noinline__ void store_momentum(const cuda_view &v, const bod
     for (int32_t at = t.begin + t.lane; on && at < t.end; at += LANES) {
         const int32_t code = v.graph.incident[at], p = code / 2;
         if (p >= v.contacts.pair_capacity) continue;
-        const pair_bodies joined = v.contacts.bodies[p];
-        if (!is_dynamic(v.model, code & 1 ? joined.body_a : joined.body_b))
+        const pair_bodies ends = v.contacts.bodies[p];
+        if (!is_dynamic(v.model, code & 1 ? ends.body_a : ends.body_b))
             add_static_pair(v.raw, p, code & 1, d, own.gram);
     }
     if (__ballot_sync((unsigned)ALL_LANES, own.gram[MOMENTUM_CONTACTS] > 0) != 0) sum_lanes<PACKED + 1>(own.gram);

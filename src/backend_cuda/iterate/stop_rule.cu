@@ -32,7 +32,7 @@ static __device__ double natural_map(const model_view &model, const body_view &b
 {
     const struct sadmm_contact_pair *pair = &raw.pairs[p];
     const mat3 frame = sadmm_contact_frame(pair->normal);
-    const int32_t joined[2] = {pair->body_a, pair->body_b};
+    const int32_t ends[2] = {pair->body_a, pair->body_b};
     const int rows = pair->friction > 0 ? 3 : 1;
     const struct sadmm_settings settings = *model.settings;
     /* As planned for, should the pair have more: nothing has checked that yet. */
@@ -43,10 +43,10 @@ static __device__ double natural_map(const model_view &model, const body_view &b
         vec3 velocity = v3(0, 0, 0);
         double weight[3] = {};
         for (int side = 0; side < 2; ++side) {
-            if (joined[side] < 0) continue;
-            const solver_real *state = bodies.state + (size_t)joined[side] * ROW;
+            if (ends[side] < 0) continue;
+            const solver_real *state = bodies.state + (size_t)ends[side] * ROW;
             const double *arm = side ? point->arm_b : point->arm_a,
-                         *inverse = bodies.A_inverse + (size_t)joined[side] * PACKED;
+                         *inverse = bodies.A_inverse + (size_t)ends[side] * PACKED;
             const vec3 turn = v3((double)state[3], (double)state[4], (double)state[5]),
                        at_point = v3_add(v3((double)state[0], (double)state[1], (double)state[2]),
                                          v3_cross(turn, v3_load(arm)));
@@ -73,15 +73,15 @@ static __device__ double natural_map_of_rows(const body_view &bodies, const row_
 {
     const struct sadmm_row_constraint constraint = raw.constraints[k];
     const struct raw_row *row = raw.rows + (size_t)k * SADMM_MAX_ROWS;
-    const int32_t joined[2] = {constraint.body_a, constraint.body_b};
+    const int32_t ends[2] = {constraint.body_a, constraint.body_b};
     double x[SADMM_MAX_ROWS] = {}, weight[SADMM_MAX_ROWS] = {}, lambda[SADMM_MAX_ROWS] = {}, worst = 0;
     for (int r = 0; r < constraint.count; ++r) {
         lambda[r] = (double)rows.data[(size_t)k * SADMM_MAX_ROWS + (size_t)r].lambda;
         for (int side = 0; side < 2; ++side) {
-            if (joined[side] < 0) continue;
-            const solver_real *state = bodies.state + (size_t)joined[side] * ROW;
+            if (ends[side] < 0) continue;
+            const solver_real *state = bodies.state + (size_t)ends[side] * ROW;
             for (int j = 0; j < 6; ++j) x[r] += row[r].jacobian[side][j] * (double)state[j];
-            weight[r] += packed_form(bodies.A_inverse + (size_t)joined[side] * PACKED, row[r].jacobian[side]);
+            weight[r] += packed_form(bodies.A_inverse + (size_t)ends[side] * PACKED, row[r].jacobian[side]);
         }
     }
     if (constraint.cone) {

@@ -201,7 +201,7 @@ static __global__ void __launch_bounds__(THREADS)
     pdl_trigger();
     if (FAST && all_stopped(v.islands, args.checks)) return;
     if (t.there) {
-        const bool on = t.live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, pair.joined));
+        const bool on = t.live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, pair.ends));
         primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, pair, t.lane,
                                                                 on, relaxation_factor);
     }

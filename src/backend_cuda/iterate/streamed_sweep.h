@@ -30,23 +30,23 @@ static __device__ __forceinline__ vec3 exchange(vec3 value, int lanes)
 /* The sums of a pair's lanes, added as (q_0 + q_1) + (q_2 + q_3), into the records of its sides. Of four lanes, 0 and 1
  * end up with force and torque on a, 2 and 3 on b. Every lane of the warp comes here. */
 template <int LANES_A_PAIR>
-static __device__ __forceinline__ void store_records(solver_real *records, const pair_bodies &joined, int32_t lane,
+static __device__ __forceinline__ void store_records(solver_real *records, const pair_bodies &ends, int32_t lane,
                                                      bool live, const pair_sum &q)
 {
     real4 *out = (real4 *)records;
     if (LANES_A_PAIR == 1) {
-        if (live && joined.side_a >= 0) {
-            out[2 * (size_t)joined.side_a] = pack(v3_neg(q.force), 0);
-            out[2 * (size_t)joined.side_a + 1] = pack(v3_neg(q.torque_a), 0);
+        if (live && ends.side_a >= 0) {
+            out[2 * (size_t)ends.side_a] = pack(v3_neg(q.force), 0);
+            out[2 * (size_t)ends.side_a + 1] = pack(v3_neg(q.torque_a), 0);
         }
-        if (live && joined.side_b >= 0) {
-            out[2 * (size_t)joined.side_b] = pack(q.force, 0);
-            out[2 * (size_t)joined.side_b + 1] = pack(q.torque_b, 0);
+        if (live && ends.side_b >= 0) {
+            out[2 * (size_t)ends.side_b] = pack(q.force, 0);
+            out[2 * (size_t)ends.side_b + 1] = pack(q.torque_b, 0);
         }
         return;
     }
     const bool odd = lane & 1, on_b = lane & 2;
-    const int32_t side = on_b ? joined.side_b : joined.side_a;
+    const int32_t side = on_b ? ends.side_b : ends.side_a;
     /* Even lanes keep the force, odd ones the torques. */
     const vec3 kept = v3_add(odd ? q.torque_a : q.force, exchange(odd ? q.force : q.torque_a, 1));
     const vec3 torque_b = v3_add(q.torque_b, exchange(q.torque_b, 1));
@@ -58,7 +58,7 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
  * whether it is there or not, so that nothing but the states waits for another load. */
 template <int COUNT> struct swept_pair {
     real4 about, between;
-    pair_bodies joined;
+    pair_bodies ends;
     real weight; /* FAST */
     size_t slot[COUNT];
     real4 point[COUNT];
@@ -78,7 +78,7 @@ static __device__ __forceinline__ swept_pair<COUNT> fetch_pair(const contact_vie
     swept_pair<COUNT> pair;
     pair.about = load_once(contacts.normal + p);
     pair.between = load_once(contacts.difference + p);
-    pair.joined = load_once(contacts.bodies + p);
+    pair.ends = load_once(contacts.bodies + p);
     pair.weight = FAST ? contacts.inv_s[p] : (real)0;
     pair.slot[0] = point_slot<LANES_A_PAIR>(contacts, p, lane);
     pair.point[0] = load_once(contacts.arm + pair.slot[0]);
@@ -104,11 +104,11 @@ static __device__ __forceinline__ double sweep_pair(const model_view &model, con
 {
     enum { SPLIT = MEASURE && !FAST };
     const real4 &about = pair.about, &between = pair.between;
-    const pair_bodies &joined = pair.joined;
+    const pair_bodies &ends = pair.ends;
     const real4(&point)[COUNT] = pair.point;
     const vec3(&old)[COUNT] = pair.old;
     const int32_t count = (int32_t)between.w;
-    const body_row a = load_row(bodies.state, joined.body_a), b = load_row(bodies.state, joined.body_b);
+    const body_row a = load_row(bodies.state, ends.body_a), b = load_row(bodies.state, ends.body_b);
 
     const vec3 normal = xyz(about), difference = xyz(between);
     const real inv_s = FAST ? pair.weight : penalty_inverse_s(a.inv_beta, b.inv_beta);
@@ -130,11 +130,11 @@ static __device__ __forceinline__ double sweep_pair(const model_view &model, con
         if (!MEASURE) continue;
         largest = real_max(largest, largest_row(normal, delta));
     }
-    store_records<LANES_A_PAIR>(iteration.records, joined, lane, live, next);
-    if (SPLIT) store_records<LANES_A_PAIR>(iteration.change, joined, lane, live, change);
+    store_records<LANES_A_PAIR>(iteration.records, ends, lane, live, next);
+    if (SPLIT) store_records<LANES_A_PAIR>(iteration.change, ends, lane, live, change);
     if (!MEASURE) return 0;
     return (double)(largest *
-                    (FAST ? inverse_of_weight(inv_s, joined.body_a < model.bodies && joined.body_b < model.bodies)
+                    (FAST ? inverse_of_weight(inv_s, ends.body_a < model.bodies && ends.body_b < model.bodies)
                           : real_max(a.inv_beta, b.inv_beta)));
 }
 

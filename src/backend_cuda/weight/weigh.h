@@ -14,10 +14,10 @@ static inline __device__ double violation_of(const body_view &bodies, const cont
 {
     const pair_data pair = load_pair(contacts, p);
     const pair_bodies of_pair = contacts.bodies[p];
-    const int32_t joined[2] = {of_pair.body_a, of_pair.body_b};
+    const int32_t ends[2] = {of_pair.body_a, of_pair.body_b};
     double velocity[2][6], sum = 0;
     for (int side = 0; side < 2; ++side)
-        for (int j = 0; j < 6; ++j) velocity[side][j] = (double)bodies.state[(size_t)joined[side] * ROW + (size_t)j];
+        for (int j = 0; j < 6; ++j) velocity[side][j] = (double)bodies.state[(size_t)ends[side] * ROW + (size_t)j];
     for (int32_t k = 0; k < pair.count; ++k) {
         const point_data point = load_point(contacts, p, k, pair);
         double u[3];

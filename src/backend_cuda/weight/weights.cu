@@ -29,16 +29,16 @@ static __global__ void __launch_bounds__(BODY_THREADS)
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);
     const real4 none = {};
-    const pair_bodies nobody = {v.model.bodies, v.model.bodies, -1, -1}, joined = live ? v.contacts.bodies[p] : nobody;
+    const pair_bodies nobody = {v.model.bodies, v.model.bodies, -1, -1}, ends = live ? v.contacts.bodies[p] : nobody;
     const real4 about = live ? v.contacts.normal[p] : none, difference = live ? v.contacts.difference[p] : none;
     const int32_t count = (int32_t)difference.w;
     const rigid_inverse no_inverse = {};
     struct pair_sums sums = {};
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
         const point_numbers point = fetch_point(v.contacts, p, k);
-        add_point(v.model, v.bodies, joined, about, difference, point.arm, point.lambda, false, &sums);
+        add_point(v.model, v.bodies, ends, about, difference, point.arm, point.lambda, false, &sums);
     }
-    store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, (double)about.w, difference,
+    store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, ends, (double)about.w, difference,
                 false, false, no_inverse, &sums);
 }
 
@@ -71,13 +71,13 @@ static __global__ void respond_rows_kernel(const __grid_constant__ cuda_view v, 
     pdl_trigger(v.model.bodies);
     const int32_t slot = thread_index(), k = slot / SADMM_MAX_ROWS, r = slot % SADMM_MAX_ROWS;
     if (k >= live_rows(v.model, v.rows) || r >= v.rows.constraints[k].rows) return;
-    const int32_t joined[2] = {v.rows.constraints[k].body_a, v.rows.constraints[k].body_b};
+    const int32_t ends[2] = {v.rows.constraints[k].body_a, v.rows.constraints[k].body_b};
     double inverse_mass = 0, w = 0, push = 0, J[6];
     for (int side = 0; side < 2; ++side) {
-        if (!is_dynamic(v.model, joined[side])) continue;
-        inverse_mass += 1 / mass_of(v.bodies, (size_t)joined[side]);
+        if (!is_dynamic(v.model, ends[side])) continue;
+        inverse_mass += 1 / mass_of(v.bodies, (size_t)ends[side]);
         load_jacobian(rows_of(v.rows, k)[r], side, J);
-        w += packed_form(v.bodies.A_inverse + (size_t)joined[side] * PACKED, J);
+        w += packed_form(v.bodies.A_inverse + (size_t)ends[side] * PACKED, J);
         push = max_of(push, length3(J));
     }
     const row_response out = {w, weight_row_scale(push, w, inverse_mass)};
