@@ -132,7 +132,7 @@ static __device__ __noinline__ bool foresee(const hits_view &v, int32_t group, u
     const struct hit_group &of = v.groups[group];
     const unsigned long long at = atomicAdd(&v.progress[group].foreseen, 1ull);
     if (at < (unsigned long long)of.room) v.foreseen[of.room_first + at] = hit;
-    return true;
+    return !pair.lost;
 }
 
 static __device__ __forceinline__ int32_t group_of(const hits_view &v, int32_t a, int32_t b)
