@@ -2,6 +2,7 @@
 #ifndef TESTS_CUDA_WORLDS_H
 #define TESTS_CUDA_WORLDS_H
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -129,7 +130,13 @@ static inline void expect_same_world(sadmm_world *a, sadmm_world *b, const char 
         if (body_def(a, id).type == SADMM_BODY_STATIC) continue;
         MUST(a, sadmm_world_body_contact_wrench(a, id, wa));
         MUST(b, sadmm_world_body_contact_wrench(b, id, wb));
-        ck_assert_msg(memcmp(wa, wb, sizeof wa) == 0, "%s: wrench of body %d differs", what, i);
+        /* contacts are summed in the same order, hits beside them in another: to rounding */
+        double size = 0;
+        for (int k = 0; k < 6; ++k) size += fabs(wa[k]);
+        const double tolerance = a->start.hit_count > 0 ? 1e-12 * size : 0;
+        for (int k = 0; k < 6; ++k)
+            ck_assert_msg(fabs(wa[k] - wb[k]) <= tolerance, "%s: wrench %d of body %d differs: %.17g %.17g", what, k, i,
+                          wa[k], wb[k]);
     }
     sadmm_step_report ra = world_report(a), rb = world_report(b);
     ck_assert_msg(ra.step == rb.step && ra.time == rb.time && ra.contacts == rb.contacts && ra.pairs == rb.pairs &&

@@ -988,7 +988,7 @@ static void count_hits(const sadmm_world *world, int *on_static, int *centred)
     for (size_t k = 0; k < world->start.hit_count; ++k) {
         const struct sadmm_world_hit *hit = &world->start.hits[k];
         *centred += hit->feature >= INNER_BALL_FEATURE;
-        for (int s = 0; s < 2; ++s) *on_static += hit->dynamic[s] < 0 && hit->driven[s] < 0;
+        for (int s = 0; s < 2; ++s) *on_static += hit->dynamic[s] < 0 && hit->kinematic[s] < 0;
     }
 }
 

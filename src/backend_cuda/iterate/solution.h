@@ -59,7 +59,7 @@ static __device__ __forceinline__ void move_body_both(const struct sadmm_rigid *
     const vec3 x = v3_load(body->position);
     const quat q = q_load(body->orientation), whole = turned_by(q, v3_load(velocity + 3), dt);
     double correction[6], mean[6];
-    trapezoid_own(body->velocity, velocity, correction);
+    body_trapezoid(body, body->velocity, velocity, correction);
     for (int k = 0; k < 6; ++k) {
         mean[k] = velocity[k] - correction[k];
         stays[7 + k] = own[7 + k] = velocity[k];
