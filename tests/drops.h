@@ -286,14 +286,21 @@ static inline struct drop_result drop_all(const struct drop_case *c)
     return result;
 }
 
+/* Can bodies of this form be made? Hulls need qhull. */
+static inline bool drop_form_is_there(int form)
+{
+    uint64_t seed = 1;
+    sadmm_hull *hull = form == SADMM_SHAPE_HULL ? drop_hull(1, &seed) : NULL;
+    const bool there = form != SADMM_SHAPE_HULL || hull;
+    sadmm_hull_destroy(hull);
+    return there;
+}
+
 /* All grounds, `worlds` of each, numbered from `first` on, with steps of 1 to 20 ms. */
 static inline void drop_worlds(int form, uint64_t first, int worlds)
 {
     static const double steps[] = {0.001, 0.005, 0.01, 0.02};
-    uint64_t seed = 1;
-    sadmm_hull *hull = form == SADMM_SHAPE_HULL ? drop_hull(1, &seed) : NULL;
-    if (form == SADMM_SHAPE_HULL && !hull) return;
-    sadmm_hull_destroy(hull);
+    if (!drop_form_is_there(form)) return;
     for (int ground = 0; ground < DROP_GROUNDS; ++ground) {
         /* What is left to the solve (meshes, what rests on something): iterations leave a share of the speed of an impact
          * of two dynamic bodies, or of coupled contacts, which may be more than a compound of several shapes, a needle or

@@ -27,6 +27,7 @@ START_TEST(these_drops_stay_on_their_side)
         {DROP_COMPOUND, DROP_FLOATING, 0.02, SADMM_BACKEND_CPU, SADMM_F64, 20019},
         {DROP_LEAF, DROP_FLOATING, 0.02, SADMM_BACKEND_CPU, SADMM_F64, 20027},
     };
+    if (!drop_form_is_there(cases[_i].form)) return;
     /* another rounding has another body of a world go through, by chance (docs/guide/limits.md) */
     const struct drop_result r = drop_all(&cases[_i]);
     ck_assert_msg(r.through <= 1, "%d are through, the first is %d", r.through, (int)r.first);
