@@ -182,7 +182,7 @@ def table_of(name):
     """The lines of a table, of its CSV file."""
     with open(csv_path(name), encoding="utf-8") as file:
         lines = file.read().splitlines()
-    notes = [line[2:] for line in lines if line.startswith("# ")]
+    notes = [re.sub(r" [0-9-]{10};", "", line[2:]) for line in lines if line.startswith("# ")]  # the date is the file's
     rows = list(csv.DictReader(line for line in lines if not line.startswith("# ")))
     columns = REPORTS[name][1] or [(key, key) for key in rows[0]]
     yield ""

@@ -130,7 +130,7 @@ static inline void expect_same_world(sadmm_world *a, sadmm_world *b, const char 
         if (body_def(a, id).type == SADMM_BODY_STATIC) continue;
         MUST(a, sadmm_world_body_contact_wrench(a, id, wa));
         MUST(b, sadmm_world_body_contact_wrench(b, id, wb));
-        /* contacts are summed in the same order, hits beside them in another: to rounding */
+        /* contacts are summed in the same order, hits beside them in another: some hundred roundings of double */
         double size = 0;
         for (int k = 0; k < 6; ++k) size += fabs(wa[k]);
         const double tolerance = a->start.hit_count > 0 ? 1e-12 * size : 0;

@@ -1,5 +1,7 @@
 /* Joints whose axes and arms turn by more in a step than a step resolves: long steps, fast bodies, distances of next to no
  * length. No mechanism gains energy, whatever its bodies begin with, and none comes to numbers that are not finite. */
+#include <float.h>
+
 #include "core/math/rigid.h"
 #include "scene_tools.h"
 
@@ -256,6 +258,42 @@ START_TEST(a_fast_top_precesses)
 }
 END_TEST
 
+/* The exponential of a rotation against the library's sines, from next to nothing to a hundred turns; what is longer than
+ * its series is doubled up, each time with one more rounding of the angle. */
+START_TEST(turns_are_exact)
+{
+    state = 1;
+    for (int k = 0; k < 20000; ++k) {
+        const double angle = pow(10, 4.5 * number() - 1.7);
+        const quat q = q_exp(v3(0.6 * angle, 0, -0.8 * angle));
+        const double tolerance = 8 * DBL_EPSILON * (angle < 2 ? 1 : angle);
+        ck_assert_double_eq_tol(q.w, cos(angle / 2), tolerance);
+        ck_assert_double_eq_tol(q.x, 0.6 * sin(angle / 2), tolerance * (angle < 1 ? angle : 1));
+        ck_assert_double_eq_tol(q.z, -0.8 * sin(angle / 2), tolerance * (angle < 1 ? angle : 1));
+    }
+    const quat far = q_exp(v3(0, 1e100, 0)); /* wherever that is */
+    ck_assert_double_eq_tol(far.w * far.w + far.y * far.y, 1, 8 * DBL_EPSILON);
+}
+END_TEST
+
+/* The mean angular velocity of a piece of a tumbling body's motion solves its equation, to rounding: at rates up to 1/3,
+ * the most that a piece has. */
+START_TEST(the_mean_spin_solves_its_equation)
+{
+    state = 2;
+    for (int k = 0; k < 20000; ++k) {
+        const vec3 w = v3(number(), number(), number());
+        const double c_x = number() / 3, c_y = number() / 3;
+        const vec3 c = v3(c_x, c_y, -(c_x + c_y) / (1 + c_x * c_y)); /* as three moments have them */
+        if (v3_max_abs(c) * v3_max_abs(w) > 1. / 3) continue;
+        const vec3 m = rigid_mean_spin(w, c);
+        ck_assert_double_eq_tol(m.x - w.x + c.x * m.y * m.z, 0, 8 * DBL_EPSILON);
+        ck_assert_double_eq_tol(m.y - w.y + c.y * m.z * m.x, 0, 8 * DBL_EPSILON);
+        ck_assert_double_eq_tol(m.z - w.z + c.z * m.x * m.y, 0, 8 * DBL_EPSILON);
+    }
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("turning");
@@ -264,6 +302,8 @@ int main(void)
     tcase_add_loop_test(cases, no_mechanism_gains_energy, 0, MECHANISMS);
     tcase_add_test(cases, a_balanced_wheel_goes_on);
     tcase_add_loop_test(cases, a_fast_top_precesses, 0, 6);
+    tcase_add_test(cases, turns_are_exact);
+    tcase_add_test(cases, the_mean_spin_solves_its_equation);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

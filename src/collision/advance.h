@@ -206,7 +206,7 @@ SADMM_CALLED struct pair_pose proxies_pose(const struct sadmm_proxy *a, const st
                                            double dt, struct proxy_place *of_b);
 
 struct first_touch {
-    double time_offset; /* s: when it touches, or up to when it was inspected */
+    double time_offset; /* s: when it touches, or up to when it was tested */
     bool missed;        /* nothing touches before the end of the step */
 };
 

@@ -15,7 +15,7 @@ struct sadmm_box_row {
     int axis;
     double widest;      /* of those in the row, along the axis, m */
     uint64_t *keys;     /* (where it begins, rounded down << 32) | slot, sorted; then room to sort them */
-    uint32_t *beside;   /* slots that are inspected one by one: planes, what is much wider than most, what was moved */
+    uint32_t *beside;   /* slots that are tested one by one: planes, what is much wider than most, what was moved */
     unsigned char *out; /* by slot: it is beside */
     size_t count, beside_count, key_capacity, beside_capacity, out_capacity;
 };

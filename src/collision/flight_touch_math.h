@@ -141,7 +141,7 @@ SADMM_INLINE double touch_closing(const struct sadmm_swept_pair *p, const struct
 
 /* ---- how long nothing comes through the plane between them --------------------------------------------------------- */
 
-/* What of a shape's points is round about others that it has, which are inspected in its place. */
+/* What of a shape's points is round about others that it has, which are tested in its place. */
 SADMM_INLINE double touch_round_of(const struct sadmm_geometry *g)
 {
     return g->type == SADMM_SHAPE_SPHERE || g->type == SADMM_SHAPE_CAPSULE ? g->size[0] : 0;

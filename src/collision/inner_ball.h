@@ -70,7 +70,7 @@ struct inner_ball {
 };
 
 /* a, b: the pair. ball, its proxy: of b where of_b. subshape: of a mesh. from: when the pair does not touch yet;
- * time_offset: when the ball is inspected if it does not hit. False: nothing is near. */
+ * time_offset: where the ball is taken if it does not hit. False: nothing is near. */
 SADMM_INLINE bool inner_ball_meets(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                    const struct sadmm_proxy *ball, bool of_b, const double *hulls, uint32_t subshape,
                                    double from, double gravity, double dt, double time_offset, struct inner_ball *found)

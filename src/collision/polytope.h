@@ -10,7 +10,7 @@
 #include "hull_data.h"
 #include "row3.h"
 
-/* Up to so many vertices all are inspected; of more a search climbs along edges, where these lead to the top. */
+/* Up to so many vertices all are tested; of more a search climbs along edges, where these lead to the top. */
 enum { POLYTOPE_SCAN = 48 };
 
 struct polytope {

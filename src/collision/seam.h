@@ -28,7 +28,7 @@
 /* Pieces are flush within this share of the thinner shape's extent: as even as what lies on them may lie
  * (MANIFOLD_FLAT). */
 #define SEAM_FLUSH  MANIFOLD_FLAT
-/* How far beside a point its surface is inspected, as a share of the thinner extent. */
+/* How far beside a point its surface is sampled, as a share of the thinner extent. */
 #define SEAM_BESIDE 0.05
 /* What faces along a direction: slopes, and turns of the direction by which its surface is searched for. */
 #define SEAM_SLOPE  2e-3

@@ -25,7 +25,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         v.push.units[i] = 0;
     }
     if (args.paper && ENERGIES) {
-        v.islands.info[i].anchored = v.islands.info[i].as_a_rule = v.islands.info[i].rows = 0;
+        v.islands.info[i].anchored = v.islands.info[i].anchored_outside = v.islands.info[i].rows = 0;
         v.islands.info[i].slow_down = 1;
     }
     const bool stiffened = JOINTS && stiffen_body(v, i, false);

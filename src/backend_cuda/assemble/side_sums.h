@@ -14,7 +14,7 @@
  * (math/momentum.h), as a solve begins; ROW in all. */
 enum { SIDE_PUSH = 6, SIDE_ANCHORS };
 /* In place of that 1 where the pair rolls (sadmm_pair_rolls): the sums of fewer than 2^20 of them are less. */
-#define HOLDS_BY_ROLLING (1.0 / (1 << 20))
+#define ANCHORS_BY_ROLLING (1.0 / (1 << 20))
 /* Those of side_arms (device/view.h) are in this precision, and sums only where contacts have three rows: else C
  * depends on normals. */
 static_assert(sizeof(struct arm_sums) == SIDE_ARMS * sizeof(double), "numbers are taken one by one");
@@ -186,7 +186,7 @@ static __device__ __forceinline__ void store_sides(const model_view &model, cons
     sum_pair<0, LOAD_SUMS>(contacts, sums);
     if (first && model.contact_rows == 3) sum_pair<LOAD_SUMS, ARM_END>(contacts, sums);
     if (first && model.contact_rows == 1) sum_pair<ARM_END, PAIR_SUMS>(contacts, sums);
-    double anchors = first && live && rolls ? HOLDS_BY_ROLLING : 0;
+    double anchors = first && live && rolls ? ANCHORS_BY_ROLLING : 0;
     if (first && live && !rolls) anchors = pair_anchors(model, count, ends, friction, sums);
 #pragma unroll
     for (int32_t side = 0; side < 2; ++side) {

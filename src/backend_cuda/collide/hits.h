@@ -1,20 +1,20 @@
-/* Hits of bodies in flight, each at its moment (core/world/hits.c says what for), on the device: between the candidates of
- * a step and its contacts.
+/* Hits of swept bodies, each at its moment (core/world/hits.c says what for), on the device: between the candidates of a
+ * step and its contacts.
  *
  *   list      candidates that are fast; bodies that something presses on; the step's start is copied
  *   foresee   when each of these pairs of swept bodies first touches               a thread a pair
  *   take      hits in the order of time, and what the two come near from then on   a block a group
  *   replace   shapes of what was hit, where they are now; the list of hits; the candidates are searched for again
  *   later     manifolds of what was hit, in what is left of the step               a thread a candidate, after `narrow`
- *   reopen    their points, and separations of swept bodies                               after `emit`
+ *   reopen    their points, and separations of swept bodies                        after `emit`
  *
- * Steps have these kernels if they are planned to (CUDA(plan_hits)); where nothing is fast all of them return at once. Lists have no order, and results do not depend on it: the next hit is
- * that of the least (time, key), shapes of a body are taken in order, a list's length and what becomes of it are the same
- * in any order. Bodies of two
- * environments never meet: each environment is a group, whose hits a block takes by itself, unless a body that moves is in
- * none of them; then all are one group. What a group may take is limited, by the world and the group alone: beyond that
- * its bodies are left to the solve, for the (sub-)step. Formulas are the host's: core/flight/swept_body.h, collision/
- * flight_touch_math.h, core/math/hit.h. */
+ * Steps have these kernels if they are planned to (CUDA(plan_hits)); where nothing is fast all of them return at once.
+ * Lists have no order, and results do not depend on it: the next hit is that of the least (time, key), shapes of a body
+ * are taken in order, a list's length and what becomes of it are the same in any order. Bodies of two environments never
+ * meet: each environment is a group, whose hits a block takes by itself, unless a body that moves is in none of them;
+ * then all are one group. What a group may take is limited, by the world and the group alone: beyond that its bodies are
+ * left to the solve, for the (sub-)step. Formulas are the host's: core/flight/swept_body.h,
+ * collision/flight_touch_math.h, core/math/hit.h. */
 #ifndef SADMM_CUDA_COLLIDE_HITS_H
 #define SADMM_CUDA_COLLIDE_HITS_H
 

@@ -88,7 +88,8 @@ static __device__ __forceinline__ double since_of(const hits_view &v, const stru
  * of its triangles. They are neighbours in the list. */
 static __device__ __noinline__ void start_on_mesh(const hits_view &v, const struct collision_step &step,
                                                   const struct candidate &own, const struct sadmm_proxy *a,
-                                                  const struct sadmm_proxy *b, double gravity, double left, struct pair_start *start)
+                                                  const struct sadmm_proxy *b, double gravity, double left,
+                                                  struct pair_start *start)
 {
     const uint64_t key = first_candidate(v.c, own.a, own.b);
     const int64_t count = usable_candidates(v.c);
@@ -102,8 +103,8 @@ static __device__ __noinline__ void start_on_mesh(const hits_view &v, const stru
 
 static __device__ __noinline__ void find_on_mesh(const hits_view &v, const struct collision_step &step,
                                                  const struct candidate &own, const struct sadmm_proxy *a,
-                                                 const struct sadmm_proxy *b, double gravity, double left, struct pair_start *start,
-                                                 uint32_t cache, struct manifold *m)
+                                                 const struct sadmm_proxy *b, double gravity, double left,
+                                                 struct pair_start *start, uint32_t cache, struct manifold *m)
 {
     if (start->moves_on) start_on_mesh(v, step, own, a, b, gravity, left, start);
     m->count = 0;

@@ -529,9 +529,7 @@ static __device__ bool leave_out(const hits_view &v, uint64_t mark, struct take_
     __syncthreads();
     for (int32_t j = (int32_t)threadIdx.x; j < shared->own.body_count; j += TAKE_THREADS) {
         const int32_t slot = v.group_bodies[shared->own.body_first + j];
-        if (v.kinds[slot] == SADMM_SWEPT_NONE || !gives_up(v, slot, mark) ||
-            v.marks[slot].passes == mark)
-            continue;
+        if (v.kinds[slot] == SADMM_SWEPT_NONE || !gives_up(v, slot, mark) || v.marks[slot].passes == mark) continue;
         v.kinds[slot] = SADMM_SWEPT_NONE;
         shared->found = 1;
     }

@@ -91,8 +91,8 @@ struct cuda_island {
     int32_t rows;         /* there are constraints given by rows: the weight scale stays 1, energies have no limit; and,
                              once iterations have ended, a kinematic body pushes */
     int32_t stopped;      /* iterations after which a check found the tolerances met; 0: not yet */
-    int32_t as_a_rule;    /* held, and not just by bodies of its own that roll on each other (sadmm_pair_rolls): what
-                             touches it is as step/move.h has it as a rule */
+    int32_t anchored_outside; /* anchored, and not just by bodies of its own that roll on each other (sadmm_pair_rolls):
+                                 what touches it is as step/move.h has it as a rule */
 };
 
 /* fast: of a step's stop rule (iterate/stop_rule.h). */

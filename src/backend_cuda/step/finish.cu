@@ -36,10 +36,10 @@ struct finish_shared {
 
 /* What its contacts say of a body; of its island where that may not be as it is as a rule (move.h). */
 static __device__ __forceinline__ void report_touch(const island_view &islands, int32_t body, int32_t label,
-                                                    bool as_a_rule, int touch)
+                                                    bool anchored_outside, int touch)
 {
-    add_touch(islands, body, label, as_a_rule ? touch & TOUCH_OF_BODY : touch);
-    if (!as_a_rule) islands.again[AGAIN] = 1;
+    add_touch(islands, body, label, anchored_outside ? touch & TOUCH_OF_BODY : touch);
+    if (!anchored_outside) islands.again[AGAIN] = 1;
     if (!(touch & TOUCH_SUPPORTED)) islands.again[AGAIN_UNPRESSED] = 1;
 }
 
@@ -69,12 +69,12 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     const int32_t label = touched ? v.graph.label[body] : 0;
     touching_begun begun = begin_touching(v, t.begin + t.lane, t.end);
     trapezoid_speeds own = {};
-    bool as_a_rule = true;
+    bool anchored_outside = true;
     pdl_wait();
     pdl_trigger();
     if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
     if (touched) {
-        as_a_rule = v.islands.info[label].as_a_rule;
+        anchored_outside = v.islands.info[label].anchored_outside;
         own = load_trapezoid_speeds<true>(v, body);
     }
     contact_sums sums = sum_touching<true>(v, own, &begun);
@@ -82,7 +82,7 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     if (t.begin < t.end && v.model.wrenches) add_owed(v, body, t.lane, sums.wrench);
     if (t.begin < t.end && v.model.wrenches)
         add_wrench(sums.wrench, t.lane, v.step.substep, v.step.substeps, v.step.wrench + 6 * t.body);
-    if (touched && t.lane == 0) report_touch(v.islands, body, label, as_a_rule, sums.touch);
+    if (touched && t.lane == 0) report_touch(v.islands, body, label, anchored_outside, sums.touch);
 }
 
 /* A body on its way: both places that there are as a rule. */

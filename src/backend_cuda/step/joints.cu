@@ -229,7 +229,7 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
         const int32_t count = v.raw.constraints[first + c].count;
         const size_t slots = (size_t)(first + c) * SADMM_MAX_ROWS;
         const bool articulated = v.joints.is_articulated[v.model.bodies + first + c];
-        /* All rows are fetched before the first is inspected: one wait for memory, not one a row. */
+        /* All rows are fetched before the first is used: one wait for memory, not one a row. */
         struct sadmm_joint_source source[SADMM_MAX_ROWS];
         double lambda[SADMM_MAX_ROWS];
 #pragma unroll

@@ -198,7 +198,7 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
 static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
 {
     const int32_t label = v.graph.label[i];
-    const int island = v.islands.touch[label] | (v.islands.info[label].as_a_rule ? TOUCH_AS_A_RULE : 0),
+    const int island = v.islands.touch[label] | (v.islands.info[label].anchored_outside ? TOUCH_AS_A_RULE : 0),
               own = v.islands.touch[i];
     if (trapezoid_kind_of(island, own) == TRAPEZOID_OWN) return; /* it was moved so: what more is known now can only
                                                                     turn the correction off */

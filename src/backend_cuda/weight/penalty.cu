@@ -71,7 +71,7 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
         }
     }
     if (t.live && (anchors || rolls) && v.islands.info) v.islands.info[v.graph.label[t.body]].anchored = 1;
-    if (t.live && anchors && v.islands.info) v.islands.info[v.graph.label[t.body]].as_a_rule = 1;
+    if (t.live && anchors && v.islands.info) v.islands.info[v.graph.label[t.body]].anchored_outside = 1;
     if (v.model.contact_rows == 1 || v.rows.count > 0) sum_lanes<PACKED>(C);
     sum_lanes<sizeof sums / sizeof(double)>(&sums.count);
     add_arm_sums(C, &sums);

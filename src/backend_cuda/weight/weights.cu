@@ -103,7 +103,7 @@ static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, co
     pdl_trigger(v.model.bodies);
     if (about.rows == 0) return; /* a joint may have fewer than there is room for */
     cuda_island *island = &v.islands.info[label];
-    if (args.start) island->rows = island->anchored = island->as_a_rule = 1; /* left alone */
+    if (args.start) island->rows = island->anchored = island->anchored_outside = 1; /* left alone */
     if (args.start && v.push.bits) v.push.bits[label] = PUSH_ROWS;
     const double share = weight_share(&island->weights, sums.load2);
     for (int r = 0; r < about.rows; ++r) {

@@ -128,7 +128,7 @@ SADMM_INLINE struct rigid_spin spin_end_whole(const struct sadmm_rigid *body, co
 }
 
 /* The pose and the velocity that the solution v leaves it with. mean: what it is moved by, and turned, where moments are
- * equal; halfway: its orientation then, inspected where they differ; whole: the correction is off. */
+ * equal; halfway: its orientation then, read where they differ; whole: the correction is off. */
 SADMM_INLINE void spin_move_from(const struct sadmm_rigid *body, const double halfway[4], const double v[6],
                                  const double mean[6], bool whole, double dt, double position[3],
                                  double orientation[4], double velocity[6])
