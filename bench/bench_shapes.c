@@ -76,7 +76,7 @@ static sadmm_status append_block(struct bench *b, struct form *form, const doubl
 static sadmm_status add_hull(struct bench *b, const char *name, const double *points, size_t count,
                              double convex_radius, struct sadmm_error *error)
 {
-    const sadmm_hull_def def = {.points = points, .point_count = count, .merge = 1e-6, .convex_radius = convex_radius};
+    const sadmm_hull_def def = {.struct_size = sizeof def, .points = points, .point_count = count, .merge = 1e-6, .convex_radius = convex_radius};
     sadmm_hull *hull;
     sadmm_status status = sadmm_hull_create(&def, &hull);
     if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_last_message());
@@ -111,8 +111,8 @@ static sadmm_status make_ground(int side, double spacing, double height, bool in
         to += 6;
     }
     if (status == SADMM_OK) {
-        const sadmm_mesh_def triangles = {x, points, corners, 2 * cells};
-        const sadmm_heightfield_def field = {z, side, side, {spacing, spacing}};
+        const sadmm_mesh_def triangles = {sizeof triangles, x, points, corners, 2 * cells};
+        const sadmm_heightfield_def field = {sizeof field, z, side, side, {spacing, spacing}};
         status = in_triangles ? sadmm_mesh_create(&triangles, mesh) : sadmm_heightfield_create(&field, mesh);
         if (status != SADMM_OK) status = sadmm_fail(error, status, "%s", sadmm_last_message());
     }

@@ -260,7 +260,7 @@ static inline struct sadmm_geometry mesh_in_data(struct test_shape_data *shape_d
         mesh = soup_mesh(s);
         free(s);
     } else {
-        const sadmm_heightfield_def def = {heights, 20, 15, {size / 4, size / 3}};
+        const sadmm_heightfield_def def = {sizeof def, heights, 20, 15, {size / 4, size / 3}};
         for (int i = 0; i < 20 * 15; ++i) heights[i] = size * (uniform() - 0.5);
         ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);
     }

@@ -45,7 +45,7 @@ static inline void soup_triangle(struct soup *s, int32_t a, int32_t b, int32_t c
 
 static inline sadmm_mesh *soup_mesh(const struct soup *s)
 {
-    const sadmm_mesh_def def = {s->x, s->vertices, s->corner, s->triangles};
+    const sadmm_mesh_def def = {sizeof def, s->x, s->vertices, s->corner, s->triangles};
     sadmm_mesh *mesh = NULL;
     ck_assert_msg(sadmm_mesh_create(&def, &mesh) == SADMM_OK, "%s", sadmm_last_message());
     return mesh;
@@ -172,7 +172,7 @@ static inline sadmm_mesh *soup_some_mesh(int kind)
     case 5: s = soup_box(half, 6); break;
     case 6: s = soup_ball(round, 8); break;
     default: { /* noise: every corner a peak or a pit */
-        const sadmm_heightfield_def def = {z, 24, 20, {0.12, 0.15}};
+        const sadmm_heightfield_def def = {sizeof def, z, 24, 20, {0.12, 0.15}};
         for (int i = 0; i < 24 * 20; ++i) z[i] = 0.15 * soup_number(&seed);
         ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);
         return mesh;

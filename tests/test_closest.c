@@ -218,7 +218,7 @@ static struct alone *take_apart(const struct mesh *m)
         static const int32_t order[3] = {0, 1, 2};
         int32_t corner[3], opposite[3];
         double x[9];
-        const sadmm_mesh_def def = {x, 3, order, 1};
+        const sadmm_mesh_def def = {sizeof def, x, 3, order, 1};
         mesh_corners(m, t, corner, opposite);
         for (int c = 0; c < 3; ++c) v3_store(mesh_vertex(m, corner[c]), x + 3 * c);
         ck_assert_int_eq(sadmm_mesh_create(&def, &all[t].mesh), SADMM_OK);

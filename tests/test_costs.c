@@ -135,7 +135,7 @@ static sadmm_mesh *triangle(void)
 {
     static const double corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     static const int32_t numbers[3] = {0, 1, 2};
-    const sadmm_mesh_def def = {corners[0], 3, numbers, 1};
+    const sadmm_mesh_def def = {sizeof def, corners[0], 3, numbers, 1};
     sadmm_mesh *mesh;
     ck_assert_int_eq(sadmm_mesh_create(&def, &mesh), SADMM_OK);
     return mesh;

@@ -121,7 +121,7 @@ static void add_piece(sadmm_world *world, sadmm_body_id body, sadmm_shape_type t
 static sadmm_mesh *flat_field(int columns, int rows, double spacing)
 {
     double *z = calloc((size_t)columns * (size_t)rows, sizeof *z);
-    const sadmm_heightfield_def def = {z, columns, rows, {spacing, spacing}};
+    const sadmm_heightfield_def def = {sizeof def, z, columns, rows, {spacing, spacing}};
     sadmm_mesh *mesh = NULL;
     ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);
     free(z);

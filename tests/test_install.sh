@@ -1,6 +1,6 @@
 #!/bin/sh
 # The installed tree works for a user: pkg-config finds it, a program links with the shared and with the static library,
-# in C and in C++, and runs; the shared library exports sadmm_ symbols only and stays loaded.
+# in C and in C++, with its headers and with those of a later version, and runs; the shared library exports sadmm_ symbols only and stays loaded.
 # usage: test_install.sh BUILD_FOLDER PROGRAM.c
 set -eu
 
@@ -33,6 +33,13 @@ link() {
     flags="-Wall -Wextra -Werror $(pkg-config --cflags subadmm)"
     link shared_c ${CC:-cc} $flags -std=c11 "$program" $(pkg-config --libs subadmm)
     link shared_c++ ${CXX:-c++} $flags -std=c++17 -x c++ "$program" -x none $(pkg-config --libs subadmm)
+    # Headers of a later version, with a member more in every struct that may grow (subadmm/status.h).
+    cp -r "$(pkg-config --variable=includedir subadmm)" "$folder/later"
+    for struct in settings world_def body_def shape_def joint_coordinate joint_def step_report; do
+        sed -i "s/^} sadmm_$struct;/    double later;\n&/" "$folder"/later/subadmm/*.h
+    done
+    [ "$(cat "$folder"/later/subadmm/*.h | grep -c '^    double later;')" = 7 ] || { echo "not every struct has grown"; exit 1; }
+    link later_c ${CC:-cc} -Wall -Wextra -Werror -I"$folder/later" -std=c11 "$program" $(pkg-config --libs subadmm)
     # As docs/guide/install.md says, with both libraries in one folder.
     link static_c ${CC:-cc} $flags -std=c11 "$program" $(pkg-config --static --libs subadmm | sed 's/-lsubadmm/-l:libsubadmm.a/')
 }

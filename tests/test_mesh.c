@@ -127,7 +127,7 @@ START_TEST(a_heightfield_is_a_mesh)
         double z[COLUMNS * ROWS];
         struct soup *s = soup_ground(COLUMNS, ROWS, 0.5, 0, 1, heights[kind]);
         for (int v = 0; v < COLUMNS * ROWS; ++v) z[v] = s->x[3 * v + 2];
-        const sadmm_heightfield_def def = {z, COLUMNS, ROWS, {0.5, 0.5}};
+        const sadmm_heightfield_def def = {sizeof def, z, COLUMNS, ROWS, {0.5, 0.5}};
         sadmm_mesh *field, *mesh = soup_mesh(s);
         ck_assert_int_eq(sadmm_heightfield_create(&def, &field), SADMM_OK);
         const struct mesh f = view_of(field), m = view_of(mesh);
@@ -224,7 +224,7 @@ START_TEST(walks_find_all_that_is_near)
     struct soup *soups[] = {soup_ground(40, 25, 0.1, 0.24, 5, bumpy), soup_box(half, 12), soup_ball(half, 12)};
     sadmm_mesh *meshes[4];
     for (int v = 0; v < 40 * 25; ++v) z[v] = 0.2 * soup_number(&seed);
-    const sadmm_heightfield_def field = {z, 40, 25, {0.1, 0.15}};
+    const sadmm_heightfield_def field = {sizeof field, z, 40, 25, {0.1, 0.15}};
     for (int k = 0; k < 3; ++k) meshes[k] = soup_mesh(soups[k]);
     ck_assert_int_eq(sadmm_heightfield_create(&field, &meshes[3]), SADMM_OK);
     for (int k = 0; k < 4; ++k) {
@@ -294,7 +294,7 @@ START_TEST(bad_meshes_are_refused)
     const double x[] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, far[] = {0, 0, 0, 1, 0, 2e6, 0, 1, 0},
                  none[] = {0, 0, 0, 1, NAN, 0, 0, 1, 0}, line[] = {0, 0, 0, 1, 1, 1, 3, 3, 3};
     const int32_t corners[] = {0, 1, 2}, beyond[] = {0, 1, 3}, below[] = {0, -1, 2};
-    sadmm_mesh_def def = {x, 3, corners, 1};
+    sadmm_mesh_def def = {sizeof def, x, 3, corners, 1};
     ck_assert_int_eq(sadmm_mesh_create(&def, NULL), SADMM_ERROR_INVALID_ARGUMENT);
     refused(NULL, "def");
     def.vertices = NULL;
@@ -324,7 +324,7 @@ START_TEST(bad_meshes_are_refused)
     ck_assert_uint_eq(sadmm_mesh_bytes(NULL), 0);
 
     const double z[4] = {0, 1, 2, INFINITY};
-    sadmm_heightfield_def field = {z, 2, 2, {1, 1}};
+    sadmm_heightfield_def field = {sizeof field, z, 2, 2, {1, 1}};
     field_refused(NULL, "def");
     field_refused(&field, "def->heights[3] = inf: must be in [-1e6, 1e6]");
     field.spacing[1] = 0;
@@ -344,8 +344,8 @@ END_TEST
 START_TEST(memory_may_run_out)
 {
     struct soup *s = soup_ground(6, 6, 1, 0.2, 1, bumpy);
-    const sadmm_mesh_def def = {s->x, s->vertices, s->corner, s->triangles};
-    const sadmm_heightfield_def field = {s->x, 6, 6, {1, 1}};
+    const sadmm_mesh_def def = {sizeof def, s->x, s->vertices, s->corner, s->triangles};
+    const sadmm_heightfield_def field = {sizeof field, s->x, 6, 6, {1, 1}};
     for (int kind = 0; kind < 2; ++kind) {
         sadmm_status status = SADMM_ERROR_OUT_OF_MEMORY;
         sadmm_mesh *mesh = NULL;
@@ -464,7 +464,7 @@ START_TEST(heightfields_are_read_back)
 {
     double z[3 * 4], got[3], spacing[2];
     for (int i = 0; i < 12; ++i) z[i] = 1.3 * sin(i) - 0.2;
-    const sadmm_heightfield_def def = {z, 3, 4, {0.5, 0.25}};
+    const sadmm_heightfield_def def = {sizeof def, z, 3, 4, {0.5, 0.25}};
     sadmm_mesh *mesh = NULL;
     int32_t columns, rows, corner[3], number;
     ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);

@@ -137,7 +137,7 @@ static sadmm_mesh *flat_ground(int kind)
 {
     if (kind == 0) {
         static double z[41 * 41];
-        const sadmm_heightfield_def def = {z, 41, 41, {0.17, 0.19}};
+        const sadmm_heightfield_def def = {sizeof def, z, 41, 41, {0.17, 0.19}};
         sadmm_mesh *mesh = NULL;
         ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);
         return mesh;
@@ -343,7 +343,7 @@ START_TEST(nothing_fast_passes)
     double z[61 * 61];
     struct soup *s = soup_ground(61, 61, 0.1, 0, 1, hilly);
     for (int v = 0; v < 61 * 61; ++v) z[v] = s->x[3 * v + 2];
-    const sadmm_heightfield_def def = {z, 61, 61, {0.1, 0.1}};
+    const sadmm_heightfield_def def = {sizeof def, z, 61, 61, {0.1, 0.1}};
     for (int kind = 0; kind < 2; ++kind) {
         sadmm_mesh *mesh = kind ? soup_mesh(s) : NULL;
         if (!kind) ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);

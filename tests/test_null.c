@@ -425,8 +425,8 @@ static void on_meshes(void)
 {
     const double zeros[4] = {0};
     const int32_t corners[3] = {0, 1, 2};
-    const sadmm_mesh_def def = sadmm_mesh_def_default(), no_triangles = {zeros, 3, NULL, 1},
-                         no_vertices = {NULL, 3, corners, 1};
+    const sadmm_mesh_def def = sadmm_mesh_def_default(), no_triangles = {sizeof def, zeros, 3, NULL, 1},
+                         no_vertices = {sizeof def, NULL, 3, corners, 1};
     const sadmm_heightfield_def field = sadmm_heightfield_def_default();
     sadmm_mesh *mesh = NULL;
     double lowest[3], highest[3];
@@ -490,6 +490,23 @@ static void on_masses(void)
     REFUSES("orientation", sadmm_mass_pose_of_body(&mass, position, NULL));
 }
 
+/* Nothing is written. */
+static void on_defaults(void)
+{
+    sadmm_settings_init(NULL, sizeof(sadmm_settings));
+    sadmm_world_def_init(NULL, sizeof(sadmm_world_def), sizeof(sadmm_settings));
+    sadmm_body_def_init(NULL, sizeof(sadmm_body_def));
+    sadmm_shape_def_init(NULL, sizeof(sadmm_shape_def));
+    sadmm_hull_def_init(NULL, sizeof(sadmm_hull_def));
+    sadmm_joint_def_init(NULL, sizeof(sadmm_joint_def), sizeof(sadmm_joint_coordinate));
+    sadmm_coupling_def_init(NULL, sizeof(sadmm_coupling_def));
+    sadmm_gear_def_init(NULL, sizeof(sadmm_gear_def));
+    sadmm_mesh_def_init(NULL, sizeof(sadmm_mesh_def));
+    sadmm_heightfield_def_init(NULL, sizeof(sadmm_heightfield_def));
+    sadmm_mesh_file_def_init(NULL, sizeof(sadmm_mesh_file_def));
+    sadmm_query_filter_init(NULL, sizeof(sadmm_query_filter));
+}
+
 /* By the function that passes NULL to them; those without a pointer have none. */
 #define P(name) "sadmm_problem_" #name
 #define W(name) "sadmm_world_" #name
@@ -497,37 +514,37 @@ static const struct {
     void (*pass_null)(void);
     const char *names[24];
 } functions[] = {
-    {on_worlds, {W(create), W(destroy), W(message), W(settings), W(set_settings), W(set_backend)}},
+    {on_worlds, {W(create), W(destroy), W(message), W(settings_sized), W(set_settings), W(set_backend)}},
     {on_bodies,
-     {W(add_body), W(remove_body), W(body_count), W(body_at), W(body_state), W(set_body_state), W(body_def),
+     {W(add_body), W(remove_body), W(body_count), W(body_at), W(body_state), W(set_body_state), W(body_def_sized),
       W(set_body_wrench), W(add_body_force_at), W(apply_body_impulse_at), W(set_body_mass), W(set_body_user_data),
       W(set_body_gravity_scale), W(set_body_damping), W(move_body),
       W(body_user_data), W(body_contact_wrench), W(set_body_pair_contact), W(body_wrench), W(body_move),
       W(body_pair_off_count), W(body_pair_off_at)}},
     {on_shapes,
-     {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def), W(set_shape_material),
+     {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def_sized), W(set_shape_material),
       W(set_pair_friction), W(pair_friction_count), W(pair_friction_at)}},
     {on_joints,
-     {W(place_joint), W(add_joint), W(remove_joint), W(joint_count), W(joint_at), W(joint_def), W(set_joint_enabled),
-      W(set_joint_coordinate), W(joint_state), W(set_joint_spring_table), W(joint_spring_table)}},
+     {W(place_joint), W(add_joint), W(remove_joint), W(joint_count), W(joint_at), W(joint_def_sized), W(set_joint_enabled),
+      W(set_joint_coordinate_sized), W(joint_state), W(set_joint_spring_table), W(joint_spring_table)}},
     {on_couplings,
-     {W(add_coupling), W(remove_coupling), W(coupling_count), W(coupling_at), W(coupling_def), W(set_coupling_target),
+     {W(add_coupling), W(remove_coupling), W(coupling_count), W(coupling_at), W(coupling_def_sized), W(set_coupling_target),
       W(set_coupling_gains), W(set_coupling_limits), W(set_coupling_enabled), W(coupling_state)}},
     {on_arrays,
      {"sadmm_array_columns", "sadmm_array_is_settable", W(array_rows), W(get_array), W(set_array), W(body_index),
       W(shape_index), W(joint_index), W(coupling_index), W(device_array), W(dynamic_bodies)}},
     {on_saves, {W(save), W(restore)}},
     {on_gears,
-     {W(add_gear), W(remove_gear), W(gear_count), W(gear_at), W(gear_def), W(set_gear_enabled), W(gear_state)}},
+     {W(add_gear), W(remove_gear), W(gear_count), W(gear_at), W(gear_def_sized), W(set_gear_enabled), W(gear_state)}},
     {on_queries,
-     {"sadmm_query_filter_default", W(cast_ray), W(cast_ray_all), W(cast_rays), W(overlap_box), W(overlap_shape),
+     {W(cast_ray), W(cast_ray_all), W(cast_rays), W(overlap_box), W(overlap_shape),
       W(closest_points), W(closest_to_shape)}},
     {on_events, {W(record_events), W(event_capacity), W(event_count), W(take_events), W(sensor_overlaps)}},
     {on_steps,
-     {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(contact_errors), W(state_hash), W(explain), W(freeze)}},
+     {W(step), W(step_async), W(wait), W(report_sized), W(contact_count), W(contacts), W(contact_errors), W(state_hash), W(explain), W(freeze)}},
     {on_problems,
      {P(create), P(destroy), P(message), P(set_bodies), P(set_contacts), P(set_blocks), P(body_count), P(contact_count),
-      P(block_count), P(get_bodies), P(get_contact), P(get_block), P(set_device), P(set_tasks), P(solve),
+      P(block_count), P(get_bodies), P(get_contact), P(get_block), P(set_device), P(set_tasks), P(solve_sized),
       P(get_solution), P(set_solution), P(certify)}},
     {on_hulls,
      {"sadmm_hull_create", "sadmm_hull_destroy", "sadmm_hull_vertex_count", "sadmm_hull_edge_count",
@@ -540,15 +557,17 @@ static const struct {
     {on_mesh_files,
      {"sadmm_mesh_file_read", "sadmm_mesh_file_destroy", "sadmm_mesh_file_vertex_count",
       "sadmm_mesh_file_triangle_count", "sadmm_mesh_file_vertices", "sadmm_mesh_file_triangles",
-      "sadmm_mesh_file_describe"}},
+      "sadmm_mesh_file_describe_sized"}},
     {on_masses,
      {"sadmm_shape_mass", "sadmm_mass_sum", "sadmm_mass_pose_in_body", "sadmm_mass_pose_of_body"}},
-    {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
+    {on_others, {"sadmm_backend_query_sized", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
+    {on_defaults,
+     {"sadmm_settings_init", W(def_init), "sadmm_body_def_init", "sadmm_shape_def_init", "sadmm_hull_def_init",
+      "sadmm_joint_def_init", "sadmm_coupling_def_init", "sadmm_gear_def_init", "sadmm_mesh_def_init",
+      "sadmm_heightfield_def_init", "sadmm_mesh_file_def_init", "sadmm_query_filter_init"}},
     {NULL,
-     {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
-      "sadmm_hull_def_default", "sadmm_joint_def_default", "sadmm_coupling_def_default", "sadmm_gear_def_default",
-      "sadmm_mesh_def_default", "sadmm_heightfield_def_default", "sadmm_mesh_file_def_default", "sadmm_status_name",
-      "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
+     {"sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_version_number", "sadmm_build_commit",
+      "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };
 
@@ -623,6 +642,7 @@ START_TEST(every_exported_function_is_listed)
     ck_assert_ptr_nonnull(symbols);
     while (fgets(line, sizeof line, symbols))
         if (sscanf(line, "%*s %c %199[^@\n]", &type, name) == 2 && strncmp(name, "sadmm_", 6) == 0) {
+            ck_assert_msg(strstr(line, "@@SUBADMM_") != NULL, "%s: without a version", name);
             ck_assert_msg(is_listed(name), "%s: exported, and nothing here passes NULL to it", name);
             ++exported;
         }

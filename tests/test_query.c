@@ -346,9 +346,9 @@ START_TEST(triangles_have_their_numbers)
 {
     static const double x[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 2, 0, 0, 3, 0, 0, 2, 1, 0};
     static const int32_t corners[] = {0, 1, 3, 4, 5, 6, 0, 1, 2}; /* the first one is none */
-    const sadmm_mesh_def def = {x, 7, corners, 3};
+    const sadmm_mesh_def def = {sizeof def, x, 7, corners, 3};
     const double flat[9] = {0};
-    const sadmm_heightfield_def field_def = {flat, 3, 3, {1, 1}};
+    const sadmm_heightfield_def field_def = {sizeof field_def, flat, 3, 3, {1, 1}};
     sadmm_mesh *mesh, *field;
     sadmm_world *world = empty_world();
     const sadmm_body_id body = add_body(world, SADMM_BODY_STATIC, 0, 0, 0),
@@ -521,8 +521,8 @@ static sadmm_world *flush_world(struct random *r, bool turned)
     static const int32_t halves[2][3] = {{0, 1, 2}, {0, 2, 3}};
     static const sadmm_shape_type types[] = {SADMM_SHAPE_PLANE, SADMM_SHAPE_MESH, SADMM_SHAPE_BOX, SADMM_SHAPE_CYLINDER,
                                              SADMM_SHAPE_MESH, SADMM_SHAPE_CONE};
-    const sadmm_mesh_def mesh_def = {square[0], 4, halves[0], 2};
-    const sadmm_heightfield_def field_def = {flat, 3, 3, {1.7, 1.7}};
+    const sadmm_mesh_def mesh_def = {sizeof mesh_def, square[0], 4, halves[0], 2};
+    const sadmm_heightfield_def field_def = {sizeof field_def, flat, 3, 3, {1.7, 1.7}};
     sadmm_world *world = empty_world();
     sadmm_body_def body_def = sadmm_body_def_default();
     sadmm_body_id body;

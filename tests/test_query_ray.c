@@ -330,7 +330,7 @@ START_TEST(crosses_a_grid)
     struct mesh m;
     int hits = 0;
     for (int i = 0; i < COLUMNS * ROWS; ++i) z[i] = 0.05 * sin(0.1 * (i % COLUMNS)) + (i % 37 == 0 ? 0.5 : 0);
-    const sadmm_heightfield_def def = {z, COLUMNS, ROWS, {0.1, 0.23}};
+    const sadmm_heightfield_def def = {sizeof def, z, COLUMNS, ROWS, {0.1, 0.23}};
     ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);
     mesh_at(mesh->block, 0, &m);
     for (int n = 0; n < (getenv("SADMM_TEST_SHORT") ? 10 : 60); ++n) {

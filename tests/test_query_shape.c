@@ -173,7 +173,7 @@ START_TEST(closest_on_meshes)
 {
     static const double x[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0, 3, 0, 0, 2, 1, 0};
     static const int32_t corners[] = {0, 1, 1, 3, 4, 5, 0, 1, 2}; /* the first one is none */
-    const sadmm_mesh_def def = {x, 6, corners, 3};
+    const sadmm_mesh_def def = {sizeof def, x, 6, corners, 3};
     sadmm_mesh *mesh;
     sadmm_world *world = empty_world();
     const sadmm_body_id body = add_body(world, SADMM_BODY_STATIC, 0, 0, 1),

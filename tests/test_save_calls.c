@@ -84,8 +84,8 @@ static sadmm_mesh *make_mesh(struct draw *d)
     static const int32_t triangles[4][3] = {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}};
     static const double heights[9] = {0, 0.3, 0, 0.3, 0, 0.3, 0, 0.3, 0};
     sadmm_mesh *mesh;
-    sadmm_mesh_def def = {square[0], 5, triangles[0], 4};
-    sadmm_heightfield_def field = {heights, 3, 3, {3, 3}};
+    sadmm_mesh_def def = {sizeof def, square[0], 5, triangles[0], 4};
+    sadmm_heightfield_def field = {sizeof field, heights, 3, 3, {3, 3}};
     sadmm_test_fail_allocations_after(-1);
     ck_assert_int_eq(below(d, 2) ? sadmm_mesh_create(&def, &mesh) : sadmm_heightfield_create(&field, &mesh), SADMM_OK);
     return mesh;

@@ -142,7 +142,7 @@ START_TEST(standing_still)
                     egg = shape_of(SADMM_SHAPE_ELLIPSOID, 0.4, 0.3, 0.2);
     const double corners[24] = {-.2, -.2, -.1, .2, -.2, -.1, -.2, .2, -.1, .2, .2, -.1,
                                 -.2, -.2, .1,  .2, -.2, .1,  -.2, .2, .1,  .2, .2, .1};
-    const sadmm_hull_def points = {.points = corners, .point_count = 8, .convex_radius = 0.05};
+    const sadmm_hull_def points = {.struct_size = sizeof points, .points = corners, .point_count = 8, .convex_radius = 0.05};
     sadmm_body_id ids[6];
     double position[6][3], start[6][3];
     sadmm_mass mass;
@@ -271,7 +271,7 @@ START_TEST(shape_data_stays_as_long_as_it_is_needed)
     sadmm_world *world = make_world(0.005, 0, BOX);
     const sadmm_shape_def shape = shape_of(SADMM_SHAPE_CYLINDER, 0.2, 0.3, 0);
     const double at[3] = {0, 0, 0.3}, corners[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
-    const sadmm_hull_def points = {.points = corners, .point_count = 4};
+    const sadmm_hull_def points = {.struct_size = sizeof points, .points = corners, .point_count = 4};
     sadmm_hull *hull = NULL;
     sadmm_mass mass;
     sadmm_shape_id first, second;

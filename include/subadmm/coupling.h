@@ -29,6 +29,7 @@ extern "C" {
 typedef struct sadmm_coupling_id { uint32_t slot, generation; } sadmm_coupling_id;
 
 typedef struct sadmm_coupling_def {
+    size_t struct_size;          /* set by sadmm_coupling_def_default() */
     sadmm_body_id body;          /* dynamic. No default */
     double position[3];          /* origin of the frame on the body, in its body frame, m, |x| <= 1e9; default 0 */
     double orientation[4];       /* the frame to the body, w x y z, | |q| - 1 | <= 1e-6 (then normalised); default
@@ -47,7 +48,13 @@ typedef struct sadmm_coupling_def {
 } sadmm_coupling_def;
 
 /* The defaults named above. Thread-safe. */
-SADMM_API sadmm_coupling_def sadmm_coupling_def_default(void);
+SADMM_API void sadmm_coupling_def_init(sadmm_coupling_def *def, size_t size);
+static inline sadmm_coupling_def sadmm_coupling_def_default(void)
+{
+    sadmm_coupling_def def;
+    sadmm_coupling_def_init(&def, sizeof def);
+    return def;
+}
 
 /* *id: the new coupling, until it or its body is removed. Errors: STALE_ID, INVALID_ARGUMENT (range; the body is
  * static; nothing changes), LIMIT (2^24 joints and couplings), OUT_OF_MEMORY, DEVICE. */
@@ -60,7 +67,11 @@ SADMM_API int32_t sadmm_world_coupling_count(const sadmm_world *world); /* also 
  * (range). */
 SADMM_API sadmm_status sadmm_world_coupling_at(sadmm_world *world, int32_t index, sadmm_coupling_id *id);
 /* Read back the definition as it is now. Errors: STALE_ID, DEVICE. */
-SADMM_API sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *def);
+SADMM_API sadmm_status sadmm_world_coupling_def_sized(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *def, size_t size);
+static inline sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *def)
+{
+    return sadmm_world_coupling_def_sized(world, id, def, sizeof *def);
+}
 
 /* Set the target at the current time of the world, from the next step on: position (m, world), orientation (target to
  * world, w x y z, unit within 1e-6), velocity (linear, angular, world; NULL: 0). May be called before every step (some

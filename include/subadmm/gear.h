@@ -28,6 +28,7 @@ extern "C" {
 typedef struct sadmm_gear_id { uint32_t slot, generation; } sadmm_gear_id;
 
 typedef struct sadmm_gear_def {
+    size_t struct_size;          /* set by sadmm_gear_def_default() */
     sadmm_joint_id joint_1, joint_2; /* may be the same, with two coordinates. No default */
     int32_t coordinate_1, coordinate_2; /* free ones, in [0, 6): any translation or distance; rotations that are the
                                            only free one or one of two. No default */
@@ -38,7 +39,13 @@ typedef struct sadmm_gear_def {
 } sadmm_gear_def;
 
 /* The defaults named above. Thread-safe. */
-SADMM_API sadmm_gear_def sadmm_gear_def_default(void);
+SADMM_API void sadmm_gear_def_init(sadmm_gear_def *def, size_t size);
+static inline sadmm_gear_def sadmm_gear_def_default(void)
+{
+    sadmm_gear_def def;
+    sadmm_gear_def_init(&def, sizeof def);
+    return def;
+}
 
 /* *id: the new gear, until it, or one of its joints or their bodies, is removed. An error of the offset is corrected by
  * at most settings.correction_speed of coordinate 1. Errors: STALE_ID, INVALID_ARGUMENT (range; a coordinate that is
@@ -52,7 +59,11 @@ SADMM_API int32_t sadmm_world_gear_count(const sadmm_world *world); /* also thos
 /* The index-th live gear in order of creation slot, index in [0, gear_count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_world_gear_at(sadmm_world *world, int32_t index, sadmm_gear_id *id);
 /* Read back the definition as it is now. Errors: STALE_ID. */
-SADMM_API sadmm_status sadmm_world_gear_def(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def);
+SADMM_API sadmm_status sadmm_world_gear_def_sized(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def, size_t size);
+static inline sadmm_status sadmm_world_gear_def(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def)
+{
+    return sadmm_world_gear_def_sized(world, id, def, sizeof *def);
+}
 /* From the next step on; its offset stays. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_set_gear_enabled(sadmm_world *world, sadmm_gear_id id, bool enabled);
 

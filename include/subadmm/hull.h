@@ -21,6 +21,7 @@ extern "C" {
 typedef struct sadmm_hull sadmm_hull;
 
 typedef struct sadmm_hull_def {
+    size_t struct_size;   /* set by sadmm_hull_def_default() */
     const double *points; /* 3 numbers a point, m, each in [-1e6, 1e6]; in any frame and order; repeated points and
                              points inside have no effect. Only read while the hull is made. No default */
     size_t point_count;   /* in [4, 1e6]; no default */
@@ -34,7 +35,13 @@ typedef struct sadmm_hull_def {
 } sadmm_hull_def;
 
 /* The defaults named above. Thread-safe. */
-SADMM_API sadmm_hull_def sadmm_hull_def_default(void);
+SADMM_API void sadmm_hull_def_init(sadmm_hull_def *def, size_t size);
+static inline sadmm_hull_def sadmm_hull_def_default(void)
+{
+    sadmm_hull_def def;
+    sadmm_hull_def_init(&def, sizeof def);
+    return def;
+}
 
 /* *out: the hull, which belongs to the caller until sadmm_hull_destroy; NULL after an error. Thread-safe.
  * Errors: INVALID_ARGUMENT (range; points that lie in one point, line or plane to within 1e-6 of their largest extent,

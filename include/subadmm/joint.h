@@ -56,7 +56,7 @@ typedef enum sadmm_drive {
 } sadmm_drive;
 
 /* What acts along one free coordinate (position q, speed dq/dt). Default: nothing. Units are those of translations; for
- * rotations read rad for m, and N m for N. */
+ * rotations read rad for m, and N m for N. It may grow; its size in the program is sadmm_joint_def.coordinate_size. */
 typedef struct sadmm_joint_coordinate {
     bool limited;                /* lower <= q <= upper; default false */
     double lower, upper;         /* m, lower <= upper, either may be infinite (no limit on that side); default 0 */
@@ -77,6 +77,8 @@ typedef struct sadmm_joint_coordinate {
 } sadmm_joint_coordinate;
 
 typedef struct sadmm_joint_def {
+    size_t struct_size;          /* set by sadmm_joint_def_default() */
+    size_t coordinate_size;      /* of a sadmm_joint_coordinate in the program, bytes; likewise */
     sadmm_joint_kind kind;       /* default FIXED */
     uint32_t locks;              /* CUSTOM: bit k locks coordinate k, in [0, 63]; default 0. Ignored for other kinds.
                                     Read back: the locks of the kind */
@@ -102,7 +104,13 @@ typedef struct sadmm_joint_def {
 } sadmm_joint_def;
 
 /* The defaults named above. Thread-safe. */
-SADMM_API sadmm_joint_def sadmm_joint_def_default(void);
+SADMM_API void sadmm_joint_def_init(sadmm_joint_def *def, size_t size, size_t coordinate_size);
+static inline sadmm_joint_def sadmm_joint_def_default(void)
+{
+    sadmm_joint_def def;
+    sadmm_joint_def_init(&def, sizeof def, sizeof *def.coordinates);
+    return def;
+}
 
 /* Set both frames of `def` (position_a, orientation_a, position_b, orientation_b) to the pose `position` (m, |x| <=
  * 1e9) and `orientation` (joint to world, w x y z, unit within 1e-6) in the world, by the current poses of its bodies.
@@ -121,14 +129,24 @@ SADMM_API int32_t sadmm_world_joint_count(const sadmm_world *world); /* also tho
 /* The index-th live joint in order of creation slot, index in [0, joint_count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint_id *id);
 /* Read back the definition as it is now. Errors: STALE_ID, DEVICE. */
-SADMM_API sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def);
+SADMM_API sadmm_status sadmm_world_joint_def_sized(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def,
+                                                   size_t size, size_t coordinate_size);
+static inline sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def)
+{
+    return sadmm_world_joint_def_sized(world, id, def, sizeof *def, sizeof *def->coordinates);
+}
 /* From the next step on; enabling a broken joint repairs it. On CUDA, here and below: sent with the next step, without
  * waiting. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled);
 /* Replace what acts along a free coordinate, index in [0, 6), from the next step on. Errors: STALE_ID, INVALID_ARGUMENT
  * (range; the coordinate is locked, or the joint has none of that index; nothing changes), DEVICE. */
-SADMM_API sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
-                                                        const sadmm_joint_coordinate *coordinate);
+SADMM_API sadmm_status sadmm_world_set_joint_coordinate_sized(sadmm_world *world, sadmm_joint_id id, int32_t index,
+                                                              const sadmm_joint_coordinate *coordinate, size_t size);
+static inline sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
+                                                            const sadmm_joint_coordinate *coordinate)
+{
+    return sadmm_world_set_joint_coordinate_sized(world, id, index, coordinate, sizeof *coordinate);
+}
 
 enum { SADMM_MOST_SPRING_POINTS = 64 };
 

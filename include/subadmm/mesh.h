@@ -26,6 +26,7 @@ extern "C" {
 typedef struct sadmm_mesh sadmm_mesh;
 
 typedef struct sadmm_mesh_def {
+    size_t struct_size;       /* set by sadmm_mesh_def_default() */
     const double *vertices;   /* 3 numbers each, m, in [-1e6, 1e6]; equal ones are merged. Vertices and triangles are
                                  only read while the mesh is made. No default */
     size_t vertex_count;      /* in [3, 2^26]; no default */
@@ -35,8 +36,14 @@ typedef struct sadmm_mesh_def {
     size_t triangle_count;    /* in [1, 2^26]; no default */
 } sadmm_mesh_def;
 
-/* All zero. Thread-safe. */
-SADMM_API sadmm_mesh_def sadmm_mesh_def_default(void);
+/* All other members are 0. Thread-safe. */
+SADMM_API void sadmm_mesh_def_init(sadmm_mesh_def *def, size_t size);
+static inline sadmm_mesh_def sadmm_mesh_def_default(void)
+{
+    sadmm_mesh_def def;
+    sadmm_mesh_def_init(&def, sizeof def);
+    return def;
+}
 
 /* *out: the mesh, which belongs to the caller until sadmm_mesh_destroy; NULL after an error. Thread-safe. Errors:
  * INVALID_ARGUMENT (range; no triangle is left), OUT_OF_MEMORY. */
@@ -45,6 +52,7 @@ SADMM_API sadmm_status sadmm_mesh_create(const sadmm_mesh_def *def, sadmm_mesh *
 /* Heights over a regular grid in the x-y plane, centred at the origin; bodies are above. Every cell is two triangles,
  * split by the diagonal from its lowest x and y to its highest. */
 typedef struct sadmm_heightfield_def {
+    size_t struct_size;       /* set by sadmm_heightfield_def_default() */
     const double *heights;    /* m, in [-1e6, 1e6], columns x rows of them: x runs fastest. Only read while the mesh is
                                  made. No default */
     int32_t columns, rows;    /* heights along x, and along y: each in [2, 16384], their product at most 2^26; no
@@ -52,8 +60,14 @@ typedef struct sadmm_heightfield_def {
     double spacing[2];        /* between two of them along x, and along y, m, in [1e-6, 1e6]; no default */
 } sadmm_heightfield_def;
 
-/* All zero. Thread-safe. */
-SADMM_API sadmm_heightfield_def sadmm_heightfield_def_default(void);
+/* All other members are 0. Thread-safe. */
+SADMM_API void sadmm_heightfield_def_init(sadmm_heightfield_def *def, size_t size);
+static inline sadmm_heightfield_def sadmm_heightfield_def_default(void)
+{
+    sadmm_heightfield_def def;
+    sadmm_heightfield_def_init(&def, sizeof def);
+    return def;
+}
 /* As sadmm_mesh_create; takes a tenth of the memory of a mesh of the same surface. The shape's frame is that of the
  * grid. */
 SADMM_API sadmm_status sadmm_heightfield_create(const sadmm_heightfield_def *def, sadmm_mesh **out);

@@ -45,6 +45,7 @@ typedef enum sadmm_mesh_file_format {
 } sadmm_mesh_file_format;
 
 typedef struct sadmm_mesh_file_def {
+    size_t struct_size;            /* set by sadmm_mesh_file_def_default() */
     const char *path;              /* the file, or NULL: `bytes` are its content. Default NULL */
     const void *bytes;             /* only read while the call lasts; NULL where there is a path. Default NULL */
     size_t size;                   /* of `bytes`, > 0 with them and 0 without; default 0 */
@@ -59,7 +60,13 @@ typedef struct sadmm_mesh_file_def {
 } sadmm_mesh_file_def;
 
 /* The defaults named above. Thread-safe. */
-SADMM_API sadmm_mesh_file_def sadmm_mesh_file_def_default(void);
+SADMM_API void sadmm_mesh_file_def_init(sadmm_mesh_file_def *def, size_t size);
+static inline sadmm_mesh_file_def sadmm_mesh_file_def_default(void)
+{
+    sadmm_mesh_file_def def;
+    sadmm_mesh_file_def_init(&def, sizeof def);
+    return def;
+}
 
 /* *out: the content of the file, owned by the caller until sadmm_mesh_file_destroy; NULL after an error. Thread-safe.
  * Takes memory of some ten times the file's size (at worst forty) and linear time. Errors: INVALID_ARGUMENT (range;
@@ -88,7 +95,8 @@ SADMM_API const double *sadmm_mesh_file_vertices(const sadmm_mesh_file *file);
  * that is not convex gets no triangle outside of it. Of NULL: NULL. Valid as long as the file. */
 SADMM_API const int32_t *sadmm_mesh_file_triangles(const sadmm_mesh_file *file);
 
-/* What the file contained, and what became of it: vertices = vertex_count + merged_vertices + unused_vertices */
+/* What the file contained, and what became of it: vertices = vertex_count + merged_vertices + unused_vertices.
+ * It may grow (status.h). */
 typedef struct sadmm_mesh_file_info {
     sadmm_mesh_file_format format;
     bool binary;
@@ -107,7 +115,12 @@ typedef struct sadmm_mesh_file_info {
 } sadmm_mesh_file_info;
 
 /* Errors: INVALID_ARGUMENT (NULL). */
-SADMM_API sadmm_status sadmm_mesh_file_describe(const sadmm_mesh_file *file, sadmm_mesh_file_info *info);
+SADMM_API sadmm_status sadmm_mesh_file_describe_sized(const sadmm_mesh_file *file, sadmm_mesh_file_info *info,
+                                                      size_t size);
+static inline sadmm_status sadmm_mesh_file_describe(const sadmm_mesh_file *file, sadmm_mesh_file_info *info)
+{
+    return sadmm_mesh_file_describe_sized(file, info, sizeof *info);
+}
 
 #ifdef __cplusplus
 }

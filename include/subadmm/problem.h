@@ -65,7 +65,7 @@ typedef struct sadmm_problem_block {
     double lower[6], upper[6];     /* ROWS: of lambda, N s, lower <= upper, either may be infinite */
 } sadmm_problem_block;
 
-/* What a solve did. */
+/* What a solve did. It may grow (status.h). */
 typedef struct sadmm_solve_report {
     sadmm_backend backend;      /* the one that ran */
     sadmm_precision precision;
@@ -125,8 +125,14 @@ SADMM_API sadmm_status sadmm_problem_set_tasks(sadmm_problem *problem, const sad
  * may be NULL. Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY, NON_FINITE (the solution, or the certificate that
  * a report asks for; the problem keeps its previous values), DEVICE. report->converged is false where the report's
  * residual is not finite. */
-SADMM_API sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, sadmm_precision precision,
-                                           const sadmm_settings *settings, sadmm_solve_report *report);
+SADMM_API sadmm_status sadmm_problem_solve_sized(sadmm_problem *problem, sadmm_backend backend,
+                                                 sadmm_precision precision, const sadmm_settings *settings,
+                                                 sadmm_solve_report *report, size_t report_size);
+static inline sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, sadmm_precision precision,
+                                               const sadmm_settings *settings, sadmm_solve_report *report)
+{
+    return sadmm_problem_solve_sized(problem, backend, precision, settings, report, sizeof *report);
+}
 
 /* The solution. velocities: (bodies x 6). impulses: (contacts x 3) on b, world frame, N s. block_lambda:
  * (blocks x 6), unused rows 0. Any may be NULL. */

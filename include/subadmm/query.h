@@ -26,6 +26,7 @@ extern "C" {
 
 /* The shapes that a query sees: */
 typedef struct sadmm_query_filter {
+    size_t struct_size;      /* set by sadmm_query_filter_default() */
     uint32_t body_types;     /* of bodies of these types: 1u << SADMM_BODY_DYNAMIC and so on, added up; in [0, 7];
                                 default 7, all */
     sadmm_body_id ignored;   /* not of this body; default all 0: no body is ignored */
@@ -38,7 +39,13 @@ typedef struct sadmm_query_filter {
 } sadmm_query_filter;
 
 /* The defaults named above. Thread-safe. */
-SADMM_API sadmm_query_filter sadmm_query_filter_default(void);
+SADMM_API void sadmm_query_filter_init(sadmm_query_filter *filter, size_t size);
+static inline sadmm_query_filter sadmm_query_filter_default(void)
+{
+    sadmm_query_filter filter;
+    sadmm_query_filter_init(&filter, sizeof filter);
+    return filter;
+}
 
 /* ---- rays -------------------------------------------------------------------------------------------------------- */
 

@@ -32,7 +32,7 @@ typedef enum sadmm_method {
     SADMM_METHOD_COUNT
 } sadmm_method;
 
-/* What a build and this machine can do. */
+/* What a build and this machine can do. It may grow (status.h). */
 typedef struct sadmm_backend_info {
     sadmm_backend backend;
     const char *name;       /* "ref", "cpu", "cuda" */
@@ -42,7 +42,11 @@ typedef struct sadmm_backend_info {
 
 /* Describe one backend. `backend` in [SADMM_BACKEND_REF, SADMM_BACKEND_COUNT).
  * Errors: INVALID_ARGUMENT. Thread-safe. */
-SADMM_API sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info);
+SADMM_API sadmm_status sadmm_backend_query_sized(sadmm_backend backend, sadmm_backend_info *info, size_t size);
+static inline sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info)
+{
+    return sadmm_backend_query_sized(backend, info, sizeof *info);
+}
 
 /* The largest sadmm_settings.substeps. */
 enum { SADMM_MOST_SUBSTEPS = 64 };
@@ -57,6 +61,7 @@ enum { SADMM_MOST_HITS = 64 };
  * Symbols are the paper's (Sec. III-D). "kg/s^2" values are the paper's time-scaled units; the solver works
  * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/internals/algorithm.md). */
 typedef struct sadmm_settings {
+    size_t struct_size;          /* set by sadmm_settings_default() */
     double dt;                   /* time step, s, in [1e-6, 1]; default 0.005. It may change from step to step. Joints
                                     that turn by more than 0.1 rad in a step lose energy (docs/internals/algorithm.md,
                                     "Large turns") */
@@ -136,7 +141,13 @@ typedef struct sadmm_settings {
 } sadmm_settings;
 
 /* The defaults named above. Thread-safe. */
-SADMM_API sadmm_settings sadmm_settings_default(void);
+SADMM_API void sadmm_settings_init(sadmm_settings *settings, size_t size);
+static inline sadmm_settings sadmm_settings_default(void)
+{
+    sadmm_settings settings;
+    sadmm_settings_init(&settings, sizeof settings);
+    return settings;
+}
 
 /* Residuals of eqs. (16) and (17), infinity norms, at the last iteration they were measured. */
 typedef struct sadmm_residual {

@@ -1,15 +1,37 @@
-/* Status codes and the version of the library.
+/* Status codes, the version of the library, and how its structs may grow.
  *
  * Every call that can fail returns a sadmm_status. The object it was made on keeps a message that names
  * the argument, its value and the allowed range (sadmm_world_message, sadmm_problem_message); calls that
  * have no object yet (creation) leave it in sadmm_last_message. The library never prints, aborts or exits.
+ *
+ * A program runs with a library that is newer or older than the headers it was compiled with, as long as both have the
+ * same major version. Of these structs, and no others, later versions have more members, at the end:
+ *
+ *   Definitions, settings, filters: they begin with `struct_size`, their size in the program, bytes. The _default
+ *       functions set it; a struct with another value there is refused. What the program does not know keeps its
+ *       default. What the library does not know must be 0.
+ *   Reports and infos: functions that write them, or definitions that are read back, are given the size in the program
+ *       (their names end in _sized; the functions without it are inline and pass it on). What the program does not know
+ *       is not written, what the library does not know is 0.
+ *
+ * Everything else stays as it is: ids, states, contacts, events, rays and their hits, masses, tasks, elements of arrays,
+ * and the parts of reports (sadmm_residual, sadmm_certificate, sadmm_phase_times). Other languages call the functions
+ * with a size (_init, _sized): inline ones are in no library.
  */
 #ifndef SUBADMM_STATUS_H
 #define SUBADMM_STATUS_H
 
+#include <stddef.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* The version of these headers; SADMM_VERSION orders versions: 10000 major + 100 minor + patch. */
+#define SADMM_VERSION_MAJOR 0
+#define SADMM_VERSION_MINOR 1
+#define SADMM_VERSION_PATCH 0
+#define SADMM_VERSION (10000 * SADMM_VERSION_MAJOR + 100 * SADMM_VERSION_MINOR + SADMM_VERSION_PATCH)
 
 #if defined(__GNUC__) && !defined(SADMM_STATIC)
 #define SADMM_API __attribute__((visibility("default")))
@@ -38,8 +60,9 @@ SADMM_API const char *sadmm_status_name(sadmm_status status);
  * the next failing call on the same thread. */
 SADMM_API const char *sadmm_last_message(void);
 
-/* "major.minor.patch". Thread-safe. */
+/* The version of the library: "major.minor.patch"; and as SADMM_VERSION has it. Thread-safe. */
 SADMM_API const char *sadmm_version(void);
+SADMM_API int sadmm_version_number(void);
 
 /* Commit the library was built from ("unknown" outside a checkout) and the compiler that built it. Thread-safe. */
 SADMM_API const char *sadmm_build_commit(void);

@@ -37,6 +37,7 @@ typedef struct sadmm_shape_id { uint32_t slot, generation; } sadmm_shape_id;
 /* ---- world ------------------------------------------------------------------------------------------------- */
 
 typedef struct sadmm_world_def {
+    size_t struct_size;         /* set by sadmm_world_def_default() */
     sadmm_backend backend;      /* default AUTO */
     sadmm_precision precision;  /* default F64 */
     int device;                 /* accelerator index, >= 0; default 0 */
@@ -48,8 +49,14 @@ typedef struct sadmm_world_def {
     sadmm_settings settings;
 } sadmm_world_def;
 
-/* The defaults named above. Thread-safe. */
-SADMM_API sadmm_world_def sadmm_world_def_default(void);
+/* The defaults named above. settings_size: of a sadmm_settings. Thread-safe. */
+SADMM_API void sadmm_world_def_init(sadmm_world_def *def, size_t size, size_t settings_size);
+static inline sadmm_world_def sadmm_world_def_default(void)
+{
+    sadmm_world_def def;
+    sadmm_world_def_init(&def, sizeof def, sizeof def.settings);
+    return def;
+}
 
 /* Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY (message: sadmm_last_message). */
 SADMM_API sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out);
@@ -63,7 +70,13 @@ SADMM_API const char *sadmm_world_message(const sadmm_world *world);
  * while asynchronous steps are running (sadmm_world_step_async), a change of anything else, e.g. of iterations, waits
  * for them. Errors: INVALID_ARGUMENT (nothing changes). The settings of NULL are the default ones. */
 SADMM_API sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings);
-SADMM_API sadmm_settings sadmm_world_settings(const sadmm_world *world);
+SADMM_API void sadmm_world_settings_sized(const sadmm_world *world, sadmm_settings *settings, size_t size);
+static inline sadmm_settings sadmm_world_settings(const sadmm_world *world)
+{
+    sadmm_settings settings;
+    sadmm_world_settings_sized(world, &settings, sizeof settings);
+    return settings;
+}
 
 /* Change backend, precision or device (as in sadmm_world_def) from the next step on; the state and the impulses for
  * warm starting are kept. Waits for steps begun. Errors: as sadmm_world_create, and those of the steps begun (nothing
@@ -83,6 +96,7 @@ typedef enum sadmm_body_type {
 } sadmm_body_type;
 
 typedef struct sadmm_body_def {
+    size_t struct_size;          /* set by sadmm_body_def_default() */
     sadmm_body_type type;        /* default DYNAMIC */
     double mass;                 /* kg, in [1e-9, 1e12]; of dynamic bodies, ignored for others; no default */
     double inertia[3]; /* principal moments, kg m^2, in [1e-24, 1e24], each <= the sum of the other two (relative
@@ -102,7 +116,13 @@ typedef struct sadmm_body_def {
 } sadmm_body_def;
 
 /* The defaults named above. Thread-safe. */
-SADMM_API sadmm_body_def sadmm_body_def_default(void);
+SADMM_API void sadmm_body_def_init(sadmm_body_def *def, size_t size);
+static inline sadmm_body_def sadmm_body_def_default(void)
+{
+    sadmm_body_def def;
+    sadmm_body_def_init(&def, sizeof def);
+    return def;
+}
 /* *id: the new body. Errors: INVALID_ARGUMENT (range; nothing changes), LIMIT (2^27 bodies), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id);
 /* Destroys its shapes too, its joints (joint.h) and its couplings (coupling.h). Errors: STALE_ID. */
@@ -139,7 +159,12 @@ SADMM_API sadmm_status sadmm_world_body_move(sadmm_world *world, sadmm_body_id i
                                              double orientation[4]);
 /* Read back the definition (mass, inertia, type, name, scale of gravity, damping) with the current state. The name is
  * the world's copy, valid until the body is removed or the world destroyed. Errors: STALE_ID, DEVICE. */
-SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
+SADMM_API sadmm_status sadmm_world_body_def_sized(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def,
+                                                  size_t size);
+static inline sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def)
+{
+    return sadmm_world_body_def_sized(world, id, def, sizeof *def);
+}
 /* External force (N) at the centre of mass and torque (N m), world frame, each component within +-1e15; kept until set
  * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic). */
 SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
@@ -213,6 +238,7 @@ typedef enum sadmm_shape_type {
 } sadmm_shape_type;
 
 typedef struct sadmm_shape_def {
+    size_t struct_size;          /* set by sadmm_shape_def_default() */
     sadmm_shape_type type;
     double size[3];              /* m, each used entry in [1e-6, 1e6] */
     double position[3];          /* of the shape's frame in the body's, m; default 0 */
@@ -229,7 +255,13 @@ typedef struct sadmm_shape_def {
 } sadmm_shape_def;
 
 /* The defaults named above. Thread-safe. */
-SADMM_API sadmm_shape_def sadmm_shape_def_default(void);
+SADMM_API void sadmm_shape_def_init(sadmm_shape_def *def, size_t size);
+static inline sadmm_shape_def sadmm_shape_def_default(void)
+{
+    sadmm_shape_def def;
+    sadmm_shape_def_init(&def, sizeof def);
+    return def;
+}
 /* *id: the new shape, on `body` until that is removed. Errors: STALE_ID, INVALID_ARGUMENT (range; a plane on a dynamic
  * body; nothing changes), LIMIT (2^28 shapes), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body, const sadmm_shape_def *def,
@@ -240,8 +272,13 @@ SADMM_API int32_t sadmm_world_shape_count(const sadmm_world *world); /* of NULL:
 /* The index-th live shape in order of creation slot, index in [0, shape_count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape_id *id);
 /* Read back the definition, and the body that has the shape. Errors: STALE_ID. */
-SADMM_API sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def,
-                                             sadmm_body_id *body /* may be NULL */);
+SADMM_API sadmm_status sadmm_world_shape_def_sized(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def,
+                                                   size_t size, sadmm_body_id *body /* may be NULL */);
+static inline sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def,
+                                                 sadmm_body_id *body /* may be NULL */)
+{
+    return sadmm_world_shape_def_sized(world, id, def, sizeof *def, body);
+}
 /* Replace friction and restitution of a shape, ranges as in the definition, from the next step on. Errors: STALE_ID,
  * INVALID_ARGUMENT (range; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id id, double friction,
@@ -298,7 +335,7 @@ typedef struct sadmm_phase_times { double total, collide, assemble, solve, finis
 
 /* With sub-steps: contacts, pairs, residual and certificate are those of the last sub-step; iterations, iterations_mean
  * and times are sums over all, converged holds for all, and the other counts and penetration_max are the largest of
- * any. */
+ * any. It may grow (status.h). */
 typedef struct sadmm_step_report {
     sadmm_backend backend;
     sadmm_precision precision;
@@ -336,7 +373,11 @@ typedef struct sadmm_step_report {
 } sadmm_step_report;
 
 /* The report of the last step (zeroed before the first). Waits for steps; errors: those of the steps waited for. */
-SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
+SADMM_API sadmm_status sadmm_world_report_sized(sadmm_world *world, sadmm_step_report *report, size_t size);
+static inline sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report)
+{
+    return sadmm_world_report_sized(world, report, sizeof *report);
+}
 
 /* Contacts are found where the bodies are halfway through the step by their velocities at its start, or where what is
  * fast first touches; impulses, separations and the certificate are those of that geometry

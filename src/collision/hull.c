@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "core/base/check.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "core/math/quat.h"
 #include "hull_data.h"
@@ -28,11 +29,10 @@ enum { MANY_POINTS = 1 << 15 };
 static const double thinnest = 1e-6;    /* of the extent, and m */
 static const double straightest = 1e-9; /* of the extent: no contact feels what bends less */
 
-sadmm_hull_def sadmm_hull_def_default(void)
-{
-    sadmm_hull_def def = {.merge = 1e-6};
-    return def;
-}
+static const sadmm_hull_def defaults = {.merge = 1e-6};
+static const struct sadmm_growing growing = SADMM_GROWING(sadmm_hull_def, &defaults, convex_radius);
+
+void sadmm_hull_def_init(sadmm_hull_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
 
 /* ---- uses ---- */
 
@@ -317,11 +317,13 @@ static sadmm_status make(const sadmm_hull_def *def, sadmm_hull **out)
     return SADMM_OK;
 }
 
-sadmm_status sadmm_hull_create(const sadmm_hull_def *def, sadmm_hull **out)
+sadmm_status sadmm_hull_create(const sadmm_hull_def *given, sadmm_hull **out)
 {
+    sadmm_hull_def taken;
+    const sadmm_hull_def *const def = &taken;
     TRY(sadmm_check_given(out, "out", NULL));
     *out = NULL;
-    TRY(sadmm_check_given(def, "def", NULL));
+    TRY(sadmm_growing_take(&growing, &taken, given, "def", NULL));
     TRY(sadmm_check_given(def->points, "def->points", NULL));
     if (def->point_count < LEAST_POINTS || def->point_count > MOST_POINTS)
         return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->point_count = %zu: must be in [%d, %d]",

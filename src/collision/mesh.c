@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/base/check.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "mesh_edges.h"
 #include "mesh_tree.h"
@@ -18,16 +19,15 @@ static const double largest = 1e6, thinnest = 1e-9; /* m; of the longest edge */
  * flat ground by about so much. */
 static const double flattest = 1e-5;
 
-sadmm_mesh_def sadmm_mesh_def_default(void)
-{
-    sadmm_mesh_def def = {0};
-    return def;
-}
+static const sadmm_mesh_def default_triangles = {0};
+static const sadmm_heightfield_def default_heights = {0};
+static const struct sadmm_growing growing_triangles = SADMM_GROWING(sadmm_mesh_def, &default_triangles, triangle_count),
+                                  growing_heights = SADMM_GROWING(sadmm_heightfield_def, &default_heights, spacing);
 
-sadmm_heightfield_def sadmm_heightfield_def_default(void)
+void sadmm_mesh_def_init(sadmm_mesh_def *def, size_t size) { sadmm_growing_init(&growing_triangles, def, size, 0); }
+void sadmm_heightfield_def_init(sadmm_heightfield_def *def, size_t size)
 {
-    sadmm_heightfield_def def = {0};
-    return def;
+    sadmm_growing_init(&growing_heights, def, size, 0);
 }
 
 /* ---- uses -------------------------------------------------------------------------------------------------------- */
@@ -442,12 +442,14 @@ static sadmm_status make_heights(const sadmm_heightfield_def *def, sadmm_mesh *m
 
 /* ---- what callers see -------------------------------------------------------------------------------------------- */
 
-sadmm_status sadmm_mesh_create(const sadmm_mesh_def *def, sadmm_mesh **out)
+sadmm_status sadmm_mesh_create(const sadmm_mesh_def *given, sadmm_mesh **out)
 {
+    sadmm_mesh_def taken;
+    const sadmm_mesh_def *const def = &taken;
     struct making making = {0};
     TRY(sadmm_check_given(out, "out", NULL));
     *out = NULL;
-    TRY(sadmm_check_given(def, "def", NULL));
+    TRY(sadmm_growing_take(&growing_triangles, &taken, given, "def", NULL));
     TRY(check_triangles(def, NULL));
     sadmm_mesh *mesh = (sadmm_mesh *)sadmm_alloc(1, sizeof *mesh);
     if (!mesh) return sadmm_fail_memory(NULL, "a mesh");
@@ -462,11 +464,13 @@ sadmm_status sadmm_mesh_create(const sadmm_mesh_def *def, sadmm_mesh **out)
     return SADMM_OK;
 }
 
-sadmm_status sadmm_heightfield_create(const sadmm_heightfield_def *def, sadmm_mesh **out)
+sadmm_status sadmm_heightfield_create(const sadmm_heightfield_def *given, sadmm_mesh **out)
 {
+    sadmm_heightfield_def taken;
+    const sadmm_heightfield_def *const def = &taken;
     TRY(sadmm_check_given(out, "out", NULL));
     *out = NULL;
-    TRY(sadmm_check_given(def, "def", NULL));
+    TRY(sadmm_growing_take(&growing_heights, &taken, given, "def", NULL));
     TRY(check_heights(def, NULL));
     sadmm_mesh *mesh = (sadmm_mesh *)sadmm_alloc(1, sizeof *mesh);
     if (!mesh) return sadmm_fail_memory(NULL, "a heightfield");

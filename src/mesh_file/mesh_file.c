@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "core/base/check.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "format.h"
 #include "obj.h"
@@ -27,11 +28,11 @@ struct sadmm_mesh_file {
     sadmm_mesh_file_info info;
 };
 
-sadmm_mesh_file_def sadmm_mesh_file_def_default(void)
-{
-    const sadmm_mesh_file_def def = {.format = SADMM_MESH_FILE_ANY, .scale = 1, .merge = true, .drop_degenerate = true};
-    return def;
-}
+static const sadmm_mesh_file_def defaults = {
+    .format = SADMM_MESH_FILE_ANY, .scale = 1, .merge = true, .drop_degenerate = true};
+static const struct sadmm_growing growing = SADMM_GROWING(sadmm_mesh_file_def, &defaults, drop_degenerate);
+
+void sadmm_mesh_file_def_init(sadmm_mesh_file_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
 
 void sadmm_mesh_file_destroy(sadmm_mesh_file *file)
 {
@@ -123,12 +124,14 @@ static sadmm_status read_source(const sadmm_mesh_file_def *def, const struct mes
     return status;
 }
 
-sadmm_status sadmm_mesh_file_read(const sadmm_mesh_file_def *def, sadmm_mesh_file **out)
+sadmm_status sadmm_mesh_file_read(const sadmm_mesh_file_def *given, sadmm_mesh_file **out)
 {
     struct mesh_source source;
+    sadmm_mesh_file_def taken;
+    const sadmm_mesh_file_def *const def = &taken;
     TRY(sadmm_check_given(out, "out", NULL));
     *out = NULL;
-    TRY(sadmm_check_given(def, "def", NULL));
+    TRY(sadmm_growing_take(&growing, &taken, given, "def", NULL));
     TRY(check_def(def));
     sadmm_mesh_file *file = (sadmm_mesh_file *)sadmm_alloc(1, sizeof *file);
     if (!file) return sadmm_fail_memory(NULL, "a mesh file");
@@ -150,10 +153,9 @@ const double *sadmm_mesh_file_vertices(const sadmm_mesh_file *file) { return fil
 
 const int32_t *sadmm_mesh_file_triangles(const sadmm_mesh_file *file) { return file ? file->triangles : NULL; }
 
-sadmm_status sadmm_mesh_file_describe(const sadmm_mesh_file *file, sadmm_mesh_file_info *info)
+sadmm_status sadmm_mesh_file_describe_sized(const sadmm_mesh_file *file, sadmm_mesh_file_info *info, size_t size)
 {
     TRY(sadmm_check_given(file, "file", NULL));
-    TRY(sadmm_check_given(info, "info", NULL));
-    *info = file->info;
-    return SADMM_OK;
+    return sadmm_give_bytes(info, size, &file->info, sizeof file->info, SADMM_SIZE_TO(sadmm_mesh_file_info, others),
+                            "info", NULL);
 }

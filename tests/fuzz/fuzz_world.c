@@ -277,7 +277,7 @@ static const sadmm_hull *hull_at(int k)
             points[3 * i + 1] = 0.5 * sin(2.4 * i);
             points[3 * i + 2] = (i % 2 ? 0.4 : -0.4) / (k % HULLS + 1);
         }
-        const sadmm_hull_def def = {.points = points, .point_count = (size_t)count, .convex_radius = k % 2 ? 0.05 : 0};
+        const sadmm_hull_def def = {.struct_size = sizeof def, .points = points, .point_count = (size_t)count, .convex_radius = k % 2 ? 0.05 : 0};
         if (sadmm_hull_create(&def, hull) != SADMM_OK) return NULL;
     }
     return *hull;
@@ -287,7 +287,7 @@ static const sadmm_hull *hull_at(int k)
 static sadmm_status make_heights(int k, sadmm_mesh **mesh)
 {
     double heights[12];
-    const sadmm_heightfield_def def = {heights, 3 + k % 2, 3, {0.5, k == 1 ? 0.05 : 0.5}};
+    const sadmm_heightfield_def def = {sizeof def, heights, 3 + k % 2, 3, {0.5, k == 1 ? 0.05 : 0.5}};
     for (int i = 0; i < 12; ++i) heights[i] = k == 0 ? 0 : k == 1 ? 0.3 * (i % 2) : 0.4 * cos(2.4 * i) + 5 * (i == 4);
     return sadmm_heightfield_create(&def, mesh);
 }
@@ -317,11 +317,11 @@ static sadmm_status make_triangles(int k, sadmm_mesh **mesh)
         }
     }
     const sadmm_mesh_def defs[5] = {
-        {square, 4, corners[0], 2},
-        {tetrahedron, 4, corners[1], 4},
-        {fan, 5, corners[2], 3},
-        {soup, 3 * MAX_TRIANGLES, all, MAX_TRIANGLES},
-        {soup, 3 * MAX_TRIANGLES, all, MAX_TRIANGLES},
+        {sizeof *defs, square, 4, corners[0], 2},
+        {sizeof *defs, tetrahedron, 4, corners[1], 4},
+        {sizeof *defs, fan, 5, corners[2], 3},
+        {sizeof *defs, soup, 3 * MAX_TRIANGLES, all, MAX_TRIANGLES},
+        {sizeof *defs, soup, 3 * MAX_TRIANGLES, all, MAX_TRIANGLES},
     };
     return sadmm_mesh_create(&defs[k], mesh);
 }

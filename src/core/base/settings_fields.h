@@ -50,6 +50,10 @@
       "Hits of a body in flight that are taken at their moments, at most, a (sub-)step; 0: the solve has all.")         \
     F(X, WHOLE, PLAN, threads, 0, 0, 1024, CLOSED, "CPU threads at most; 0: no bound. Results do not depend on it.")
 
+/* The defaults, as an initialiser. */
+#define SADMM_SETTING_DEFAULT(X, kind, role, name, value, ...) .name = value,
+#define SADMM_DEFAULT_SETTINGS {SADMM_SETTINGS(SADMM_SETTING_DEFAULT, )}
+
 /* ---- as a table -------------------------------------------------------------------------------------------------- */
 
 enum sadmm_setting_kind {

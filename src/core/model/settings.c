@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#define ROW_DEFAULT(X, kind, role, name, value, ...) .name = value,
 #define ROW_MEMBER(X, kind, role, name, ...) ROW_ZERO_##kind
 #define ROW_ZERO_REAL 0,
 #define ROW_ZERO_WHOLE 0,
@@ -14,15 +13,23 @@
 /* A struct with too few initialisers is an error here: no member can be left out of the list. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic error "-Wmissing-field-initializers"
-_Static_assert(sizeof((sadmm_settings){SADMM_SETTINGS(ROW_MEMBER, )}) == sizeof(sadmm_settings), "every member is listed");
+_Static_assert(sizeof((sadmm_settings){0, SADMM_SETTINGS(ROW_MEMBER, )}) == sizeof(sadmm_settings), "every member is listed");
 #pragma GCC diagnostic pop
 
 static const struct sadmm_setting list[SADMM_SETTING_COUNT] = {SADMM_SETTINGS(SADMM_SETTING_ROW, )};
 
-sadmm_settings sadmm_settings_default(void)
+static const sadmm_settings defaults = SADMM_DEFAULT_SETTINGS;
+const struct sadmm_growing sadmm_growing_settings = SADMM_GROWING(sadmm_settings, &defaults, threads);
+
+void sadmm_settings_init(sadmm_settings *settings, size_t size)
 {
-    const sadmm_settings s = {SADMM_SETTINGS(ROW_DEFAULT, )};
-    return s;
+    sadmm_growing_init(&sadmm_growing_settings, settings, size, 0);
+}
+
+sadmm_status sadmm_settings_take(sadmm_settings *settings, const sadmm_settings *given, struct sadmm_error *error)
+{
+    TRY(sadmm_growing_take(&sadmm_growing_settings, settings, given, "settings", error));
+    return sadmm_settings_validate(settings, error);
 }
 
 /* ---- ranges ------------------------------------------------------------------------------------------------------ */
@@ -56,9 +63,6 @@ _Static_assert((int)SADMM_MOST_SUBSTEPS == 64 && (int)SADMM_MOST_NCP_POINTS == 1
 
 sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadmm_error *error)
 {
-    if (!s)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "settings = NULL: must be given (sadmm_settings_default())");
     for (int i = 0; i < SADMM_SETTING_COUNT; ++i) {
         const char *at = (const char *)s + list[i].offset;
         if (list[i].kind == SADMM_SETTING_REAL) TRY(check(&list[i], *(const double *)(const void *)at, error));

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 
 #include "core/base/error.h"
+#include "core/base/growing.h"
 #include "core/base/settings_fields.h"
 #include "subadmm/settings.h"
 
@@ -12,7 +13,13 @@
 extern "C" {
 #endif
 
-/* INVALID_ARGUMENT with the first field out of range, its value and the range; NULL is refused too. */
+/* The first version's end with `threads`. */
+#define SADMM_SETTINGS_LEAST SADMM_SIZE_TO(sadmm_settings, threads)
+extern const struct sadmm_growing sadmm_growing_settings;
+
+/* A caller's: taken, and validated. */
+sadmm_status sadmm_settings_take(sadmm_settings *settings, const sadmm_settings *given, struct sadmm_error *error);
+/* INVALID_ARGUMENT with the first field out of range, its value and the range. */
 sadmm_status sadmm_settings_validate(const struct sadmm_settings *settings, struct sadmm_error *error);
 
 /* A sub-step's share of a step of a world: of its time and its iterations. (`substeps` still says how many there

@@ -149,8 +149,11 @@ sadmm_status sadmm_problem_set_device(sadmm_problem *problem, int device)
     return SADMM_OK;
 }
 
-sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, sadmm_precision precision,
-                                 const sadmm_settings *settings, sadmm_solve_report *report)
+/* Of the report's first version. */
+enum { LEAST_REPORT = SADMM_SIZE_TO(sadmm_solve_report, threads) };
+
+sadmm_status sadmm_problem_solve_sized(sadmm_problem *problem, sadmm_backend backend, sadmm_precision precision,
+                                       const sadmm_settings *given, sadmm_solve_report *report, size_t report_size)
 {
     TRY(sadmm_check_problem(problem));
     struct sadmm_error *error = &problem->error;
@@ -158,12 +161,14 @@ sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, 
     struct sadmm_context **context;
     struct sadmm_solve_report done = {0};
 
-    TRY(sadmm_settings_validate(settings, error));
+    sadmm_settings settings;
+    TRY(sadmm_settings_take(&settings, given, error));
+    if (report) TRY(sadmm_give_bytes(report, report_size, &done, sizeof done, LEAST_REPORT, "report", error));
     int64_t constraints = (int64_t)problem->contacts.point_count + problem->block_count;
     TRY(sadmm_backend_choose(backend, precision, constraints, &kernels, NULL, 0, error));
     TRY(find_context(problem, kernels, &context, error));
 
-    problem->settings = *settings;
+    problem->settings = settings;
     problem->system = make_system(problem, &problem->contacts, &problem->rows);
     problem->system.team = &problem->team;
     problem->team.ran = 1;
@@ -182,6 +187,5 @@ sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, 
         }
         return status;
     }
-    if (report) *report = done;
-    return SADMM_OK;
+    return report ? sadmm_give_bytes(report, report_size, &done, sizeof done, LEAST_REPORT, "report", error) : SADMM_OK;
 }

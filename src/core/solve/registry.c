@@ -5,6 +5,7 @@
 #include "backends.h"
 #include "config.h"
 #include "core/base/check.h"
+#include "core/base/growing.h"
 
 /* The one list: a backend is registered by adding its line here (backends.h declares the functions). */
 static const struct {
@@ -37,21 +38,21 @@ const struct sadmm_kernels *sadmm_kernels_at(size_t index)
     return NULL;
 }
 
-sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info)
+sadmm_status sadmm_backend_query_sized(sadmm_backend backend, sadmm_backend_info *out, size_t size)
 {
-    TRY(sadmm_check_given(info, "info", NULL));
+    sadmm_backend_info info = {.backend = backend};
+    TRY(sadmm_check_given(out, "info", NULL));
     if (backend < SADMM_BACKEND_REF || backend >= SADMM_BACKEND_COUNT)
         return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "backend = %d: must be in [%d, %d]", (int)backend,
                           SADMM_BACKEND_REF, SADMM_BACKEND_COUNT - 1);
-    info->backend = backend;
-    info->name = backends[backend].name;
+    info.name = backends[backend].name;
     /* An unavailable precision explains itself; else the f32 line says what it runs on. */
     const char *reasons[2] = {"", ""};
     for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision)
-        info->available[precision] =
+        info.available[precision] =
             sadmm_kernels_find(backend, (sadmm_precision)precision, &reasons[precision]) != NULL;
-    info->reason = reasons[info->available[SADMM_F32] ? SADMM_F64 : SADMM_F32];
-    return SADMM_OK;
+    info.reason = reasons[info.available[SADMM_F32] ? SADMM_F64 : SADMM_F32];
+    return sadmm_give_bytes(out, size, &info, sizeof info, SADMM_SIZE_TO(sadmm_backend_info, reason), "info", NULL);
 }
 
 /* From this many contacts on a step on the GPU is the shorter one. */

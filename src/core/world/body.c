@@ -14,11 +14,10 @@ static const double POSITION_LIMIT = 1e9, VELOCITY_LIMIT = 1e6, WRENCH_LIMIT = 1
 /* Of a state that is set: whatever a step can make. */
 static const double ANY = HUGE_VAL;
 
-sadmm_body_def sadmm_body_def_default(void)
-{
-    sadmm_body_def def = {.type = SADMM_BODY_DYNAMIC, .orientation = {1, 0, 0, 0}, .gravity_scale = 1};
-    return def;
-}
+static const sadmm_body_def defaults = {.type = SADMM_BODY_DYNAMIC, .orientation = {1, 0, 0, 0}, .gravity_scale = 1};
+static const struct sadmm_growing growing = SADMM_GROWING(sadmm_body_def, &defaults, angular_damping);
+
+void sadmm_body_def_init(sadmm_body_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
 
 /* The moments of all solids within the ranges of mass and size are 4e-22 (a ball of 1e-9 kg, 1e-6 m) to 7e23 kg m^2; an
  * arm of 1e6 m on the smallest, 1e12 / 1e-24, is still a number in single precision. */
@@ -125,13 +124,15 @@ static sadmm_status copy_name(const char *given, char **name, struct sadmm_error
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id)
+sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *given, sadmm_body_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
+    sadmm_body_def taken;
+    const sadmm_body_def *const def = &taken;
     double orientation[4];
     char *name;
-    TRY(sadmm_check_given(def, "def", error));
+    TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
     TRY(sadmm_check_given(id, "id", error));
     TRY(check_def(def, world->def.precision, orientation, error));
     TRY(sadmm_world_detach(world));
@@ -320,28 +321,27 @@ sadmm_status sadmm_world_body_move(sadmm_world *world, sadmm_body_id id, bool *p
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def)
+sadmm_status sadmm_world_body_def_sized(sadmm_world *world, sadmm_body_id id, sadmm_body_def *out, size_t size)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(def, "def", error));
+    TRY(sadmm_check_given(out, "def", error));
     TRY(sadmm_world_download_bodies(world));
-    memset(def, 0, sizeof *def);
-    def->type = body->type;
-    def->mass = body->rigid.mass;
-    memcpy(def->inertia, body->rigid.inertia, sizeof def->inertia);
-    memcpy(def->position, body->rigid.position, sizeof def->position);
-    memcpy(def->orientation, body->rigid.orientation, sizeof def->orientation);
-    memcpy(def->linear_velocity, body->rigid.velocity, sizeof def->linear_velocity);
-    memcpy(def->angular_velocity, body->rigid.velocity + 3, sizeof def->angular_velocity);
-    def->gravity_scale = body->rigid.gravity_scale;
-    def->linear_damping = body->rigid.damping[0];
-    def->angular_damping = body->rigid.damping[1];
-    def->environment = body->environment;
-    def->name = sadmm_world_body_name(body);
-    return SADMM_OK;
+    sadmm_body_def def = {.type = body->type,
+                          .mass = body->rigid.mass,
+                          .environment = body->environment,
+                          .name = sadmm_world_body_name(body),
+                          .gravity_scale = body->rigid.gravity_scale,
+                          .linear_damping = body->rigid.damping[0],
+                          .angular_damping = body->rigid.damping[1]};
+    memcpy(def.inertia, body->rigid.inertia, sizeof def.inertia);
+    memcpy(def.position, body->rigid.position, sizeof def.position);
+    memcpy(def.orientation, body->rigid.orientation, sizeof def.orientation);
+    memcpy(def.linear_velocity, body->rigid.velocity, sizeof def.linear_velocity);
+    memcpy(def.angular_velocity, body->rigid.velocity + 3, sizeof def.angular_velocity);
+    return sadmm_growing_give(&growing, out, size, 0, &def, "def", error);
 }
 
 static sadmm_status check_dynamic(const struct sadmm_world_body *body, sadmm_body_id id, const char *why,

@@ -11,14 +11,14 @@
 
 static const double FRAME_LIMIT = 1e9, GAIN_LIMIT = 1e15;
 
-sadmm_coupling_def sadmm_coupling_def_default(void)
-{
-    return (sadmm_coupling_def){.orientation = {1, 0, 0, 0},
-                                .target_orientation = {1, 0, 0, 0},
-                                .max_force = INFINITY,
-                                .max_torque = INFINITY,
-                                .enabled = true};
-}
+static const sadmm_coupling_def defaults = {.orientation = {1, 0, 0, 0},
+                                            .target_orientation = {1, 0, 0, 0},
+                                            .max_force = INFINITY,
+                                            .max_torque = INFINITY,
+                                            .enabled = true};
+static const struct sadmm_growing growing = SADMM_GROWING(sadmm_coupling_def, &defaults, enabled);
+
+void sadmm_coupling_def_init(sadmm_coupling_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
 
 /* ---- checks ------------------------------------------------------------------------------------------------------ */
 
@@ -118,13 +118,15 @@ static struct sadmm_world_joint joint_of(const sadmm_coupling_def *def, struct j
     return joint;
 }
 
-sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_def *def, sadmm_coupling_id *id)
+sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_def *given, sadmm_coupling_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     struct sadmm_world_coupling made = {.alive = true, .generation = 1};
     struct joint_frame frame = {.orientation = {1, 0, 0, 0}};
-    TRY(sadmm_check_given(def, "def", error));
+    sadmm_coupling_def taken;
+    const sadmm_coupling_def *const def = &taken;
+    TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
     TRY(check_def(world, def, &frame, &made.last.target, error));
     TRY(sadmm_world_detach(world));
     made.def = *def;
@@ -182,19 +184,20 @@ sadmm_status sadmm_world_coupling_index(sadmm_world *world, sadmm_coupling_id id
 
 /* ---- what it is, and what is set --------------------------------------------------------------------------------- */
 
-sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *def)
+sadmm_status sadmm_world_coupling_def_sized(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *out,
+                                            size_t size)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     const struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
     if (!coupling) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(def, "def", &world->error));
+    TRY(sadmm_check_given(out, "def", &world->error));
     TRY(sadmm_world_download_joints(world));
     const struct sadmm_rigid *target = &coupling->last.target;
-    *def = coupling->def;
-    memcpy(def->target_position, target->position, sizeof def->target_position);
-    memcpy(def->target_orientation, target->orientation, sizeof def->target_orientation);
-    memcpy(def->target_velocity, target->velocity, sizeof def->target_velocity);
-    return SADMM_OK;
+    sadmm_coupling_def def = coupling->def;
+    memcpy(def.target_position, target->position, sizeof def.target_position);
+    memcpy(def.target_orientation, target->orientation, sizeof def.target_orientation);
+    memcpy(def.target_velocity, target->velocity, sizeof def.target_velocity);
+    return sadmm_growing_give(&growing, out, size, 0, &def, "def", &world->error);
 }
 
 sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_id id, const double position[3],

@@ -10,10 +10,10 @@
 static const double OFFSET_LIMIT = 1e9, RATIO_LEAST = 1e-9, RATIO_MOST = 1e9;
 enum { MOST_GEARS = 1 << 24 };
 
-sadmm_gear_def sadmm_gear_def_default(void)
-{
-    return (sadmm_gear_def){.coordinate_1 = -1, .coordinate_2 = -1, .ratio = 1, .offset = NAN, .enabled = true};
-}
+static const sadmm_gear_def defaults = {.coordinate_1 = -1, .coordinate_2 = -1, .ratio = 1, .offset = NAN, .enabled = true};
+static const struct sadmm_growing growing = SADMM_GROWING(sadmm_gear_def, &defaults, enabled);
+
+void sadmm_gear_def_init(sadmm_gear_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
 
 /* ---- checks ------------------------------------------------------------------------------------------------------ */
 
@@ -80,12 +80,14 @@ static sadmm_status measure(sadmm_world *world, const sadmm_gear_def *def, doubl
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *def, sadmm_gear_id *id)
+sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *given, sadmm_gear_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     struct sadmm_world_gear made = {.alive = true, .generation = 1};
-    TRY(sadmm_check_given(def, "def", error));
+    sadmm_gear_def taken;
+    const sadmm_gear_def *const def = &taken;
+    TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
     TRY(sadmm_world_check_gear(world, def, error));
     TRY(sadmm_world_detach(world));
     made.def = *def;
@@ -140,14 +142,12 @@ sadmm_status sadmm_world_gear_at(sadmm_world *world, int32_t index, sadmm_gear_i
 
 /* ---- what it is, and what is set --------------------------------------------------------------------------------- */
 
-sadmm_status sadmm_world_gear_def(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def)
+sadmm_status sadmm_world_gear_def_sized(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def, size_t size)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     const struct sadmm_world_gear *gear = sadmm_world_find_gear(world, id, "id", &world->error);
     if (!gear) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(def, "def", &world->error));
-    *def = gear->def;
-    return SADMM_OK;
+    return sadmm_growing_give(&growing, def, size, 0, &gear->def, "def", &world->error);
 }
 
 sadmm_status sadmm_world_set_gear_enabled(sadmm_world *world, sadmm_gear_id id, bool enabled)

@@ -28,17 +28,36 @@ static const uint32_t locks_of[SADMM_JOINT_KIND_COUNT] = {
     [SADMM_JOINT_LINK] = TX | TZ,
 };
 
-sadmm_joint_def sadmm_joint_def_default(void)
+#define DEFAULT_COORDINATE {.drive_force = INFINITY}
+static const sadmm_joint_coordinate default_coordinate = DEFAULT_COORDINATE;
+static const sadmm_joint_def defaults = {
+    .kind = SADMM_JOINT_FIXED,
+    .orientation_a = {1, 0, 0, 0},
+    .orientation_b = {1, 0, 0, 0},
+    .length = -1,
+    .enabled = true,
+    .break_force = INFINITY,
+    .break_torque = INFINITY,
+    .coordinates = {DEFAULT_COORDINATE, DEFAULT_COORDINATE, DEFAULT_COORDINATE, DEFAULT_COORDINATE, DEFAULT_COORDINATE,
+                    DEFAULT_COORDINATE},
+};
+enum { LEAST_COORDINATE = SADMM_SIZE_TO(sadmm_joint_coordinate, armature) };
+static const struct sadmm_growing growing = {
+    .size = sizeof(sadmm_joint_def),
+    .least = SADMM_SIZE_TO(sadmm_joint_def, break_torque) + JOINT_COORDINATES * LEAST_COORDINATE,
+    .defaults = &defaults,
+    .start = "sadmm_joint_def_default()",
+    .part_count = JOINT_COORDINATES,
+    .part_at = offsetof(sadmm_joint_def, coordinates),
+    .part_size = sizeof(sadmm_joint_coordinate),
+    .part_least = LEAST_COORDINATE,
+    .part_size_at = offsetof(sadmm_joint_def, coordinate_size),
+    .part_name = "coordinate_size",
+};
+
+void sadmm_joint_def_init(sadmm_joint_def *def, size_t size, size_t coordinate_size)
 {
-    sadmm_joint_def def = {.kind = SADMM_JOINT_FIXED,
-                           .orientation_a = {1, 0, 0, 0},
-                           .orientation_b = {1, 0, 0, 0},
-                           .length = -1,
-                           .enabled = true,
-                           .break_force = INFINITY,
-                           .break_torque = INFINITY};
-    for (int k = 0; k < JOINT_COORDINATES; ++k) def.coordinates[k].drive_force = INFINITY;
-    return def;
+    sadmm_growing_init(&growing, def, size, coordinate_size);
 }
 
 /* ---- checks ------------------------------------------------------------------------------------------------------ */
@@ -281,13 +300,15 @@ sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_wor
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *def, sadmm_joint_id *id)
+sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *given, sadmm_joint_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     struct sadmm_world_joint made = {.alive = true};
+    sadmm_joint_def taken;
+    const sadmm_joint_def *const def = &taken;
     size_t slot;
-    TRY(sadmm_check_given(def, "def", error));
+    TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
     made.def = *def;
     TRY(check_def(def, &made.def.locks, error));
     TRY(find_sides(world, def, made.body, error));
@@ -400,15 +421,15 @@ sadmm_status sadmm_world_joint_index(sadmm_world *world, sadmm_joint_id id, int3
 
 /* ---- what it is, and what is set --------------------------------------------------------------------------------- */
 
-sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def)
+sadmm_status sadmm_world_joint_def_sized(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def, size_t size,
+                                         size_t coordinate_size)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", &world->error));
     TRY(sadmm_world_download_joints(world));
-    *def = joint->def;
-    return SADMM_OK;
+    return sadmm_growing_give(&growing, def, size, coordinate_size, &joint->def, "def", &world->error);
 }
 
 sadmm_status sadmm_world_take_update(sadmm_world *world, struct sadmm_world_joint *joint,
@@ -443,16 +464,17 @@ sadmm_status sadmm_world_check_coordinate(const struct sadmm_world_joint *joint,
     return check_coordinate("coordinate->", coordinate, error);
 }
 
-sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
-                                              const sadmm_joint_coordinate *coordinate)
+sadmm_status sadmm_world_set_joint_coordinate_sized(sadmm_world *world, sadmm_joint_id id, int32_t index,
+                                                    const sadmm_joint_coordinate *given, size_t size)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", error);
     if (!joint) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(coordinate, "coordinate", error));
-    TRY(sadmm_world_check_coordinate(joint, index, coordinate, error));
-    joint->def.coordinates[index] = *coordinate;
+    sadmm_joint_coordinate coordinate = default_coordinate;
+    TRY(sadmm_take_bytes(&coordinate, sizeof coordinate, LEAST_COORDINATE, given, size, "coordinate", error));
+    TRY(sadmm_world_check_coordinate(joint, index, &coordinate, error));
+    joint->def.coordinates[index] = coordinate;
     return sadmm_world_take_update(world, joint, (enum sadmm_joint_update)index);
 }
 
@@ -525,10 +547,11 @@ sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, c
     struct sadmm_error *error = &world->error;
     double unit[4];
     int32_t slots[2];
-    TRY(sadmm_check_given(def, "def", error));
+    sadmm_joint_def taken;
+    TRY(sadmm_growing_take(&growing, &taken, def, "def", error)); /* its frames have the same place in all versions */
     TRY(sadmm_check_given(position, "position", error));
     TRY(sadmm_check_given(orientation, "orientation", error));
-    TRY(find_sides(world, def, slots, error));
+    TRY(find_sides(world, &taken, slots, error));
     TRY(sadmm_check_vector("position", position, 3, FRAME_LIMIT, error));
     TRY(sadmm_check_orientation("orientation", orientation, unit, error));
     TRY(sadmm_world_download_bodies(world));

@@ -69,11 +69,13 @@ static sadmm_status own_mass(const sadmm_shape_def *def, double density, sadmm_m
     return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: a plane or a mesh has no mass", (int)def->type);
 }
 
-sadmm_status sadmm_shape_mass(const sadmm_shape_def *def, double density, sadmm_mass *mass)
+sadmm_status sadmm_shape_mass(const sadmm_shape_def *given, double density, sadmm_mass *mass)
 {
     double orientation[4];
+    sadmm_shape_def taken;
+    const sadmm_shape_def *const def = &taken;
     sadmm_mass own;
-    TRY(sadmm_check_given(def, "def", NULL));
+    TRY(sadmm_growing_take(&sadmm_growing_shape, &taken, given, "def", NULL));
     TRY(sadmm_check_range("density", density, 1e-30, 1e30, NULL));
     TRY(sadmm_check_given(mass, "mass", NULL));
     TRY(sadmm_shape_form_check(def, orientation, NULL));

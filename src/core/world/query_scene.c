@@ -11,17 +11,17 @@
 /* Shapes for which another thread is worth its while. */
 enum { SHAPES_PER_THREAD = 16384 };
 
-sadmm_query_filter sadmm_query_filter_default(void)
-{
-    sadmm_query_filter filter = {.body_types = SADMM_ALL_BODY_TYPES, .environment = -1, .from_inside = true};
-    return filter;
-}
+static const sadmm_query_filter defaults = {.body_types = SADMM_ALL_BODY_TYPES, .environment = -1, .from_inside = true};
+static const struct sadmm_growing growing = SADMM_GROWING(sadmm_query_filter, &defaults, sensors);
+
+void sadmm_query_filter_init(sadmm_query_filter *filter, size_t size) { sadmm_growing_init(&growing, filter, size, 0); }
 
 sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filter *filter,
                                      struct sadmm_shape_filter *taken, sadmm_query_filter *given)
 {
     struct sadmm_error *error = &world->error;
-    *given = filter ? *filter : sadmm_query_filter_default();
+    *given = defaults;
+    if (filter) TRY(sadmm_growing_take(&growing, given, filter, "filter", error));
     if (given->body_types > SADMM_ALL_BODY_TYPES)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "filter->body_types = %u: must be in [0, %d]",
                           given->body_types, SADMM_ALL_BODY_TYPES);

@@ -17,12 +17,14 @@ enum { SLOT_BITS = 28 };
 
 /* ---- a shape that is none of the world's ------------------------------------------------------------------------- */
 
-static sadmm_status take_shape(sadmm_world *world, const sadmm_shape_def *def, const double position[3],
+static sadmm_status take_shape(sadmm_world *world, const sadmm_shape_def *given, const double position[3],
                                const double orientation[4], struct sadmm_placed *placed)
 {
     struct sadmm_error *error = &world->error;
     double own[4], turn[4], at[3], axes[4];
-    TRY(sadmm_check_given(def, "def", error));
+    sadmm_shape_def taken;
+    const sadmm_shape_def *const def = &taken;
+    TRY(sadmm_growing_take(&sadmm_growing_shape, &taken, given, "def", error));
     TRY(sadmm_check_given(position, "position", error));
     TRY(sadmm_check_given(orientation, "orientation", error));
     if (def->type == SADMM_SHAPE_MESH)

@@ -11,14 +11,13 @@
 
 /* A member that is added has to be listed below. */
 #define LISTED(type, size) _Static_assert(sizeof(type) == (size), #type " has other members than the list of a saved world")
-LISTED(sadmm_settings, 168);
 LISTED(struct sadmm_rigid, 320);
 LISTED(struct sadmm_extrapolation, 72);
 LISTED(sadmm_joint_coordinate, 112);
-LISTED(sadmm_joint_def, 840);
+LISTED(sadmm_joint_def, 856);
 LISTED(struct sadmm_joint_memory, 560);
-LISTED(sadmm_gear_def, 48);
-LISTED(sadmm_coupling_def, 224);
+LISTED(sadmm_gear_def, 56);
+LISTED(sadmm_coupling_def, 232);
 
 enum { MOST_SLOTS = 1 << 28 };
 

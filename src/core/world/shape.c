@@ -8,18 +8,6 @@
 #include "shape_form.h"
 #include "world_internal.h"
 
-sadmm_shape_def sadmm_shape_def_default(void)
-{
-    sadmm_shape_def def = {
-        .type = SADMM_SHAPE_SPHERE,
-        .orientation = {1, 0, 0, 0},
-        .friction = 0.5,
-        .category = 1,
-        .mask = UINT32_MAX,
-    };
-    return def;
-}
-
 /* owner: what stands before the names, "def->" say. */
 static sadmm_status check_material(const char *owner, double friction, double restitution, struct sadmm_error *error)
 {
@@ -138,23 +126,24 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def,
+sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *given,
                                    sadmm_shape_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     const struct sadmm_world_body *body = sadmm_world_find_body(world, body_id, "body", error);
+    sadmm_shape_def def;
     double ignored[4];
     if (!body) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(def, "def", error));
-    TRY(check_def(body, def, ignored, error)); /* before the world is detached */
+    TRY(sadmm_growing_take(&sadmm_growing_shape, &def, given, "def", error));
+    TRY(check_def(body, &def, ignored, error)); /* before the world is detached */
     TRY(sadmm_world_detach(world));
 
     const size_t slot = sadmm_slots_free(&world->shapes_taken);
     if (slot >= (size_t)1 << 28)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d shapes: a world holds at most 2^28", world->shape_count);
     if (!sadmm_world_reserve_shapes(world, slot + 1)) return sadmm_fail_memory(error, "a shape");
-    TRY(sadmm_world_put_shape(world, slot, (int32_t)body_id.slot - 1, def, error));
+    TRY(sadmm_world_put_shape(world, slot, (int32_t)body_id.slot - 1, &def, error));
     if (slot == world->shape_slots) {
         ++world->shape_slots;
         world->shape_generations[slot] = 1;
@@ -228,31 +217,31 @@ sadmm_status sadmm_world_shape_index(sadmm_world *world, sadmm_shape_id id, int3
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def, sadmm_body_id *body)
+sadmm_status sadmm_world_shape_def_sized(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *out, size_t size,
+                                         sadmm_body_id *body)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
     if (!shape) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(def, "def", error));
-    memset(def, 0, sizeof *def);
     const struct sadmm_geometry *geometry = &world->geometries[shape->geometry];
-    def->type = (sadmm_shape_type)geometry->type;
-    memcpy(def->size, geometry->size, sizeof def->size);
-    memcpy(def->position, shape->position, sizeof def->position);
-    memcpy(def->orientation, shape->orientation, sizeof def->orientation);
+    sadmm_shape_def def = {.type = (sadmm_shape_type)geometry->type,
+                           .friction = shape->friction,
+                           .restitution = shape->restitution,
+                           .category = shape->category,
+                           .mask = shape->mask,
+                           .sensor = shape->sensor};
+    memcpy(def.size, geometry->size, sizeof def.size);
+    memcpy(def.position, shape->position, sizeof def.position);
+    memcpy(def.orientation, shape->orientation, sizeof def.orientation);
     if (has_block(geometry->type)) {
         const struct sadmm_world_block_shape *kept = &world->block_shapes[id.slot - 1];
-        def->hull = kept->hull;
-        def->mesh = kept->mesh;
-        memcpy(def->position, kept->position, sizeof def->position);
-        memcpy(def->orientation, kept->orientation, sizeof def->orientation);
+        def.hull = kept->hull;
+        def.mesh = kept->mesh;
+        memcpy(def.position, kept->position, sizeof def.position);
+        memcpy(def.orientation, kept->orientation, sizeof def.orientation);
     }
-    def->friction = shape->friction;
-    def->restitution = shape->restitution;
-    def->category = shape->category;
-    def->mask = shape->mask;
-    def->sensor = shape->sensor;
+    TRY(sadmm_growing_give(&sadmm_growing_shape, out, size, 0, &def, "def", error));
     if (body) {
         body->slot = (uint32_t)shape->body + 1;
         body->generation = world->bodies[shape->body].generation;

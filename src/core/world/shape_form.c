@@ -8,6 +8,17 @@
 #include "core/base/check.h"
 #include "core/math/quat.h"
 
+static const sadmm_shape_def defaults = {
+    .type = SADMM_SHAPE_SPHERE,
+    .orientation = {1, 0, 0, 0},
+    .friction = 0.5,
+    .category = 1,
+    .mask = UINT32_MAX,
+};
+const struct sadmm_growing sadmm_growing_shape = SADMM_GROWING(sadmm_shape_def, &defaults, sensor);
+
+void sadmm_shape_def_init(sadmm_shape_def *def, size_t size) { sadmm_growing_init(&sadmm_growing_shape, def, size, 0); }
+
 /* A hull is given with shapes of that type, and with no others; so is a mesh. */
 static sadmm_status check_part(const char *name, const void *part, int of_type, int type, struct sadmm_error *error)
 {

@@ -4,7 +4,10 @@
 
 #include "collision/collision.h"
 #include "core/base/error.h"
+#include "core/base/growing.h"
 #include "subadmm/world.h"
+
+extern const struct sadmm_growing sadmm_growing_shape;
 
 /* INVALID_ARGUMENT that names a member of `def`; `orientation`: the definition's, normalised. */
 sadmm_status sadmm_shape_form_check(const sadmm_shape_def *def, double orientation[4], struct sadmm_error *error);

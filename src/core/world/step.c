@@ -424,11 +424,13 @@ sadmm_status sadmm_world_wait(sadmm_world *world)
     return sadmm_world_synchronise(world);
 }
 
-sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report)
+/* Of the report's first version. */
+enum { LEAST_REPORT = SADMM_SIZE_TO(sadmm_step_report, certificate) };
+
+sadmm_status sadmm_world_report_sized(sadmm_world *world, sadmm_step_report *report, size_t size)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     TRY(sadmm_check_given(report, "report", &world->error));
     TRY(sadmm_world_synchronise(world));
-    *report = world->report;
-    return SADMM_OK;
+    return sadmm_give_bytes(report, size, &world->report, sizeof world->report, LEAST_REPORT, "report", &world->error);
 }

@@ -7,41 +7,52 @@
 #include "core/solve/registry.h"
 #include "world_internal.h"
 
-sadmm_world_def sadmm_world_def_default(void)
+static const sadmm_world_def defaults = {
+    .backend = SADMM_BACKEND_AUTO,
+    .precision = SADMM_F64,
+    .device = 0,
+    .contact_margin = 0.02,
+    .settings = SADMM_DEFAULT_SETTINGS,
+};
+static const struct sadmm_growing growing = {
+    .size = sizeof(sadmm_world_def),
+    .least = SADMM_SIZE_TO(sadmm_world_def, tasks) + SADMM_SETTINGS_LEAST,
+    .defaults = &defaults,
+    .start = "sadmm_world_def_default()",
+    .part_count = 1,
+    .part_at = offsetof(sadmm_world_def, settings),
+    .part_size = sizeof(sadmm_settings),
+    .part_least = SADMM_SETTINGS_LEAST,
+    .part_size_at = offsetof(sadmm_world_def, settings.struct_size),
+    .part_name = "settings.struct_size",
+};
+
+void sadmm_world_def_init(sadmm_world_def *def, size_t size, size_t settings_size)
 {
-    sadmm_world_def def = {
-        .backend = SADMM_BACKEND_AUTO,
-        .precision = SADMM_F64,
-        .device = 0,
-        .contact_margin = 0.02,
-        .settings = sadmm_settings_default(),
-    };
-    return def;
+    sadmm_growing_init(&growing, def, size, settings_size);
 }
 
-sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out)
+sadmm_status sadmm_world_create(const sadmm_world_def *given, sadmm_world **out)
 {
-    sadmm_status status = sadmm_check_given(out, "out", NULL);
-    if (status != SADMM_OK) return status;
-    *out = NULL;
-    status = sadmm_check_given(def, "def", NULL);
-    if (status == SADMM_OK) status = sadmm_settings_validate(&def->settings, NULL);
-    if (status == SADMM_OK) status = sadmm_check_range("def->contact_margin", def->contact_margin, 0, 1, NULL);
+    sadmm_world_def def;
     struct sadmm_team team;
-    if (status == SADMM_OK) status = sadmm_team_init(&team, &def->tasks, "def->tasks", NULL);
-    if (status != SADMM_OK) return status;
-    if (def->device < 0)
-        return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->device = %d: must be >= 0", def->device);
+    TRY(sadmm_check_given(out, "out", NULL));
+    *out = NULL;
+    TRY(sadmm_growing_take(&growing, &def, given, "def", NULL));
+    TRY(sadmm_settings_validate(&def.settings, NULL));
+    TRY(sadmm_check_range("def->contact_margin", def.contact_margin, 0, 1, NULL));
+    TRY(sadmm_team_init(&team, &def.tasks, "def->tasks", NULL));
+    if (def.device < 0)
+        return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->device = %d: must be >= 0", def.device);
     /* AUTO is decided at the first step, when the size of the scene is known; unavailable choices fail here. */
     const struct sadmm_kernels *kernels = NULL;
-    status = sadmm_backend_choose(def->backend, def->precision, 0, &kernels, NULL, 0, NULL);
-    if (status != SADMM_OK) return status;
+    TRY(sadmm_backend_choose(def.backend, def.precision, 0, &kernels, NULL, 0, NULL));
 
     sadmm_world *world = (sadmm_world *)sadmm_alloc(1, sizeof *world);
     if (!world) return sadmm_fail_memory(NULL, "the world");
-    world->def = *def;
+    world->def = def;
     world->team = team;
-    status = sadmm_collision_create(&world->collision, NULL);
+    const sadmm_status status = sadmm_collision_create(&world->collision, NULL);
     if (status != SADMM_OK) {
         sadmm_free(world);
         return status;
@@ -104,10 +115,11 @@ const char *sadmm_world_message(const sadmm_world *world)
 
 sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings)
 {
-    sadmm_status status = sadmm_check_given(world, "world", NULL);
-    if (status == SADMM_OK) status = sadmm_settings_validate(settings, &world->error);
-    if (status == SADMM_OK) world->def.settings = *settings;
-    return status;
+    sadmm_settings taken;
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(sadmm_settings_take(&taken, settings, &world->error));
+    world->def.settings = taken;
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_world_set_backend(sadmm_world *world, sadmm_backend backend, sadmm_precision precision, int device)
@@ -128,7 +140,8 @@ sadmm_status sadmm_world_set_backend(sadmm_world *world, sadmm_backend backend, 
     return SADMM_OK;
 }
 
-sadmm_settings sadmm_world_settings(const sadmm_world *world)
+void sadmm_world_settings_sized(const sadmm_world *world, sadmm_settings *settings, size_t size)
 {
-    return world ? world->def.settings : sadmm_settings_default();
+    if (world) (void)sadmm_growing_give(&sadmm_growing_settings, settings, size, 0, &world->def.settings, "settings", NULL);
+    else sadmm_settings_init(settings, size);
 }

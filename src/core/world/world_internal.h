@@ -23,6 +23,7 @@
 #include "collision/query_tree.h"
 #include "core/base/check.h"
 #include "core/base/error.h"
+#include "core/base/growing.h"
 #include "core/base/parallel.h"
 #include "core/model/coupling_law.h"
 #include "core/model/joint_law.h"
