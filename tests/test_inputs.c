@@ -89,7 +89,7 @@ START_TEST(settings_at_the_ends_of_their_ranges)
     s.penalty_mass_factor = 0; /* with an offset of 0 there is no penalty */
     ck_assert_int_eq(sadmm_settings_validate(&s, NULL), SADMM_ERROR_INVALID_ARGUMENT);
     ck_assert_msg(strstr(sadmm_last_message(), "penalty_offset"), "%s", sadmm_last_message());
-    ck_assert_int_eq(sadmm_settings_validate(NULL, NULL), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_int_eq(sadmm_settings_take(&s, NULL, NULL), SADMM_ERROR_INVALID_ARGUMENT);
 }
 END_TEST
 

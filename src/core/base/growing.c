@@ -121,7 +121,7 @@ sadmm_status sadmm_growing_give(const struct sadmm_growing *type, void *out, siz
     return SADMM_OK;
 }
 
-static sadmm_status check_bytes(size_t size, size_t least, const char *name, struct sadmm_error *error)
+sadmm_status sadmm_check_bytes(size_t size, size_t least, const char *name, struct sadmm_error *error)
 {
     if (size >= least && size <= LARGEST) return SADMM_OK;
     return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "size = %zu: must be in [%zu, %d], that of %s", size, least,
@@ -132,7 +132,7 @@ sadmm_status sadmm_take_bytes(void *out, size_t known, size_t least, const void 
                               struct sadmm_error *error)
 {
     TRY(sadmm_check_given(given, name, error));
-    TRY(check_bytes(size, least, name, error));
+    TRY(sadmm_check_bytes(size, least, name, error));
     return take_known((unsigned char *)out, known, (const unsigned char *)given, size, name, 0, error);
 }
 
@@ -140,7 +140,7 @@ sadmm_status sadmm_give_bytes(void *out, size_t size, const void *from, size_t k
                               struct sadmm_error *error)
 {
     TRY(sadmm_check_given(out, name, error));
-    TRY(check_bytes(size, least, name, error));
+    TRY(sadmm_check_bytes(size, least, name, error));
     copy_to((unsigned char *)out, size, (const unsigned char *)from, known);
     return SADMM_OK;
 }

@@ -38,6 +38,7 @@ sadmm_status sadmm_growing_give(const struct sadmm_growing *type, void *out, siz
  * holds the defaults. */
 sadmm_status sadmm_take_bytes(void *out, size_t known, size_t least, const void *given, size_t size, const char *name,
                               struct sadmm_error *error);
+sadmm_status sadmm_check_bytes(size_t size, size_t least, const char *name, struct sadmm_error *error);
 sadmm_status sadmm_give_bytes(void *out, size_t size, const void *from, size_t known, size_t least, const char *name,
                               struct sadmm_error *error);
 

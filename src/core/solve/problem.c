@@ -163,7 +163,7 @@ sadmm_status sadmm_problem_solve_sized(sadmm_problem *problem, sadmm_backend bac
 
     sadmm_settings settings;
     TRY(sadmm_settings_take(&settings, given, error));
-    if (report) TRY(sadmm_give_bytes(report, report_size, &done, sizeof done, LEAST_REPORT, "report", error));
+    if (report) TRY(sadmm_check_bytes(report_size, LEAST_REPORT, "report", error));
     int64_t constraints = (int64_t)problem->contacts.point_count + problem->block_count;
     TRY(sadmm_backend_choose(backend, precision, constraints, &kernels, NULL, 0, error));
     TRY(find_context(problem, kernels, &context, error));
