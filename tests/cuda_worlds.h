@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/world/world_internal.h"
 #include "cuda_suite.h"
 #include "scene_tools.h"
+#include "world/state/world_internal.h"
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"

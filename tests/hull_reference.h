@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "collision/hull_data.h"
+#include "collision/hull/hull_data.h"
 
 enum { TEST_HULL_POINTS = 64, TEST_HULL_FACES = 2 * TEST_HULL_POINTS, TEST_HULL_EDGES = 3 * TEST_HULL_POINTS };
 

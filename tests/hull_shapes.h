@@ -4,7 +4,7 @@
 
 #include <check.h>
 
-#include "collision/collision.h"
+#include "collision/shapes/input.h"
 #include "hull_reference.h"
 
 enum { TEST_SHAPE_DATA = 200000 };

@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "collision/hull.h"
-#include "collision/polytope.h"
+#include "collision/convex/polytope.h"
+#include "collision/hull/hull.h"
 #include "core/math/quat.h"
 #include "subadmm/subadmm.h"
 

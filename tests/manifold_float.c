@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "collision/pair_manifold.h"
+#include "collision/manifold/pair_manifold.h"
 
 /* As in manifold_tools.h, which is compiled in double. */
 struct world_manifold {

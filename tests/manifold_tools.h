@@ -12,8 +12,8 @@
 #include <string.h>
 
 #include "core/math/array3.h"
-#include "collision/bounds.h"
-#include "collision/pair_manifold.h"
+#include "collision/base/bounds.h"
+#include "collision/manifold/pair_manifold.h"
 
 /* A deterministic generator: xorshift64*. */
 struct random {

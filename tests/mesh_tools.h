@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "collision/mesh.h"
-#include "collision/mesh_triangle.h"
+#include "collision/mesh/mesh.h"
+#include "collision/mesh/mesh_triangle.h"
 #include "subadmm/subadmm.h"
 
 enum { SOUP_VERTICES = 20000, SOUP_TRIANGLES = 40000 };

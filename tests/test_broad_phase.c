@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "collision/pipeline.h"
-#include "collision/radix_sort.h"
+#include "collision/base/radix_sort.h"
+#include "collision/find/pipeline.h"
 #include "config.h"
 #include "core/base/memory.h"
 #include "manifold_tools.h"

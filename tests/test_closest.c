@@ -3,7 +3,7 @@
 #include <float.h>
 #include <stdio.h>
 
-#include "collision/closest.h"
+#include "collision/query/closest.h"
 #include "convex_tools.h"
 #include "mesh_tools.h"
 #include "run_suite.h"

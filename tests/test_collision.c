@@ -6,8 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "collision/kernels.h"
-#include "collision/pipeline.h"
+#include "collision/collision.h"
+#include "collision/find/kernels.h"
+#include "collision/find/pipeline.h"
 #include "config.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"

@@ -9,7 +9,7 @@
 #include "collision_soups.h"
 #include "scene_tools.h"
 
-#include "core/world/world_internal.h"
+#include "world/state/world_internal.h"
 
 /* ---- soups ----------------------------------------------------------------------------------------------------- */
 

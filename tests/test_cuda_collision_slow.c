@@ -5,7 +5,7 @@
  * are few. */
 #include <stdio.h>
 
-#include "collision/collision_table.h"
+#include "collision/manifold/collision_table.h"
 #include "collision_soups.h"
 
 enum { WANTED = 1000000, BODIES = 20000, FEW_BODIES = 60, THREADS = 16, MOST_ROUNDS = 20 };

@@ -7,9 +7,9 @@
 enum { EMULATED = 0 };
 #endif
 #include "bouncing.h"
-#include "collision/box_row.h"
-#include "collision/candidates.h"
-#include "collision/manifold.h"
+#include "collision/base/manifold.h"
+#include "collision/find/box_row.h"
+#include "collision/find/candidates.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "core/math/rigid.h"

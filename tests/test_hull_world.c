@@ -3,9 +3,9 @@
 #include <check.h>
 
 #include "core/base/memory.h"
-#include "core/world/world_internal.h"
 #include "hull_tools.h"
 #include "scene_tools.h"
+#include "world/state/world_internal.h"
 
 static sadmm_hull *make_hull(int corners)
 {

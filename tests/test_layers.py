@@ -15,13 +15,24 @@ import sys
 
 # folder -> folders it may use, besides itself. Within a group of folders each may use those before it.
 CORE = ["core/base", "core/math", "core/model", "core/solve"]
+COLLISION = ["collision/" + name for name in
+             ("base", "shapes", "hull", "convex", "mesh", "manifold", "broad", "find", "query")] + ["collision"]
+WORLD = ["world/" + name for name in ("state", "step", "resident", "query", "objects")] + ["world", "world/save"]
 CUDA = ["backend_cuda/" + name for name in
         ("device", "collide", "graph", "assemble", "weight", "iterate", "step", "table")]
-MAY_USE = {folder: CORE[:place] for place, folder in enumerate(CORE)}
-MAY_USE.update({
-    "core/flight": CORE + ["collision"],
-    "core/world": CORE + ["collision", "core/flight"],
-    "collision": ["core/base", "core/math"],
+FLIGHT = "collision/flight"
+
+
+def layers(folders, below=()):
+    return {folder: [*below, *folders[:place]] for place, folder in enumerate(folders)}
+
+
+MAY_USE = {
+    **layers(CORE),
+    **layers(COLLISION, CORE[:2]),
+    FLIGHT: CORE[:3] + COLLISION,
+    **layers(WORLD, CORE + COLLISION + [FLIGHT]),
+    **layers(CUDA, CORE + COLLISION + [FLIGHT]),
     "mesh_file": ["core/base"],
     "backend_ref": CORE,
     "backend_cpu": CORE,
@@ -29,8 +40,7 @@ MAY_USE.update({
     "scenes": ["core/base", "core/math", "scene_file"],
     "fclib": ["core/base", "core/model"],
     "cli": ["core/base", "scene_file", "scenes", "fclib"],
-})
-MAY_USE.update({folder: CORE + ["collision", "core/flight"] + CUDA[:place] for place, folder in enumerate(CUDA)})
+}
 # The list of backends: the one place that names them (each through its find function).
 BACKEND_LIST = "core/solve/registry.c"
 

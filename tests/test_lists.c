@@ -6,9 +6,9 @@
 
 #include "core/base/key_tree.h"
 #include "core/base/memory.h"
-#include "core/world/pair_table.h"
-#include "core/world/slots.h"
 #include "run_suite.h"
+#include "world/state/pair_table.h"
+#include "world/state/slots.h"
 
 enum { KEYS = 300, SLOTS = 700, BODIES = 14, CALLS = 20000 };
 

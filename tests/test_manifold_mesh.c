@@ -2,7 +2,7 @@
  * nearer than it is, the inside of a convex mesh is that of its hull, and along paths nothing jumps. */
 #include <check.h>
 
-#include "collision/mesh_walk.h"
+#include "collision/mesh/mesh_walk.h"
 #include "fewer.h"
 #include "hull_shapes.h"
 #include "manifold_tools.h"

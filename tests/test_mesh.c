@@ -1,7 +1,7 @@
 /* Meshes: who is beside whom, what is flat, what a walk finds, what is refused. */
 #include <check.h>
 
-#include "collision/mesh_walk.h"
+#include "collision/mesh/mesh_walk.h"
 #include "core/base/memory.h"
 #include "mesh_tools.h"
 #include "run_suite.h"

@@ -1,5 +1,5 @@
-/* Where contacts are taken within a step (collision/midpoint.h, advance.h): halfway through it, or where what is fast
- * first touches. Separations of turning bodies, what passes by, bullets, momentum of fast impacts. */
+/* Where contacts are taken within a step (collision/base/midpoint.h, advance.h): halfway through it, or where what is
+ * fast first touches. Separations of turning bodies, what passes by, bullets, momentum of fast impacts. */
 #include "momentum_worlds.h"
 
 static sadmm_world *empty_world(double dt, int iterations)

@@ -4,8 +4,8 @@
 
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
-#include "core/world/world_internal.h"
 #include "query_worlds.h"
+#include "world/state/world_internal.h"
 
 static sadmm_ray ray_of(double x, double y, double z, double dx, double dy, double dz)
 {

@@ -2,8 +2,8 @@
  * farthest along the normal, and the bisection of a function that is negative inside), meshes by all triangles. */
 #include <float.h>
 
-#include "collision/ray.h"
-#include "collision/ray_box.h"
+#include "collision/query/ray.h"
+#include "collision/query/ray_box.h"
 #include "convex_tools.h"
 #include "mesh_tools.h"
 #include "run_suite.h"

@@ -1,10 +1,10 @@
 /* Overlaps and closest points in worlds: by formula, and against asking shape by shape. */
 #include <stddef.h>
 
-#include "collision/closest.h"
+#include "collision/query/closest.h"
 #include "core/base/memory.h"
-#include "core/world/world_internal.h"
 #include "query_worlds.h"
+#include "world/state/world_internal.h"
 
 static const double origin[3] = {0, 0, 0}, as_it_is[4] = {1, 0, 0, 0};
 

@@ -1,5 +1,5 @@
 /* Rims are round: a body whose centre of mass is over a round support stays, one whose is not tips, to a thousandth of
- * the radius, whichever way it is turned (collision/convex_clip.h). */
+ * the radius, whichever way it is turned (collision/convex/convex_clip.h). */
 #include "core/math/quat.h"
 #include "scene_tools.h"
 

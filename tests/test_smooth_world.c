@@ -5,12 +5,12 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "collision/hull_data.h"
+#include "collision/hull/hull_data.h"
 #include "core/math/quat.h"
-#include "core/world/world_internal.h"
 #include "mesh_tools.h"
 #include "run_suite.h"
 #include "subadmm/subadmm.h"
+#include "world/state/world_internal.h"
 
 #define MUST(world, call)                                                                        \
     do {                                                                                         \

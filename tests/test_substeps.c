@@ -2,9 +2,9 @@
  * bit, what n steps of dt / n give, so that most is tested by comparison with these. The same on the device:
  * test_cuda_substeps.c.
  */
-#include "collision/pipeline.h"
+#include "collision/find/pipeline.h"
 #include "core/base/parallel.h"
-#include "core/world/world_internal.h"
+#include "world/state/world_internal.h"
 #include "bouncing.h"
 #include "scene_tools.h"
 

@@ -1,5 +1,6 @@
-/* Nothing falls or is shot through what is thin, misses it by what accelerations add within a step, or is passed through
- * by what turns (collision/advance.h, inner_ball.h); nor do bodies that are shot at one another (core/world/hits.c). */
+/* Nothing falls or is shot through what is thin, misses it by what accelerations add within a step, or is passed
+ * through by what turns (collision/manifold/advance.h, inner_ball.h); nor do bodies that are shot at one another
+ * (world/step/hits.c). */
 #include "fewer.h"
 #include "shots.h"
 
@@ -21,7 +22,8 @@ START_TEST(these_drops_stay_on_their_side)
         {SADMM_SHAPE_CONE, DROP_GRID, 0.005, SADMM_BACKEND_CPU, SADMM_F64, 5025},
         {SADMM_SHAPE_CONE, DROP_HEIGHTS, 0.005, SADMM_BACKEND_CPU, SADMM_F64, 5045},
         {SADMM_SHAPE_CONE, DROP_GRID, 0.01, SADMM_BACKEND_CPU, SADMM_F64, 5046},
-        /* what is hit and turns on within the step, or is anchored; what parts from a pair that bounces (system_math.h) */
+        /* what is hit and turns on within the step, or is anchored; what parts from a pair that bounces
+         * (system_math.h) */
         {SADMM_SHAPE_HULL, DROP_FLOATING, 0.02, SADMM_BACKEND_CPU, SADMM_F64, 20083},
         {SADMM_SHAPE_CONE, DROP_FLOATING, 0.02, SADMM_BACKEND_CPU, SADMM_F64, 20023},
         {DROP_COMPOUND, DROP_FLOATING, 0.02, SADMM_BACKEND_CPU, SADMM_F64, 20019},
@@ -59,8 +61,8 @@ START_TEST(shots_do_not_go_through)
 }
 END_TEST
 
-/* What turns by radians once it is hit: looks that do not end, touches of what begins to approach after it touched, more
- * hits than a body may have. */
+/* What turns by radians once it is hit: looks that do not end, touches of what begins to approach after it touched,
+ * more hits than a body may have. */
 START_TEST(these_shots_do_not_go_through)
 {
     static const uint64_t worlds[] = {1026, 1030, 1067, 1126, 1187, 1190, 1227, 1251};
@@ -179,9 +181,9 @@ END_TEST
 
 /* ---- turning ---------------------------------------------------------------------------------------------------- */
 
-/* A bar of 2 m turns about its middle, kinematic or of a tonne, and hits a ball of 10 g that is at rest in its way, 0.7 m
- * out: the ball is faster than half of what hits it. Up to 0.3 rad a step by the plane in which they touch: what a tangent
- * is off by then, r x^3 / 3 at most, is less than the ball and the bar together. Beyond at its moment. */
+/* A bar of 2 m turns about its middle, kinematic or of a tonne, and hits a ball of 10 g that is at rest in its way, 0.7
+ * m out: the ball is faster than half of what hits it. Up to 0.3 rad a step by the plane in which they touch: what a
+ * tangent is off by then, r x^3 / 3 at most, is less than the ball and the bar together. Beyond at its moment. */
 START_TEST(a_turning_bar_hits)
 {
     static const struct {

@@ -5,10 +5,10 @@
 
 #include "core/base/error.h"
 #include "core/base/utf8.h"
-#include "core/world/save.h"
 #include "run_suite.h"
 #include "subadmm/save.h"
 #include "subadmm/world.h"
+#include "world/save/save.h"
 
 static const struct {
     const char *text;

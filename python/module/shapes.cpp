@@ -24,7 +24,7 @@ using points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::dev
 using triangles = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using grid = nb::ndarray<const double, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
 
-// src/collision/hull.h and mesh.h, which are C
+// src/collision/hull/hull.h and mesh.h, which are C
 extern "C" void sadmm_hull_retain(const sadmm_hull *hull);
 extern "C" void sadmm_mesh_retain(const sadmm_mesh *mesh);
 

@@ -9,12 +9,11 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "collision/find/kernels.h"
+#include "collision/find/pipeline.h"
 #include "config.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
-#include "kernels.h"
-#include "pipeline.h"
-#include "swept_bodies.h"
 
 /* Fewer candidates a thread than this are not worth waking it. */
 enum { PAIRS_PER_THREAD = 256 };

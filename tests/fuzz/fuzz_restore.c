@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "bytes.h"
-#include "core/world/save.h"
 #include "subadmm/subadmm.h"
+#include "world/save/save.h"
 
 enum { WORLDS = 4, MOST_CHANGES = 8 };
 

@@ -129,7 +129,7 @@ static __device__ __forceinline__ void each_force(const cuda_view &v, int32_t i,
     }
 }
 
-/* What joints stiffen body i by (core/world/joint_stiffen.c); is it another inertia than before? found: as above; else
+/* What joints stiffen body i by (world/step/joint_stiffen.c); is it another inertia than before? found: as above; else
  * the (sub-)step begins. */
 static __device__ __noinline__ bool stiffen_body(const cuda_view &v, int32_t i, bool found)
 {

@@ -8,7 +8,7 @@
  * Stackless Traversal).
  */
 #include "batch.h"
-#include "collision/geometry.h"
+#include "collision/shapes/geometry.h"
 
 /* ---- place ----------------------------------------------------------------------------------------------------- */
 

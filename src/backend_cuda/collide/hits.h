@@ -1,5 +1,5 @@
-/* Hits of swept bodies, each at its moment (core/world/hits.c says what for), on the device: between the candidates of a
- * step and its contacts.
+/* Hits of swept bodies, each at its moment (world/step/hits.c says what for), on the device: between the candidates of
+ * a step and its contacts.
  *
  *   list      candidates that are fast; bodies that something presses on; the step's start is copied
  *   foresee   when each of these pairs of swept bodies first touches               a thread a pair
@@ -10,11 +10,11 @@
  *
  * Steps have these kernels if they are planned to (CUDA(plan_hits)); where nothing is fast all of them return at once.
  * Lists have no order, and results do not depend on it: the next hit is that of the least (time, key), shapes of a body
- * are taken in order, a list's length and what becomes of it are the same in any order. Bodies of two environments never
- * meet: each environment is a group, whose hits a block takes by itself, unless a body that moves is in none of them;
- * then all are one group. What a group may take is limited, by the world and the group alone: beyond that its bodies are
- * left to the solve, for the (sub-)step. Formulas are the host's: core/flight/swept_body.h,
- * collision/flight_touch_math.h, core/math/hit.h. */
+ * are taken in order, a list's length and what becomes of it are the same in any order. Bodies of two environments
+ * never meet: each environment is a group, whose hits a block takes by itself, unless a body that moves is in none of
+ * them; then all are one group. What a group may take is limited, by the world and the group alone: beyond that its
+ * bodies are left to the solve, for the (sub-)step. Formulas are the host's: collision/flight/swept_body.h,
+ * collision/flight/flight_touch_math.h, core/math/hit.h. */
 #ifndef SADMM_CUDA_COLLIDE_HITS_H
 #define SADMM_CUDA_COLLIDE_HITS_H
 
@@ -23,7 +23,7 @@
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
-#include "core/flight/swept_body.h"
+#include "collision/flight/swept_body.h"
 #pragma GCC diagnostic pop
 
 enum {

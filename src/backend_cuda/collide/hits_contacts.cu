@@ -5,8 +5,8 @@
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
-#include "collision/later.h"
-#include "collision/swept_bodies.h"
+#include "collision/find/later.h"
+#include "collision/flight/swept_bodies.h"
 #pragma GCC diagnostic pop
 
 /* ---- replace ----------------------------------------------------------------------------------------------------- */

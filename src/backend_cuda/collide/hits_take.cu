@@ -4,9 +4,9 @@
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
-#include "collision/flight_touch_math.h"
-#include "collision/fast_pair.h"
-#include "collision/swept_bodies.h"
+#include "collision/flight/flight_touch_math.h"
+#include "collision/flight/fast_pair.h"
+#include "collision/flight/swept_bodies.h"
 #pragma GCC diagnostic pop
 
 /* ---- list -------------------------------------------------------------------------------------------------------- */

@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-#include "collision/mesh_data.h"
+#include "collision/mesh/mesh_data.h"
 #include "memory.h"
 
 /* A mover of this many median radii is large. */

@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-#include "collision/seams.h"
+#include "collision/find/seams.h"
 #include "core/base/memory.h"
 #include "hits.h"
 #include "view.h"
@@ -93,7 +93,7 @@ struct sadmm_cuda_collision {
     struct collision_buffer buffers[BUFFERS];
     size_t input_bytes[INPUTS]; /* as uploaded; SIZE_MAX: not */
     uint32_t hull_revision;
-    bool smooth;                /* a shape is a smooth body (collision/geometry.h) */
+    bool smooth;                /* a shape is a smooth body (collision/shapes/geometry.h) */
     bool takes_hits;            /* the world is one of those of hits.h; */
     bool hits_ready;            /* and the device has its lists */
     struct hit_lists *hit_lists;

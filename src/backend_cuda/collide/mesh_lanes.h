@@ -1,11 +1,11 @@
-/* Which triangles of a mesh are near a shape, by the lanes of a warp: those that collision/mesh_walk.h comes to, in any
- * order. A thread by itself would wait for memory at every cell of a heightfield and every node of a tree. */
+/* Which triangles of a mesh are near a shape, by the lanes of a warp: those that collision/mesh/mesh_walk.h comes to,
+ * in any order. A thread by itself would wait for memory at every cell of a heightfield and every node of a tree. */
 #ifndef SADMM_CUDA_COLLIDE_MESH_LANES_H
 #define SADMM_CUDA_COLLIDE_MESH_LANES_H
 
 #include "backend_cuda/device/parallel.h"
-#include "collision/box_tree.h"
-#include "collision/mesh_walk.h"
+#include "collision/mesh/box_tree.h"
+#include "collision/mesh/mesh_walk.h"
 
 /* Nodes that wait, last in, first out. The lanes take a node each, which at most as many more wait for; fewer lanes do
  * where many wait, in the end one: depth first, as box_tree.c makes the nodes, of a subtree no more wait than

@@ -9,9 +9,9 @@
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
-#include "collision/fast_pair.h"
-#include "collision/mesh_walk.h"
-#include "collision/pair_manifold.h"
+#include "collision/flight/fast_pair.h"
+#include "collision/manifold/pair_manifold.h"
+#include "collision/mesh/mesh_walk.h"
 #pragma GCC diagnostic pop
 
 /* find_key with seven loads at a time: rounds to memory are what a search takes. */

@@ -47,9 +47,9 @@
 #include "backend_cuda/device/layout.h"
 #include "backend_cuda/device/pdl.h"
 #include "backend_cuda/device/wide.h"
-#include "collision/contact_emit.h"
-#include "collision/gjk.h"
-#include "collision/seam.h"
+#include "collision/convex/gjk.h"
+#include "collision/find/contact_emit.h"
+#include "collision/find/seam.h"
 #include "pipeline.h"
 
 enum {
@@ -164,8 +164,8 @@ struct collision_set {
 struct collision_view {
     const struct sadmm_shape *shapes;              /* by slot */
     const struct sadmm_geometry *geometries;       /* by handle */
-    const double *hulls;                           /* shape data (collision/hull_data.h); NULL: no shape is a hull, or a
-                                                      mesh */
+    const double *hulls;                           /* shape data (collision/hull/hull_data.h); NULL: no shape is a hull,
+                                                      or a mesh */
     const struct sadmm_collision_body *bodies;     /* by body slot */
     const uint32_t *present;                       /* slots: leaves, then planes */
     const uint64_t *planes;                        /* (group + 1) << 32 | slot, sorted */
@@ -202,9 +202,10 @@ struct collision_view {
 
     unsigned long long *candidate_count;           /* found, whether they fit or not; listed; mesh_pairs; general; is
                                                       any fast? (COUNT_) */
-    uint64_t *mesh_pairs;                          /* first_candidate of pairs with a mesh, of which there may be as many as
-                                                      candidates; as they come */
-    double *touches;                               /* by candidate, of triangles and pairs that are fast: mesh_first_touch */
+    uint64_t *mesh_pairs;                          /* first_candidate of pairs with a mesh, of which there may be as
+                                                      many as candidates; as they come */
+    double *touches;                               /* by candidate, of triangles and pairs that are fast:
+                                                      mesh_first_touch */
     int32_t *listed;                               /* candidates that the narrow phase does by themselves */
     struct gjk_walk *walks;                       /* as listed: what of each is done */
     uint64_t *found;                               /* candidates as they come, packed (candidate_of) */

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "collision/bounds.h"
+#include "collision/base/bounds.h"
 #include "core/base/memory.h"
 #include "context.h"
 

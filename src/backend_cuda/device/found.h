@@ -16,7 +16,7 @@ struct sadmm_cuda_contact_counts {
     int64_t candidates; /* pairs of shapes whose boxes overlap */
     int32_t pairs, points;
     double dt;          /* of the step that the impulses are for, s; 0: of none */
-    int32_t fast;       /* not 0: some pair is (collision/fast_pair.h); where that is asked */
+    int32_t fast;       /* not 0: some pair is (collision/flight/fast_pair.h); where that is asked */
 };
 
 #ifdef SADMM_CUDA_EMULATED

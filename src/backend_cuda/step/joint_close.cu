@@ -1,5 +1,5 @@
 /* What is locked, closed at the end of a (sub-)step (core/model/joint_close.h) by the rule of the host
- * (core/world/joint_close.c): a thread block a part, which leaves at once where no loop of it folds and its islands may
+ * (world/step/joint_close.c): a thread block a part, which leaves at once where no loop of it folds and its islands may
  * not be opened by more than the order of the step. Bodies get their place where they are moved (move_articulated.h),
  * once their island has paid for it (joint_momentum.cu). */
 #include "backend_cuda/device/double.h"

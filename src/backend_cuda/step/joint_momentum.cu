@@ -1,6 +1,6 @@
 /* Momentum and energy of islands with joints (core/model/joint_momentum.h) on the device. A thread block an island, once
  * it is known where its joints let it go: what closing has cost, which it pays; then what each body adds, then sums over
- * the bodies, in the order of the host (core/world/joint_momentum.c). Bodies get what restores it where they are moved
+ * the bodies, in the order of the host (world/step/joint_momentum.c). Bodies get what restores it where they are moved
  * (move_articulated.h). Beside them a thread a joint: how far that is off. */
 #include <algorithm>
 

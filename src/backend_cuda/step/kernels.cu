@@ -5,7 +5,7 @@
 
 #include "backend_cuda/device/double.h"
 
-#include "collision/bounds.h"
+#include "collision/base/bounds.h"
 #include "core/model/coupling_law.h"
 #include "core/model/gear_law.h"
 #include "core/model/joint_trapezoid.h"

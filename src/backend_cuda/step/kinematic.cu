@@ -1,5 +1,5 @@
 /* Kinematic bodies of a world on the device (core/model/kinematic.h), in double: where they are, what they support
- * (core/world/kinematic.c says what that is for), and what contacts give them. A step without any has none of it.
+ * (world/step/kinematic.c says what that is for), and what contacts give them. A step without any has none of it.
  *
  *   start    velocities of the step, and poses as collision sees them
  *   support  once the layout has islands: the first pair that supports each, by its number; is there anything else that

@@ -23,7 +23,7 @@ SADMM_INLINE bool sadmm_body_is_kinematic(int32_t body) { return body < -1; }
 SADMM_INLINE int32_t sadmm_kinematic(int32_t body) { return -2 - body; }
 
 /* A manifold of a pair of shapes: one normal, up to SADMM_MAX_POINTS points. Two shapes may have several, distinguished
- * by `subshape` (collision/geometry.h). */
+ * by `subshape` (collision/shapes/geometry.h). */
 struct sadmm_contact_pair {
     int32_t body_a, body_b;   /* system body, -1: static, below: kinematic */
     int32_t shape_a, shape_b; /* world shape slot (world level), else -1 */
@@ -31,8 +31,8 @@ struct sadmm_contact_pair {
     double normal[3];         /* unit, from a to b */
     double friction;          /* mu */
     double restitution;
-    uint32_t cache;           /* narrow phase: axis and side of the last step (collision/manifold.h), 0 = none */
-    uint32_t revision, placed; /* of the two shapes, and of their bodies' poses (collision/contact_match.h) */
+    uint32_t cache;           /* narrow phase: axis and side of the last step (collision/base/manifold.h), 0 = none */
+    uint32_t revision, placed; /* of the two shapes, and of their bodies' poses (collision/find/contact_match.h) */
     uint32_t subshape;
 };
 

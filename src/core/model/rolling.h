@@ -2,20 +2,21 @@
  * touch where their surfaces are curved, or at a corner that goes round with its body.
  *
  * Time. Their normal and arms are those of the step's *end*, so that it is there that the contact's velocity is what
- * the law says: J_1 v_1. With the ones halfway, J, what is left of J_1 v_1 would do work in every step. They are carried
- * on from the last step's and this step's, which are both found halfway (collision/contact_migrate.h). Impulses act
- * along J, though: what J^T lambda differs from J_1^T lambda by is `owed`, and each body is given it with the next step.
+ * the law says: J_1 v_1. With the ones halfway, J, what is left of J_1 v_1 would do work in every step. They are
+ * carried on from the last step's and this step's, which are both found halfway (collision/find/contact_migrate.h).
+ * Impulses act along J, though: what J^T lambda differs from J_1^T lambda by is `owed`, and each body is given it with
+ * the next step.
  *
  * Spin. Where moments differ a solution is the spin halfway (spin.h), and the body goes on by itself from there to the
  * step's end. So the next step of a body that rolls on a round surface is solved for the spin at its end: what it gains
  * by itself, to first order, is in b, and taken off again before the body turns on. Not in islands with joints, whose
  * rows are of the spin halfway, nor where it turns about edges and corners.
  *
- * Stiffness. A body that rocks on a radius of curvature r, its centre of mass h above the contact, has the stiffness
- * N (r - h), N the load, against turning across the normal. Its torque is that of the pose halfway, explicit, and
- * stable for omega dt < 2; beyond, and without friction from less, rocking would grow out of rounding. So where
- * (omega dt)^2 is more than ROLLING_STIFF the body gets half of dt^2 times the stiffness added to its inertia, and moves
- * by the velocity after the step: with that any dt is stable, and rocking dies away. In double. */
+ * Stiffness. A body that rocks on a radius of curvature r, its centre of mass h above the contact, has the stiffness N
+ * (r - h), N the load, against turning across the normal. Its torque is that of the pose halfway, explicit, and stable
+ * for omega dt < 2; beyond, and without friction from less, rocking would grow out of rounding. So where (omega dt)^2
+ * is more than ROLLING_STIFF the body gets half of dt^2 times the stiffness added to its inertia, and moves by the
+ * velocity after the step: with that any dt is stable, and rocking dies away. In double. */
 #ifndef SADMM_CORE_MODEL_ROLLING_H
 #define SADMM_CORE_MODEL_ROLLING_H
 
@@ -26,9 +27,9 @@
 /* (omega dt)^2, half a radian a step: from there to 1 frictionless rocking is no longer stable by itself. */
 #define ROLLING_STIFF 0.25
 
-/* What a body takes along from contacts that rolled. Few have any of it, so that it is not read, or cleared, where a bit
- * does not say that it is there: records of bodies are what large worlds move. TURNS_ON: the step's solution is
- * the spin at its end, not halfway (spin.h). STIFFENED: in the step at hand its stiffness has what joints add
+/* What a body takes along from contacts that rolled. Few have any of it, so that it is not read, or cleared, where a
+ * bit does not say that it is there: records of bodies are what large worlds move. TURNS_ON: the step's solution is the
+ * spin at its end, not halfway (spin.h). STIFFENED: in the step at hand its stiffness has what joints add
  * (stiffening.h). */
 enum rolling_kept { ROLLING_OWES = 1, ROLLING_IS_STIFF = 2, ROLLING_TURNS_ON = 4, ROLLING_IS_STIFFENED = 8 };
 

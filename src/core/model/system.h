@@ -63,7 +63,7 @@ struct sadmm_system {
     const double *kinematic;         /* (kinematic_count x 6) velocities of kinematic bodies, m/s, rad/s, world */
     int32_t kinematic_count;
     const double *support_motion;    /* (body_count x 6): velocities are relative to this, the motion of an island's
-                                        support (core/world/kinematic.c); NULL: as they are */
+                                        support (world/step/kinematic.c); NULL: as they are */
     struct sadmm_contact_set *contacts;
     bool errors_given;               /* points carry e (problem level) instead of a separation */
     bool first;                      /* no step came before: where there are no impulses, none are known */

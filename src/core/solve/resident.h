@@ -1,5 +1,5 @@
 /* Whole steps on a backend that keeps the world itself: state, contacts and impulses stay in its memory from step to
- * step, and the host only says "go on". Optional (kernels.h, `resident`); core/world/resident.c is the caller.
+ * step, and the host only says "go on". Optional (kernels.h, `resident`); world/resident/resident.c is the caller.
  *
  * Steps are enqueued: `step` may return before the step has run. Steps run in order. A step that fails leaves the world
  * as it was before it, and those enqueued after it do not run; `wait` reports it. What a step could not know when it

@@ -21,7 +21,7 @@ extern "C" {
 
 enum sadmm_stage_kind {
     SADMM_STAGE_GATHER,             /* -    bodies and start values of the step */
-    SADMM_STAGE_HITS,               /* -    bodies in flight hit each other at their moments (core/world/hits.c) */
+    SADMM_STAGE_HITS,               /* -    bodies in flight hit each other at their moments (world/step/hits.c) */
     SADMM_STAGE_FIND,               /* -    contacts */
     SADMM_STAGE_JOINT_ROWS,         /* -    rows of joints, gears and couplings */
     SADMM_STAGE_PLAN,               /* -    what this sub-step needs, found from its contacts and rows */

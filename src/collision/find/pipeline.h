@@ -1,0 +1,25 @@
+/* The insides of struct sadmm_collision, for collision.c and the tests. */
+#ifndef SADMM_COLLISION_FIND_PIPELINE_H
+#define SADMM_COLLISION_FIND_PIPELINE_H
+
+#include "box_row.h"
+#include "candidates.h"
+
+struct sadmm_collision {
+    struct sadmm_candidates candidates;
+    /* The set before the last find, to undo it; the next find writes here. Finds again write to `between`, from the
+     * set that they replace. */
+    struct sadmm_contact_set spare, between;
+    bool can_undo;
+    bool has_candidates; /* the candidates are those of the next find */
+    struct sadmm_box_row row; /* of their boxes, made when it is asked for (swept_bodies.h) */
+    /* One a thread beyond the first; its first thread writes to the new set itself. */
+    struct sadmm_contact_set *parts;
+    size_t part_count, part_capacity;
+};
+
+/* sadmm_collision_create with a broad phase of choice. */
+sadmm_status sadmm_collision_create_with(const struct sadmm_broad_phase_kind *kind, struct sadmm_collision **out,
+                                         struct sadmm_error *error);
+
+#endif

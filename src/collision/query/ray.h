@@ -1,0 +1,52 @@
+/* A ray against a shape: where it enters.
+ *
+ *   ray.c         one function for all types, in the world
+ *   ray_solid.c   what has a formula of its own, and hulls: the stretch of the line that is in the solid
+ *   ray_mesh.c    triangle meshes and heightfields
+ */
+#ifndef SADMM_COLLISION_QUERY_RAY_H
+#define SADMM_COLLISION_QUERY_RAY_H
+
+#include <stdbool.h>
+
+#include "collision/shapes/placed.h"
+
+struct sadmm_ray_line {
+    double origin[3], direction[3]; /* unit */
+    double length;                  /* m; may be infinite */
+    bool from_inside;               /* what the origin is in counts, at distance 0 */
+    bool from_behind;               /* triangles count from behind as well */
+};
+
+struct sadmm_ray_find {
+    double distance;  /* m */
+    double normal[3]; /* unit, outward, world */
+    int32_t triangle; /* of a mesh; else -1 */
+    bool inside;      /* the origin is in the solid */
+};
+
+/* False: the ray does not meet the shape within `limit` (m, at most the ray's length). */
+bool sadmm_ray_cast(const struct sadmm_ray_line *ray, const struct sadmm_placed *shape, double limit,
+                    struct sadmm_ray_find *find);
+
+/* ---- for ray.c, in the frame of a shape ------------------------------------------------------------------------- */
+
+/* The line x + t d, d unit, and the stretch of it that is in a solid. */
+struct ray_line {
+    vec3 x, d;
+};
+struct ray_span {
+    double in, out;
+    vec3 normal; /* outward where it enters */
+};
+
+/* False: the line does not meet it. `line`: x is near where the line is nearest to the shape's origin. Not of planes
+ * and meshes. */
+bool sadmm_ray_span(const struct sadmm_geometry *geometry, const double *blocks, const struct ray_line *line,
+                    struct ray_span *span);
+
+/* The nearest triangle within the limit, -1: there is none. */
+int32_t sadmm_ray_mesh(const double *blocks, uint32_t at, const struct ray_line *line, double limit, bool from_behind,
+                       double *distance, vec3 *normal);
+
+#endif

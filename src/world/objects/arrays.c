@@ -1,0 +1,381 @@
+/* Many numbers in one call: a row a body, joint or coupling. A kind of array says how wide it is, what its rows are of,
+ * and how one of them is read, checked and set; the rest is the same for all. */
+#include "subadmm/arrays.h"
+
+#include <string.h>
+
+#include "core/solve/resident.h"
+#include "world/state/world_internal.h"
+
+enum owner { OF_BODY, OF_JOINT, OF_COUPLING };
+enum { MOST_COLUMNS = 13 };
+
+struct array_kind {
+    int32_t columns;
+    enum owner owner;
+    sadmm_status (*get)(sadmm_world *world, size_t slot, double *row);
+    /* NULL: read only. `check`: may the row be set? */
+    sadmm_status (*check)(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error);
+    sadmm_status (*set)(sadmm_world *world, size_t slot, const double *row);
+};
+
+/* ---- bodies ------------------------------------------------------------------------------------------------------ */
+
+static sadmm_body_id body_id(const sadmm_world *world, size_t slot)
+{
+    return (sadmm_body_id){(uint32_t)slot + 1, world->bodies[slot].generation};
+}
+
+static bool dynamic(const sadmm_world *world, size_t slot) { return world->bodies[slot].type == SADMM_BODY_DYNAMIC; }
+
+static void store_motion(const struct sadmm_rigid *rigid, double *row)
+{
+    memcpy(row, rigid->position, 3 * sizeof *row);
+    memcpy(row + 3, rigid->orientation, 4 * sizeof *row);
+    memcpy(row + 7, rigid->velocity, 6 * sizeof *row);
+}
+
+static sadmm_body_state state_of(const double *row)
+{
+    sadmm_body_state state;
+    memcpy(state.position, row, sizeof state.position);
+    memcpy(state.orientation, row + 3, sizeof state.orientation);
+    memcpy(state.linear_velocity, row + 7, sizeof state.linear_velocity);
+    memcpy(state.angular_velocity, row + 10, sizeof state.angular_velocity);
+    return state;
+}
+
+static sadmm_status get_state(sadmm_world *world, size_t slot, double *row)
+{
+    store_motion(&world->bodies[slot].rigid, row);
+    return SADMM_OK;
+}
+
+static sadmm_status check_state(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    const sadmm_body_state state = state_of(row);
+    double ignored[4];
+    return sadmm_world_check_body_state(&world->bodies[slot], &state, ignored, error);
+}
+
+static sadmm_status set_state(sadmm_world *world, size_t slot, const double *row)
+{
+    const struct sadmm_world_body *body = &world->bodies[slot];
+    const sadmm_body_state state = state_of(row);
+    double now[MOST_COLUMNS];
+    store_motion(&body->rigid, now);
+    /* Such a body is part of what a backend was given once. */
+    if (body->type == SADMM_BODY_STATIC && memcmp(now, row, sizeof now) == 0) return SADMM_OK;
+    return sadmm_world_set_body_state(world, body_id(world, slot), &state);
+}
+
+static sadmm_status get_wrench(sadmm_world *world, size_t slot, double *row)
+{
+    memcpy(row, world->bodies[slot].rigid.wrench, 6 * sizeof *row);
+    return SADMM_OK;
+}
+
+/* Of bodies that are not dynamic: 0, as it is read. */
+static sadmm_status check_none(const sadmm_world *world, size_t slot, const double *row, int count,
+                               struct sadmm_error *error)
+{
+    for (int k = 0; k < count; ++k)
+        if (!(row[k] == 0))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "column %d = %g: must be 0, for the body is %s", k,
+                              row[k], world->bodies[slot].type == SADMM_BODY_STATIC ? "static" : "kinematic");
+    return SADMM_OK;
+}
+
+static sadmm_status check_wrench(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    return dynamic(world, slot) ? sadmm_world_check_wrench(row, row + 3, error)
+                                : check_none(world, slot, row, 6, error);
+}
+
+static sadmm_status set_wrench(sadmm_world *world, size_t slot, const double *row)
+{
+    return dynamic(world, slot) ? sadmm_world_set_body_wrench(world, body_id(world, slot), row, row + 3) : SADMM_OK;
+}
+
+static sadmm_status get_contact_wrench(sadmm_world *world, size_t slot, double *row)
+{
+    const struct sadmm_world_body *body = &world->bodies[slot];
+    if (world->stepped && !world->step_settings.recover_wrenches)
+        return sadmm_fail(&world->error, SADMM_ERROR_UNAVAILABLE, "contact wrenches: settings.recover_wrenches was false");
+    if (world->stepped && body->type != SADMM_BODY_STATIC) memcpy(row, body->contact_wrench, 6 * sizeof *row);
+    else memset(row, 0, 6 * sizeof *row);
+    return SADMM_OK;
+}
+
+static sadmm_status get_inertia(sadmm_world *world, size_t slot, double *row)
+{
+    row[0] = world->bodies[slot].rigid.mass;
+    memcpy(row + 1, world->bodies[slot].rigid.inertia, 3 * sizeof *row);
+    return SADMM_OK;
+}
+
+static sadmm_status check_inertia(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    return dynamic(world, slot) ? sadmm_world_check_mass(world, row[0], row + 1, error)
+                                : check_none(world, slot, row, 4, error);
+}
+
+static sadmm_status set_inertia(sadmm_world *world, size_t slot, const double *row)
+{
+    return dynamic(world, slot) ? sadmm_world_set_body_mass(world, body_id(world, slot), row[0], row + 1) : SADMM_OK;
+}
+
+/* ---- joints ------------------------------------------------------------------------------------------------------ */
+
+static sadmm_joint_id joint_id(const sadmm_world *world, size_t slot)
+{
+    return (sadmm_joint_id){(uint32_t)slot + 1, world->joints[slot].generation};
+}
+
+#define GET_OF_JOINT(name, member)                                                     \
+    static sadmm_status name(sadmm_world *world, size_t slot, double *row)             \
+    {                                                                                  \
+        sadmm_joint_state state;                                                       \
+        TRY(sadmm_world_joint_state(world, joint_id(world, slot), &state));            \
+        memcpy(row, state.member, sizeof state.member);                                \
+        return SADMM_OK;                                                               \
+    }
+GET_OF_JOINT(get_joint_position, position)
+GET_OF_JOINT(get_joint_speed, speed)
+GET_OF_JOINT(get_drive_force, drive_force)
+GET_OF_JOINT(get_joint_wrench, wrench_b)
+
+#define TARGET_OF_JOINT(part, member)                                                                               \
+    static sadmm_status get_##part(sadmm_world *world, size_t slot, double *row)                                    \
+    {                                                                                                               \
+        for (int k = 0; k < JOINT_COORDINATES; ++k) row[k] = world->joints[slot].def.coordinates[k].member;         \
+        return SADMM_OK;                                                                                            \
+    }                                                                                                               \
+    static sadmm_status check_##part(const sadmm_world *world, size_t slot, const double *row,                      \
+                                     struct sadmm_error *error)                                                     \
+    {                                                                                                               \
+        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                           \
+            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                             \
+            coordinate.member = row[k];                                                                             \
+            if (row[k] == world->joints[slot].def.coordinates[k].member) continue;                                  \
+            TRY(sadmm_world_check_coordinate(&world->joints[slot], k, &coordinate, error));                         \
+        }                                                                                                           \
+        return SADMM_OK;                                                                                            \
+    }                                                                                                               \
+    static sadmm_status set_##part(sadmm_world *world, size_t slot, const double *row)                              \
+    {                                                                                                               \
+        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                           \
+            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                             \
+            if (row[k] == coordinate.member) continue;                                                              \
+            coordinate.member = row[k];                                                                             \
+            TRY(sadmm_world_set_joint_coordinate(world, joint_id(world, slot), k, &coordinate));                    \
+        }                                                                                                           \
+        return SADMM_OK;                                                                                            \
+    }
+TARGET_OF_JOINT(target_position, target_position)
+TARGET_OF_JOINT(target_speed, target_speed)
+
+/* ---- couplings --------------------------------------------------------------------------------------------------- */
+
+static sadmm_coupling_id coupling_id(const sadmm_world *world, size_t slot)
+{
+    return (sadmm_coupling_id){(uint32_t)slot + 1, world->couplings[slot].generation};
+}
+
+static sadmm_status get_target(sadmm_world *world, size_t slot, double *row)
+{
+    store_motion(&world->couplings[slot].last.target, row);
+    return SADMM_OK;
+}
+
+static sadmm_status check_target(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    struct sadmm_rigid ignored;
+    (void)world;
+    (void)slot;
+    return sadmm_world_check_target(row, row + 3, row + 7, &ignored, error);
+}
+
+static sadmm_status set_target(sadmm_world *world, size_t slot, const double *row)
+{
+    return sadmm_world_set_coupling_target(world, coupling_id(world, slot), row, row + 3, row + 7);
+}
+
+static sadmm_status get_reaction(sadmm_world *world, size_t slot, double *row)
+{
+    memcpy(row, world->couplings[slot].last.reaction, 6 * sizeof *row);
+    return SADMM_OK;
+}
+
+/* ---- all --------------------------------------------------------------------------------------------------------- */
+
+static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
+    [SADMM_ARRAY_BODY_STATE] = {13, OF_BODY, get_state, check_state, set_state},
+    [SADMM_ARRAY_BODY_WRENCH] = {6, OF_BODY, get_wrench, check_wrench, set_wrench},
+    [SADMM_ARRAY_BODY_CONTACT_WRENCH] = {6, OF_BODY, get_contact_wrench, NULL, NULL},
+    [SADMM_ARRAY_BODY_INERTIA] = {4, OF_BODY, get_inertia, check_inertia, set_inertia},
+    [SADMM_ARRAY_JOINT_POSITION] = {6, OF_JOINT, get_joint_position, NULL, NULL},
+    [SADMM_ARRAY_JOINT_SPEED] = {6, OF_JOINT, get_joint_speed, NULL, NULL},
+    [SADMM_ARRAY_JOINT_DRIVE_FORCE] = {6, OF_JOINT, get_drive_force, NULL, NULL},
+    [SADMM_ARRAY_JOINT_WRENCH] = {6, OF_JOINT, get_joint_wrench, NULL, NULL},
+    [SADMM_ARRAY_JOINT_TARGET_POSITION] = {6, OF_JOINT, get_target_position, check_target_position,
+                                           set_target_position},
+    [SADMM_ARRAY_JOINT_TARGET_SPEED] = {6, OF_JOINT, get_target_speed, check_target_speed, set_target_speed},
+    [SADMM_ARRAY_COUPLING_TARGET] = {13, OF_COUPLING, get_target, check_target, set_target},
+    [SADMM_ARRAY_COUPLING_REACTION] = {6, OF_COUPLING, get_reaction, NULL, NULL},
+};
+
+static const struct array_kind *kind_of(sadmm_array array)
+{
+    return (unsigned)array < SADMM_ARRAY_COUNT ? &kinds[array] : NULL;
+}
+
+int32_t sadmm_array_columns(sadmm_array array) { return kind_of(array) ? kind_of(array)->columns : 0; }
+bool sadmm_array_is_settable(sadmm_array array) { return kind_of(array) && kind_of(array)->set; }
+
+int32_t sadmm_world_array_rows(const sadmm_world *world, sadmm_array array)
+{
+    const struct array_kind *kind = kind_of(array);
+    if (!kind) return 0;
+    return kind->owner == OF_BODY ? sadmm_world_body_count(world)
+         : kind->owner == OF_JOINT ? sadmm_world_joint_count(world) : sadmm_world_coupling_count(world);
+}
+
+static bool alive(const sadmm_world *world, enum owner owner, size_t slot)
+{
+    return owner == OF_BODY ? world->bodies[slot].alive
+         : owner == OF_JOINT ? world->joints[slot].alive && !world->joints[slot].coupling : world->couplings[slot].alive;
+}
+
+/* Slot of the first row. */
+static sadmm_status first_slot(sadmm_world *world, enum owner owner, int32_t row, size_t *slot)
+{
+    sadmm_body_id body = {1, 0};
+    sadmm_joint_id joint = {1, 0};
+    sadmm_coupling_id coupling = {1, 0};
+    if (owner == OF_BODY) TRY(sadmm_world_body_at(world, row, &body));
+    if (owner == OF_JOINT) TRY(sadmm_world_joint_at(world, row, &joint));
+    if (owner == OF_COUPLING) TRY(sadmm_world_coupling_at(world, row, &coupling));
+    *slot = (owner == OF_BODY ? body.slot : owner == OF_JOINT ? joint.slot : coupling.slot) - 1;
+    return SADMM_OK;
+}
+
+/* The array, its range and its numbers, and all that is needed from a device. */
+static sadmm_status begin(sadmm_world *world, sadmm_array array, int32_t first, int32_t count, const double *values)
+{
+    struct sadmm_error *error = &world->error;
+    const int32_t rows = sadmm_world_array_rows(world, array);
+    if (!kind_of(array))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "array = %d: must be in [0, %d)", (int)array,
+                          SADMM_ARRAY_COUNT);
+    if (first < 0 || count < 0 || first > rows || count > rows - first)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "first = %d, count = %d: must be rows of the array, which has %d", first, count, rows);
+    if (count > 0) TRY(sadmm_check_given(values, "values", error));
+    TRY(sadmm_world_download_bodies(world));
+    return sadmm_world_download_joints(world);
+}
+
+sadmm_status sadmm_world_get_array(sadmm_world *world, sadmm_array array, int32_t first, int32_t count, double *values)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(begin(world, array, first, count, values));
+    const struct array_kind *kind = &kinds[array];
+    size_t slot = 0;
+    if (count > 0) TRY(first_slot(world, kind->owner, first, &slot));
+    for (int32_t row = 0; row < count; ++slot) {
+        if (!alive(world, kind->owner, slot)) continue;
+        TRY(kind->get(world, slot, values + (size_t)row * (size_t)kind->columns));
+        ++row;
+    }
+    return SADMM_OK;
+}
+
+/* The row that an error is of. */
+static sadmm_status fail_row(sadmm_world *world, int32_t row, sadmm_status status)
+{
+    const struct sadmm_error cause = world->error;
+    return sadmm_fail(&world->error, status, "values, row %d: %s", row, cause.message);
+}
+
+sadmm_status sadmm_world_set_array(sadmm_world *world, sadmm_array array, int32_t first, int32_t count,
+                                   const double *values)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(begin(world, array, first, count, values));
+    const struct array_kind *kind = &kinds[array];
+    size_t begin_slot = 0;
+    if (!kind->set)
+        return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "array = %d: must be one that can be set",
+                          (int)array);
+    if (count > 0) TRY(first_slot(world, kind->owner, first, &begin_slot));
+    for (int setting = 0; setting < 2; ++setting) {
+        size_t slot = begin_slot;
+        for (int32_t row = 0; row < count; ++slot) {
+            if (!alive(world, kind->owner, slot)) continue;
+            const double *given = values + (size_t)row * (size_t)kind->columns;
+            const sadmm_status status =
+                setting ? kind->set(world, slot, given) : kind->check(world, slot, given, &world->error);
+            if (status != SADMM_OK) return fail_row(world, row, status);
+            ++row;
+        }
+    }
+    return SADMM_OK;
+}
+
+/* ---- in a device's memory ---------------------------------------------------------------------------------------- */
+
+static sadmm_status unavailable(sadmm_world *world, const char *why)
+{
+    return sadmm_fail(&world->error, SADMM_ERROR_UNAVAILABLE, "arrays of a device: %s", why);
+}
+
+sadmm_status sadmm_world_device_array(sadmm_world *world, sadmm_array array, sadmm_device_array *out)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(sadmm_check_given(out, "out", &world->error));
+    if (array != SADMM_ARRAY_BODY_STATE && array != SADMM_ARRAY_BODY_CONTACT_WRENCH)
+        return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "array = %d: must be SADMM_ARRAY_BODY_STATE or SADMM_ARRAY_BODY_CONTACT_WRENCH", (int)array);
+    TRY(sadmm_world_synchronise(world));
+    if (world->kernels && !world->kernels->resident) return unavailable(world, "the backend has no memory of its own");
+    if (!world->resident.loaded || world->resident.done == 0)
+        return unavailable(world, "the world is not there until the backend has made steps, from the first or from the "
+                                  "last change on that is no state or wrench");
+    if (world->resident.dirty_count > 0)
+        return unavailable(world, "a state or a wrench was set that no step has taken along yet");
+    if (array == SADMM_ARRAY_BODY_CONTACT_WRENCH && !world->plan.wrenches)
+        return unavailable(world, "settings.recover_wrenches was false");
+    struct sadmm_resident_view view;
+    TRY(sadmm_world_contain(world, world->kernels->resident->view(world->context, &view, &world->error)));
+    const bool state = array == SADMM_ARRAY_BODY_STATE;
+    *out = (sadmm_device_array){
+        .values = state ? view.rigid->position : view.wrench,
+        .rows = world->dynamic_count,
+        .columns = kinds[array].columns,
+        .stride = state ? (int64_t)(sizeof *view.rigid / sizeof(double)) : kinds[array].columns,
+        .device = world->def.device,
+        .stream = view.stream,
+    };
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_dynamic_bodies(sadmm_world *world, int32_t *indices, int32_t capacity, int32_t *count)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(sadmm_check_given(count, "count", &world->error));
+    *count = world->dynamic_count;
+    if (!indices && capacity == 0) return SADMM_OK;
+    TRY(sadmm_check_given(indices, "indices", &world->error));
+    if (capacity < world->dynamic_count)
+        return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "capacity = %d: must be at least %d, the number of dynamic bodies", capacity,
+                          world->dynamic_count);
+    int32_t index = 0;
+    for (size_t slot = 0; slot < world->body_slots; ++slot) {
+        if (!world->bodies[slot].alive) continue;
+        if (dynamic(world, slot)) *indices++ = index;
+        ++index;
+    }
+    return SADMM_OK;
+}

@@ -1,0 +1,286 @@
+/* Couplings of a world: what callers see of them, and change. Each has a joint slot that callers do not see, from its
+ * target to the frame on the body, whose six coordinates have position drives: its gains and limits. */
+#include "subadmm/coupling.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/math/rigid.h"
+#include "world/state/world_internal.h"
+
+static const double FRAME_LIMIT = 1e9, GAIN_LIMIT = 1e15;
+
+static const sadmm_coupling_def defaults = {.orientation = {1, 0, 0, 0},
+                                            .target_orientation = {1, 0, 0, 0},
+                                            .max_force = INFINITY,
+                                            .max_torque = INFINITY,
+                                            .enabled = true};
+static const struct sadmm_growing growing = SADMM_GROWING(sadmm_coupling_def, &defaults, enabled);
+
+void sadmm_coupling_def_init(sadmm_coupling_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
+
+/* ---- checks ------------------------------------------------------------------------------------------------------ */
+
+/* prefix: what stands before the fields' names, "def->" say. */
+static sadmm_status check_numbers(const char *prefix, const sadmm_coupling_def *def, struct sadmm_error *error)
+{
+    const struct {
+        const char *field;
+        double value, most;
+    } numbers[] = {
+        {"linear_stiffness", def->linear_stiffness, GAIN_LIMIT},
+        {"linear_damping", def->linear_damping, GAIN_LIMIT},
+        {"angular_stiffness", def->angular_stiffness, GAIN_LIMIT},
+        {"angular_damping", def->angular_damping, GAIN_LIMIT},
+        {"max_force", def->max_force, INFINITY},
+        {"max_torque", def->max_torque, INFINITY},
+    };
+    for (size_t k = 0; k < sizeof numbers / sizeof *numbers; ++k)
+        if (!(numbers[k].value >= 0 && numbers[k].value <= numbers[k].most))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s = %g: must be in [0, %g]", prefix,
+                              numbers[k].field, numbers[k].value, numbers[k].most);
+    return SADMM_OK;
+}
+
+/* names: of the three. */
+static sadmm_status check_target(const char *const names[3], const double position[3], const double orientation[4],
+                                 const double velocity[6], struct sadmm_rigid *target, struct sadmm_error *error)
+{
+    TRY(sadmm_check_vector(names[0], position, 3, FRAME_LIMIT, error));
+    if (velocity) TRY(sadmm_check_vector(names[2], velocity, 6, FRAME_LIMIT, error));
+    TRY(sadmm_check_orientation(names[1], orientation, target->orientation, error));
+    memcpy(target->position, position, sizeof target->position);
+    if (velocity) memcpy(target->velocity, velocity, sizeof target->velocity);
+    else memset(target->velocity, 0, sizeof target->velocity);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_check_coupling(const sadmm_coupling_def *def, struct sadmm_error *error)
+{
+    double ignored[4];
+    TRY(sadmm_check_vector("def->position", def->position, 3, FRAME_LIMIT, error));
+    TRY(sadmm_check_orientation("def->orientation", def->orientation, ignored, error));
+    return check_numbers("def->", def, error);
+}
+
+sadmm_status sadmm_world_check_target(const double position[3], const double orientation[4], const double velocity[6],
+                                      struct sadmm_rigid *target, struct sadmm_error *error)
+{
+    static const char *const names[] = {"position", "orientation", "velocity"};
+    return check_target(names, position, orientation, velocity, target, error);
+}
+
+static sadmm_status check_def(const sadmm_world *world, const sadmm_coupling_def *def, struct joint_frame *frame,
+                              struct sadmm_rigid *target, struct sadmm_error *error)
+{
+    static const char *const names[] = {"def->target_position", "def->target_orientation", "def->target_velocity"};
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, def->body, "def->body", error);
+    double unit[4];
+    if (!body) return SADMM_ERROR_STALE_ID;
+    if (body->type != SADMM_BODY_DYNAMIC)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->body = (slot %u, generation %u): must be dynamic, it is %s", def->body.slot,
+                          def->body.generation, body->type == SADMM_BODY_STATIC ? "static" : "kinematic");
+    TRY(sadmm_check_vector("def->position", def->position, 3, FRAME_LIMIT, error));
+    TRY(sadmm_check_orientation("def->orientation", def->orientation, unit, error));
+    frame->position = v3_load(def->position);
+    frame->orientation = q_load(unit);
+    TRY(check_target(names, def->target_position, def->target_orientation, def->target_velocity, target, error));
+    return check_numbers("def->", def, error);
+}
+
+/* ---- life -------------------------------------------------------------------------------------------------------- */
+
+/* What its joint is to do. */
+static void set_drives(sadmm_joint_def *joint, const sadmm_coupling_def *def)
+{
+    joint->enabled = def->enabled;
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        sadmm_joint_coordinate *c = &joint->coordinates[k];
+        c->drive_stiffness = k < 3 ? def->linear_stiffness : def->angular_stiffness;
+        c->drive_damping = k < 3 ? def->linear_damping : def->angular_damping;
+        c->drive_force = k < 3 ? def->max_force : def->max_torque;
+        c->drive = c->drive_stiffness > 0 || c->drive_damping > 0 ? SADMM_DRIVE_POSITION : SADMM_DRIVE_OFF;
+    }
+}
+
+static struct sadmm_world_joint joint_of(const sadmm_coupling_def *def, struct joint_frame frame, size_t coupling)
+{
+    struct sadmm_world_joint joint = {.alive = true,
+                                      .coupling = (int32_t)coupling + 1,
+                                      .def = sadmm_joint_def_default(),
+                                      .body = {-1, (int32_t)def->body.slot - 1},
+                                      .frame = {{.orientation = {1, 0, 0, 0}}, frame}};
+    joint.def.kind = SADMM_JOINT_CUSTOM;
+    joint.def.body_b = def->body;
+    set_drives(&joint.def, def);
+    return joint;
+}
+
+sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_def *given, sadmm_coupling_id *id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_coupling made = {.alive = true, .generation = 1};
+    struct joint_frame frame = {.orientation = {1, 0, 0, 0}};
+    sadmm_coupling_def taken;
+    const sadmm_coupling_def *const def = &taken;
+    TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
+    TRY(check_def(world, def, &frame, &made.last.target, error));
+    TRY(sadmm_world_detach(world));
+    made.def = *def;
+    q_store(frame.orientation, made.def.orientation);
+    const size_t slot = sadmm_slots_free(&world->couplings_taken);
+    if (!sadmm_grow(&world->couplings, &world->coupling_capacity, world->coupling_slots, slot + 1,
+                    sizeof *world->couplings) ||
+        !sadmm_slots_reserve(&world->couplings_taken, slot + 1))
+        return sadmm_fail_memory(error, "a coupling");
+    const struct sadmm_world_joint joint = joint_of(&made.def, frame, slot);
+    TRY(sadmm_world_insert_joint(world, &joint, &made.joint));
+
+    if (slot < world->coupling_slots) made.generation = world->couplings[slot].generation;
+    else ++world->coupling_slots;
+    world->couplings[slot] = made;
+    sadmm_slots_take(&world->couplings_taken, slot);
+    ++world->coupling_count;
+    if (id) *id = (sadmm_coupling_id){(uint32_t)slot + 1, made.generation};
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_remove_coupling(sadmm_world *world, sadmm_coupling_id id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    const struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
+    if (!coupling) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_detach(world));
+    sadmm_world_kill_joint(world, coupling->joint);
+    return SADMM_OK;
+}
+
+int32_t sadmm_world_coupling_count(const sadmm_world *world) { return world ? world->coupling_count : 0; }
+
+sadmm_status sadmm_world_coupling_at(sadmm_world *world, int32_t index, sadmm_coupling_id *id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(id, "id", error));
+    if (index < 0 || index >= world->coupling_count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
+                          world->coupling_count);
+    const size_t slot = sadmm_slots_at(&world->couplings_taken, index);
+    *id = (sadmm_coupling_id){(uint32_t)slot + 1, world->couplings[slot].generation};
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_coupling_index(sadmm_world *world, sadmm_coupling_id id, int32_t *index)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_coupling(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(index, "index", &world->error));
+    *index = sadmm_slots_index(&world->couplings_taken, id.slot - 1);
+    return SADMM_OK;
+}
+
+/* ---- what it is, and what is set --------------------------------------------------------------------------------- */
+
+sadmm_status sadmm_world_coupling_def_sized(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *out,
+                                            size_t size)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    const struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
+    if (!coupling) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(out, "def", &world->error));
+    TRY(sadmm_world_download_joints(world));
+    const struct sadmm_rigid *target = &coupling->last.target;
+    sadmm_coupling_def def = coupling->def;
+    memcpy(def.target_position, target->position, sizeof def.target_position);
+    memcpy(def.target_orientation, target->orientation, sizeof def.target_orientation);
+    memcpy(def.target_velocity, target->velocity, sizeof def.target_velocity);
+    return sadmm_growing_give(&growing, out, size, 0, &def, "def", &world->error);
+}
+
+sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_id id, const double position[3],
+                                             const double orientation[4], const double velocity[6])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", error);
+    struct sadmm_rigid target = {.position = {0}};
+    if (!coupling) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(position, "position", error));
+    TRY(sadmm_check_given(orientation, "orientation", error));
+    TRY(sadmm_world_check_target(position, orientation, velocity, &target, error));
+    coupling->last.target = target;
+    return sadmm_world_take_update(world, &world->joints[coupling->joint], SADMM_JOINT_TARGET);
+}
+
+/* Gains, limits and whether it acts: those of `def` from here on. */
+static sadmm_status change(sadmm_world *world, struct sadmm_world_coupling *coupling, const sadmm_coupling_def *def)
+{
+    TRY(check_numbers("", def, &world->error));
+    coupling->def = *def;
+    struct sadmm_world_joint *joint = &world->joints[coupling->joint];
+    set_drives(&joint->def, def);
+    for (int k = 0; k <= SADMM_JOINT_ENABLED; ++k)
+        TRY(sadmm_world_take_update(world, joint, (enum sadmm_joint_update)k));
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_coupling_gains(sadmm_world *world, sadmm_coupling_id id, double linear_stiffness,
+                                            double linear_damping, double angular_stiffness, double angular_damping)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
+    if (!coupling) return SADMM_ERROR_STALE_ID;
+    sadmm_coupling_def def = coupling->def;
+    def.linear_stiffness = linear_stiffness;
+    def.linear_damping = linear_damping;
+    def.angular_stiffness = angular_stiffness;
+    def.angular_damping = angular_damping;
+    return change(world, coupling, &def);
+}
+
+sadmm_status sadmm_world_set_coupling_limits(sadmm_world *world, sadmm_coupling_id id, double max_force,
+                                             double max_torque)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
+    if (!coupling) return SADMM_ERROR_STALE_ID;
+    sadmm_coupling_def def = coupling->def;
+    def.max_force = max_force;
+    def.max_torque = max_torque;
+    return change(world, coupling, &def);
+}
+
+sadmm_status sadmm_world_set_coupling_enabled(sadmm_world *world, sadmm_coupling_id id, bool enabled)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
+    if (!coupling) return SADMM_ERROR_STALE_ID;
+    sadmm_coupling_def def = coupling->def;
+    def.enabled = enabled;
+    return change(world, coupling, &def);
+}
+
+/* ---- state ------------------------------------------------------------------------------------------------------- */
+
+sadmm_status sadmm_world_coupling_state(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_state *state)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    const struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
+    if (!coupling) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(state, "state", &world->error));
+    TRY(sadmm_world_download_bodies(world));
+    TRY(sadmm_world_download_joints(world));
+    const struct sadmm_coupling_memory *last = &coupling->last;
+    const struct sadmm_world_joint *joint = &world->joints[coupling->joint];
+    const struct joint_end end = joint_end_on(&joint->frame[1], &world->bodies[joint->body[1]].rigid);
+    memcpy(state->reaction_force, last->reaction, sizeof state->reaction_force);
+    memcpy(state->reaction_torque, last->reaction + 3, sizeof state->reaction_torque);
+    memcpy(state->body_force, last->body, sizeof state->body_force);
+    memcpy(state->body_torque, last->body + 3, sizeof state->body_torque);
+    v3_store(v3_sub(v3_load(last->target.position), end.point), state->position_error);
+    v3_store(q_log(q_mul(q_load(last->target.orientation), q_conjugate(end.orientation))), state->rotation_error);
+    return SADMM_OK;
+}

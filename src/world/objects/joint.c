@@ -1,0 +1,610 @@
+/* Joints of a world: what callers see of them, and change. */
+#include "subadmm/joint.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/math/rigid.h"
+#include "world/state/world_internal.h"
+
+static const double FRAME_LIMIT = 1e9, FORCE_LIMIT = 1e15;
+enum { MOST_JOINTS = 1 << 24 };
+
+enum { TX = 1, TY = 2, TZ = 4, RX = 8, RY = 16, RZ = 32 };
+
+/* CUSTOM names its own. */
+static const uint32_t locks_of[SADMM_JOINT_KIND_COUNT] = {
+    [SADMM_JOINT_FIXED] = JOINT_ALL_LOCKED,
+    [SADMM_JOINT_REVOLUTE] = JOINT_ALL_LOCKED & ~RZ,
+    [SADMM_JOINT_PRISMATIC] = JOINT_ALL_LOCKED & ~TZ,
+    [SADMM_JOINT_CYLINDRICAL] = JOINT_ALL_LOCKED & ~(TZ | RZ),
+    [SADMM_JOINT_SPHERICAL] = TX | TY | TZ,
+    [SADMM_JOINT_UNIVERSAL] = TX | TY | TZ | RZ,
+    [SADMM_JOINT_PLANAR] = TZ | RX | RY,
+    [SADMM_JOINT_CARTESIAN] = RX | RY | RZ,
+    [SADMM_JOINT_DISTANCE] = TX,
+    [SADMM_JOINT_SPRING] = 0,
+    [SADMM_JOINT_LINK] = TX | TZ,
+};
+
+#define DEFAULT_COORDINATE {.drive_force = INFINITY}
+static const sadmm_joint_coordinate default_coordinate = DEFAULT_COORDINATE;
+static const sadmm_joint_def defaults = {
+    .kind = SADMM_JOINT_FIXED,
+    .orientation_a = {1, 0, 0, 0},
+    .orientation_b = {1, 0, 0, 0},
+    .length = -1,
+    .enabled = true,
+    .break_force = INFINITY,
+    .break_torque = INFINITY,
+    .coordinates = {DEFAULT_COORDINATE, DEFAULT_COORDINATE, DEFAULT_COORDINATE, DEFAULT_COORDINATE, DEFAULT_COORDINATE,
+                    DEFAULT_COORDINATE},
+};
+enum { LEAST_COORDINATE = SADMM_SIZE_TO(sadmm_joint_coordinate, armature) };
+static const struct sadmm_growing growing = {
+    .size = sizeof(sadmm_joint_def),
+    .least = SADMM_SIZE_TO(sadmm_joint_def, break_torque) + JOINT_COORDINATES * LEAST_COORDINATE,
+    .defaults = &defaults,
+    .start = "sadmm_joint_def_default()",
+    .part_count = JOINT_COORDINATES,
+    .part_at = offsetof(sadmm_joint_def, coordinates),
+    .part_size = sizeof(sadmm_joint_coordinate),
+    .part_least = LEAST_COORDINATE,
+    .part_size_at = offsetof(sadmm_joint_def, coordinate_size),
+    .part_name = "coordinate_size",
+};
+
+void sadmm_joint_def_init(sadmm_joint_def *def, size_t size, size_t coordinate_size)
+{
+    sadmm_growing_init(&growing, def, size, coordinate_size);
+}
+
+/* ---- checks ------------------------------------------------------------------------------------------------------ */
+
+static bool acts(const sadmm_joint_coordinate *c)
+{
+    return c->limited || c->drive != SADMM_DRIVE_OFF || c->friction != 0 || c->spring_stiffness != 0 ||
+           c->spring_damping != 0 || c->armature != 0;
+}
+
+static sadmm_status check_limits(const char *name, const sadmm_joint_coordinate *c, struct sadmm_error *error)
+{
+    if (isnan(c->lower) || isnan(c->upper) || c->lower == INFINITY || c->upper == -INFINITY || c->lower > c->upper)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "%slower = %g, upper = %g: must be numbers, lower in [-inf, upper], upper in [lower, inf]",
+                          name, c->lower, c->upper);
+    return SADMM_OK;
+}
+
+/* name: what stands before the fields, "coordinate->" say. */
+static sadmm_status check_coordinate(const char *name, const sadmm_joint_coordinate *c, struct sadmm_error *error)
+{
+    const struct {
+        const char *field;
+        double value, least, most;
+    } numbers[] = {
+        {"target_position", c->target_position, -FRAME_LIMIT, FRAME_LIMIT},
+        {"target_speed", c->target_speed, -FRAME_LIMIT, FRAME_LIMIT},
+        {"drive_stiffness", c->drive_stiffness, 0, FORCE_LIMIT},
+        {"drive_damping", c->drive_damping, 0, FORCE_LIMIT},
+        {"drive_force", c->drive_force, 0, INFINITY},
+        {"friction", c->friction, 0, FORCE_LIMIT},
+        {"spring_stiffness", c->spring_stiffness, 0, FORCE_LIMIT},
+        {"spring_damping", c->spring_damping, 0, FORCE_LIMIT},
+        {"spring_rest", c->spring_rest, -FRAME_LIMIT, FRAME_LIMIT},
+        {"armature", c->armature, 0, FORCE_LIMIT},
+    };
+    TRY(check_limits(name, c, error));
+    if ((unsigned)c->drive >= SADMM_DRIVE_COUNT)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%sdrive = %d: must be in [0, %d]", name, (int)c->drive,
+                          SADMM_DRIVE_COUNT - 1);
+    for (size_t k = 0; k < sizeof numbers / sizeof *numbers; ++k)
+        if (!(numbers[k].value >= numbers[k].least && numbers[k].value <= numbers[k].most))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s = %g: must be in [%g, %g]", name,
+                              numbers[k].field, numbers[k].value, numbers[k].least, numbers[k].most);
+    return SADMM_OK;
+}
+
+static bool has_coordinate(const sadmm_joint_def *def, int k) { return k == 0 || !joint_is_radial(def->kind); }
+
+static sadmm_status check_coordinates(const sadmm_joint_def *def, uint32_t locks, struct sadmm_error *error)
+{
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        const sadmm_joint_coordinate *c = &def->coordinates[k];
+        char name[32] = "def->coordinates[0].";
+        name[17] = (char)('0' + k);
+        TRY(check_coordinate(name, c, error));
+        if (acts(c) && (locks >> k & 1 || !has_coordinate(def, k)))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "def->coordinates[%d]: must be the default, for the joint %s that coordinate", k,
+                              locks >> k & 1 ? "locks" : "does not have");
+    }
+    return SADMM_OK;
+}
+
+/* The slot of a joint's body, -1: the static world. */
+static sadmm_status find_side(const sadmm_world *world, sadmm_body_id id, const char *name, int32_t *slot,
+                              struct sadmm_error *error)
+{
+    *slot = -1;
+    if (id.slot == 0 && id.generation == 0) return SADMM_OK;
+    if (!sadmm_world_find_body(world, id, name, error)) return SADMM_ERROR_STALE_ID;
+    *slot = (int32_t)id.slot - 1;
+    return SADMM_OK;
+}
+
+static bool moves(const sadmm_world *world, int32_t slot)
+{
+    return slot >= 0 && world->bodies[slot].type == SADMM_BODY_DYNAMIC;
+}
+
+static sadmm_status find_sides(const sadmm_world *world, const sadmm_joint_def *def, int32_t slots[2],
+                               struct sadmm_error *error)
+{
+    TRY(find_side(world, def->body_a, "def->body_a", &slots[0], error));
+    TRY(find_side(world, def->body_b, "def->body_b", &slots[1], error));
+    if (slots[0] == slots[1] && slots[0] >= 0)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->body_a = def->body_b = (slot %u, generation %u): must be two bodies", def->body_a.slot,
+                          def->body_a.generation);
+    if (!moves(world, slots[0]) && !moves(world, slots[1]))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->body_a = (slot %u, generation %u), def->body_b = (slot %u, generation %u): one at "
+                          "least must be dynamic", def->body_a.slot, def->body_a.generation, def->body_b.slot,
+                          def->body_b.generation);
+    return SADMM_OK;
+}
+
+static sadmm_status check_frames(const sadmm_joint_def *def, struct joint_frame frames[2], struct sadmm_error *error)
+{
+    static const char *const positions[2] = {"def->position_a", "def->position_b"},
+                             *const orientations[2] = {"def->orientation_a", "def->orientation_b"};
+    for (int s = 0; s < 2; ++s) {
+        const double *position = s ? def->position_b : def->position_a;
+        double unit[4];
+        TRY(sadmm_check_vector(positions[s], position, 3, FRAME_LIMIT, error));
+        TRY(sadmm_check_orientation(orientations[s], s ? def->orientation_b : def->orientation_a, unit, error));
+        frames[s].position = v3_load(position);
+        frames[s].orientation = q_load(unit);
+    }
+    return SADMM_OK;
+}
+
+static sadmm_status check_def(const sadmm_joint_def *def, uint32_t *locks, struct sadmm_error *error)
+{
+    if ((unsigned)def->kind >= SADMM_JOINT_KIND_COUNT)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->kind = %d: must be in [0, %d]", (int)def->kind,
+                          SADMM_JOINT_KIND_COUNT - 1);
+    *locks = def->kind == SADMM_JOINT_CUSTOM ? def->locks : locks_of[def->kind];
+    if (*locks > JOINT_ALL_LOCKED)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->locks = %u: must be in [0, %d]", def->locks,
+                          JOINT_ALL_LOCKED);
+    if (def->length != -1) TRY(sadmm_check_range("def->length (or -1: as it is)", def->length, 0, FRAME_LIMIT, error));
+    TRY(sadmm_check_range("def->break_force", def->break_force, 0, INFINITY, error));
+    TRY(sadmm_check_range("def->break_torque", def->break_torque, 0, INFINITY, error));
+    return check_coordinates(def, *locks, error);
+}
+
+sadmm_status sadmm_world_check_joint_def(const sadmm_joint_def *def, struct sadmm_error *error)
+{
+    uint32_t locks = 0;
+    TRY(check_def(def, &locks, error));
+    return locks == def->locks ? SADMM_OK
+                               : sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->locks = %u: must be %u, by its kind",
+                                            def->locks, locks);
+}
+
+/* ---- life -------------------------------------------------------------------------------------------------------- */
+
+static const struct sadmm_rigid *pose_of(const sadmm_world *world, int32_t slot)
+{
+    return slot >= 0 ? &world->bodies[slot].rigid : NULL;
+}
+
+static struct joint_geometry geometry_now(const sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    struct joint_end ends[2];
+    for (int s = 0; s < 2; ++s) ends[s] = joint_end_on(&joint->frame[s], pose_of(world, joint->body[s]));
+    return joint_geometry_of(&ends[0], &ends[1], joint->def.locks, joint_is_radial(joint->def.kind));
+}
+
+/* The pair that does not meet for this joint. */
+static bool leaves_out(const struct sadmm_world_joint *joint, uint64_t *key)
+{
+    if (joint->def.collide || joint->body[0] < 0 || joint->body[1] < 0) return false;
+    *key = sadmm_pair_key((size_t)joint->body[0], (size_t)joint->body[1]);
+    return true;
+}
+
+static sadmm_status add_pair(sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    uint64_t key;
+    if (!leaves_out(joint, &key)) return SADMM_OK;
+    const double *before = sadmm_pair_table_find(&world->jointed_pairs, key);
+    return sadmm_pair_table_set(&world->jointed_pairs, key, (before ? *before : 0) + 1, &world->error);
+}
+
+static void remove_pair(sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    uint64_t key;
+    if (leaves_out(joint, &key)) sadmm_pair_table_lower(&world->jointed_pairs, key);
+}
+
+bool sadmm_world_reserve_joints(sadmm_world *world, size_t slots)
+{
+    return sadmm_grow(&world->joints, &world->joint_capacity, world->joint_slots, slots, sizeof *world->joints) &&
+           sadmm_slots_reserve(&world->joints_taken, slots) && sadmm_slots_reserve(&world->own_joints, slots);
+}
+
+static sadmm_status new_slot(sadmm_world *world, size_t *slot)
+{
+    *slot = sadmm_slots_free(&world->joints_taken);
+    if (*slot >= MOST_JOINTS)
+        return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d joints and couplings: a world holds at most 2^24",
+                          world->joint_count);
+    if (!sadmm_world_reserve_joints(world, *slot + 1)) return sadmm_fail_memory(&world->error, "a joint");
+    return SADMM_OK;
+}
+
+static struct sadmm_link *joint_link(sadmm_world *world, uint32_t name)
+{
+    return &world->joints[(name - 1) / 2].on_body[(name - 1) % 2];
+}
+
+static struct sadmm_link *gear_link(sadmm_world *world, uint32_t name)
+{
+    return &world->gears[(name - 1) / 2].on_joint[(name - 1) % 2];
+}
+
+static uint32_t link_name(size_t slot, int side) { return 2 * (uint32_t)slot + (uint32_t)side + 1; }
+
+void sadmm_world_link_joint(sadmm_world *world, size_t slot)
+{
+    const struct sadmm_world_joint *joint = &world->joints[slot];
+    sadmm_slots_take(&world->joints_taken, slot);
+    if (!joint->coupling) sadmm_slots_take(&world->own_joints, slot);
+    for (int s = 0; s < 2; ++s)
+        if (joint->body[s] >= 0)
+            sadmm_link_add(world, joint_link, &world->bodies[joint->body[s]].first_joint, link_name(slot, s));
+}
+
+static void unlink_joint(sadmm_world *world, size_t slot)
+{
+    const struct sadmm_world_joint *joint = &world->joints[slot];
+    sadmm_slots_release(&world->joints_taken, slot);
+    if (!joint->coupling) sadmm_slots_release(&world->own_joints, slot);
+    for (int s = 0; s < 2; ++s)
+        if (joint->body[s] >= 0)
+            sadmm_link_remove(world, joint_link, &world->bodies[joint->body[s]].first_joint, link_name(slot, s));
+}
+
+void sadmm_world_link_gear(sadmm_world *world, size_t slot)
+{
+    sadmm_slots_take(&world->gears_taken, slot);
+    for (int s = 0; s < 2; ++s)
+        sadmm_link_add(world, gear_link, &world->joints[world->gears[slot].joint[s]].first_gear, link_name(slot, s));
+}
+
+sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot)
+{
+    TRY(new_slot(world, slot));
+    TRY(add_pair(world, joint));
+    struct sadmm_world_joint *made = &world->joints[*slot];
+    const uint32_t generation = *slot < world->joint_slots ? made->generation : 1;
+    *made = *joint;
+    made->generation = generation;
+    if (*slot == world->joint_slots) ++world->joint_slots;
+    sadmm_world_link_joint(world, *slot);
+    ++world->joint_count;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *given, sadmm_joint_id *id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_joint made = {.alive = true};
+    sadmm_joint_def taken;
+    const sadmm_joint_def *const def = &taken;
+    size_t slot;
+    TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
+    made.def = *def;
+    TRY(check_def(def, &made.def.locks, error));
+    TRY(find_sides(world, def, made.body, error));
+    TRY(check_frames(def, made.frame, error));
+    TRY(sadmm_world_detach(world));
+    q_store(made.frame[0].orientation, made.def.orientation_a);
+    q_store(made.frame[1].orientation, made.def.orientation_b);
+    if (def->length == -1 && joint_is_radial(def->kind)) {
+        made.def.length = geometry_now(world, &made).value[0];
+        TRY(sadmm_check_range("def->length (-1: as it is)", made.def.length, 0, FRAME_LIMIT, error));
+    }
+    TRY(sadmm_world_insert_joint(world, &made, &slot));
+    if (id) {
+        id->slot = (uint32_t)slot + 1;
+        id->generation = world->joints[slot].generation;
+    }
+    return SADMM_OK;
+}
+
+static void kill_coupling(sadmm_world *world, size_t slot)
+{
+    struct sadmm_world_coupling *coupling = &world->couplings[slot];
+    coupling->alive = false;
+    ++coupling->generation;
+    --world->coupling_count;
+    sadmm_slots_release(&world->couplings_taken, slot);
+}
+
+static void set_table(sadmm_world *world, size_t slot, int index, double *table, int32_t count)
+{
+    struct sadmm_world_joint *joint = &world->joints[slot];
+    world->table_count += (count > 0) - (joint->table_count[index] > 0);
+    sadmm_free(joint->table[index]);
+    joint->table[index] = table;
+    joint->table_count[index] = count;
+}
+
+void sadmm_world_free_tables(sadmm_world *world)
+{
+    for (size_t slot = 0; slot < world->joint_slots; ++slot)
+        for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(world, slot, k, NULL, 0);
+}
+
+void sadmm_world_kill_gear(sadmm_world *world, size_t slot)
+{
+    struct sadmm_world_gear *gear = &world->gears[slot];
+    for (int s = 0; s < 2; ++s)
+        sadmm_link_remove(world, gear_link, &world->joints[gear->joint[s]].first_gear, link_name(slot, s));
+    gear->alive = false;
+    ++gear->generation;
+    --world->gear_count;
+    sadmm_slots_release(&world->gears_taken, slot);
+}
+
+void sadmm_world_kill_joint(sadmm_world *world, size_t slot)
+{
+    struct sadmm_world_joint *joint = &world->joints[slot];
+    remove_pair(world, joint);
+    while (joint->first_gear) sadmm_world_kill_gear(world, (joint->first_gear - 1) / 2);
+    unlink_joint(world, slot);
+    for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(world, slot, k, NULL, 0);
+    joint->alive = false;
+    ++joint->generation;
+    --world->joint_count;
+    if (joint->coupling) kill_coupling(world, (size_t)joint->coupling - 1);
+}
+
+sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_id id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_joint(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_detach(world));
+    sadmm_world_kill_joint(world, id.slot - 1);
+    return SADMM_OK;
+}
+
+void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body)
+{
+    const uint32_t *first = &world->bodies[body].first_joint;
+    while (*first) sadmm_world_kill_joint(world, (*first - 1) / 2);
+}
+
+int32_t sadmm_world_joint_count(const sadmm_world *world)
+{
+    return world ? world->joint_count - world->coupling_count : 0;
+}
+
+sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint_id *id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(id, "id", error));
+    const int32_t count = sadmm_world_joint_count(world);
+    if (index < 0 || index >= count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, count);
+    const size_t slot = sadmm_slots_at(&world->own_joints, index);
+    id->slot = (uint32_t)slot + 1;
+    id->generation = world->joints[slot].generation;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_joint_index(sadmm_world *world, sadmm_joint_id id, int32_t *index)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_joint(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(index, "index", &world->error));
+    *index = sadmm_slots_index(&world->own_joints, id.slot - 1);
+    return SADMM_OK;
+}
+
+/* ---- what it is, and what is set --------------------------------------------------------------------------------- */
+
+sadmm_status sadmm_world_joint_def_sized(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def, size_t size,
+                                         size_t coordinate_size)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(def, "def", &world->error));
+    TRY(sadmm_world_download_joints(world));
+    return sadmm_growing_give(&growing, def, size, coordinate_size, &joint->def, "def", &world->error);
+}
+
+sadmm_status sadmm_world_take_update(sadmm_world *world, struct sadmm_world_joint *joint,
+                                     enum sadmm_joint_update update)
+{
+    return sadmm_world_update_joint(world, joint, update) ? SADMM_OK : sadmm_world_detach(world);
+}
+
+sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    joint->def.enabled = enabled;
+    joint->last.broken = joint->last.broken && !enabled;
+    return sadmm_world_take_update(world, joint, SADMM_JOINT_ENABLED);
+}
+
+static sadmm_status check_free(const struct sadmm_world_joint *joint, int32_t index, struct sadmm_error *error)
+{
+    if (index < 0 || index >= JOINT_COORDINATES || joint->def.locks >> index & 1 || !has_coordinate(&joint->def, index))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "index = %d: must be a free coordinate of the joint, in [0, 6) (locked: mask %u)", index,
+                          joint->def.locks);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_check_coordinate(const struct sadmm_world_joint *joint, int32_t index,
+                                          const sadmm_joint_coordinate *coordinate, struct sadmm_error *error)
+{
+    TRY(check_free(joint, index, error));
+    return check_coordinate("coordinate->", coordinate, error);
+}
+
+sadmm_status sadmm_world_set_joint_coordinate_sized(sadmm_world *world, sadmm_joint_id id, int32_t index,
+                                                    const sadmm_joint_coordinate *given, size_t size)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    sadmm_joint_coordinate coordinate = default_coordinate;
+    TRY(sadmm_take_bytes(&coordinate, sizeof coordinate, LEAST_COORDINATE, given, size, "coordinate", error));
+    TRY(sadmm_world_check_coordinate(joint, index, &coordinate, error));
+    joint->def.coordinates[index] = coordinate;
+    return sadmm_world_take_update(world, joint, (enum sadmm_joint_update)index);
+}
+
+sadmm_status sadmm_world_check_table(const double *positions, const double *forces, int32_t count,
+                                     struct sadmm_error *error)
+{
+    if (count != 0 && (count < 2 || count > SADMM_MOST_SPRING_POINTS))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "count = %d: must be 0 or in [2, %d]", count,
+                          SADMM_MOST_SPRING_POINTS);
+    if (count == 0) return SADMM_OK;
+    TRY(sadmm_check_given(positions, "positions", error));
+    TRY(sadmm_check_given(forces, "forces", error));
+    TRY(sadmm_check_vector("positions", positions, count, FRAME_LIMIT, error));
+    TRY(sadmm_check_vector("forces", forces, count, FORCE_LIMIT, error));
+    for (int32_t i = 1; i < count; ++i) {
+        const double way = positions[i] - positions[i - 1];
+        if (!(way > 0))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "positions[%d] = %.17g after positions[%d] = %.17g: must increase", i, positions[i],
+                              i - 1, positions[i - 1]);
+        if (!(fabs(forces[i] - forces[i - 1]) <= FORCE_LIMIT * way))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "forces[%d] = %g after forces[%d] = %g, %g farther: must be within 1e15 a unit of way", i,
+                              forces[i], i - 1, forces[i - 1], way);
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_joint_spring_table(sadmm_world *world, sadmm_joint_id id, int32_t index,
+                                                const double *positions, const double *forces, int32_t count)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    TRY(check_free(joint, index, error));
+    TRY(sadmm_world_check_table(positions, forces, count, error));
+    TRY(sadmm_world_detach(world));
+    const size_t n = (size_t)count;
+    double *table = n ? (double *)sadmm_alloc(2 * n, sizeof *table) : NULL;
+    if (n && !table) return sadmm_fail_memory(error, "a spring's table");
+    if (n) {
+        memcpy(table, positions, n * sizeof *table);
+        memcpy(table + n, forces, n * sizeof *table);
+    }
+    set_table(world, id.slot - 1, index, table, count);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_joint_spring_table(sadmm_world *world, sadmm_joint_id id, int32_t index, double *positions,
+                                            double *forces, int32_t *count)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    if (index < 0 || index >= JOINT_COORDINATES)
+        return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, 6)", index);
+    TRY(sadmm_check_given(count, "count", &world->error));
+    const size_t n = (size_t)joint->table_count[index];
+    *count = joint->table_count[index];
+    if (n && positions) memcpy(positions, joint->table[index], n * sizeof *positions);
+    if (n && forces) memcpy(forces, joint->table[index] + n, n * sizeof *forces);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, const double position[3],
+                                     const double orientation[4])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    double unit[4];
+    int32_t slots[2];
+    sadmm_joint_def taken;
+    TRY(sadmm_growing_take(&growing, &taken, def, "def", error)); /* its frames have the same place in all versions */
+    TRY(sadmm_check_given(position, "position", error));
+    TRY(sadmm_check_given(orientation, "orientation", error));
+    TRY(find_sides(world, &taken, slots, error));
+    TRY(sadmm_check_vector("position", position, 3, FRAME_LIMIT, error));
+    TRY(sadmm_check_orientation("orientation", orientation, unit, error));
+    TRY(sadmm_world_download_bodies(world));
+    for (int s = 0; s < 2; ++s) {
+        static const struct sadmm_rigid origin = {.orientation = {1, 0, 0, 0}};
+        const struct sadmm_rigid *body = slots[s] >= 0 ? pose_of(world, slots[s]) : &origin;
+        const quat back = q_conjugate(q_load(body->orientation));
+        v3_store(q_turn(back, v3_sub(v3_load(position), v3_load(body->position))),
+                 s ? def->position_b : def->position_a);
+        q_store(q_normalize(q_mul(back, q_load(unit))), s ? def->orientation_b : def->orientation_a);
+    }
+    return SADMM_OK;
+}
+
+/* ---- state ------------------------------------------------------------------------------------------------------- */
+
+static void read_motion(const sadmm_world *world, const struct sadmm_world_joint *joint, sadmm_joint_state *state)
+{
+    static const double still[6];
+    const struct joint_geometry geometry = geometry_now(world, joint);
+    const double *v[2];
+    for (int s = 0; s < 2; ++s) v[s] = joint->body[s] >= 0 ? world->bodies[joint->body[s]].rigid.velocity : still;
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        state->position[k] = joint_winds(joint->def.locks, k) ? joint_unwind(geometry.value[k], joint->last.angle[k])
+                                                              : geometry.value[k];
+        state->speed[k] = joint_rate(&geometry, k, v[0], v[1]);
+    }
+    if (joint_is_radial(joint->def.kind) && joint->def.locks & 1) state->position[0] -= joint->def.length;
+}
+
+sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadmm_joint_state *state)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(state, "state", &world->error));
+    TRY(sadmm_world_download_bodies(world));
+    TRY(sadmm_world_download_joints(world));
+    const struct sadmm_joint_memory *last = &joint->last;
+    memset(state, 0, sizeof *state);
+    read_motion(world, joint, state);
+    memcpy(state->point, last->point, sizeof state->point);
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        state->wrench_b[k] = last->wrench[k];
+        state->wrench_a[k] = 0 - last->wrench[k];
+        state->wrench_joint[k] = last->local[k];
+        state->lock_force[k] = last->force[SADMM_ROLE_LOCK][k];
+        state->limit_force[k] = last->force[SADMM_ROLE_LOWER][k] + last->force[SADMM_ROLE_UPPER][k];
+        state->drive_force[k] = last->force[SADMM_ROLE_DRIVE][k];
+        state->friction_force[k] = last->force[SADMM_ROLE_FRICTION][k];
+        state->spring_force[k] = last->force[SADMM_ROLE_SPRING][k];
+        state->armature_force[k] = last->force[SADMM_ROLE_ARMATURE][k];
+    }
+    state->broken = last->broken;
+    return SADMM_OK;
+}

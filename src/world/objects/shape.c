@@ -1,0 +1,305 @@
+/* Shapes of a world. */
+#include <string.h>
+
+#include "collision/hull/hull.h"
+#include "collision/mesh/mesh.h"
+#include "collision/shapes/geometry.h"
+#include "core/base/memory.h"
+#include "world/state/shape_form.h"
+#include "world/state/world_internal.h"
+
+/* owner: what stands before the names, "def->" say. */
+static sadmm_status check_material(const char *owner, double friction, double restitution, struct sadmm_error *error)
+{
+    if (!(friction >= 0 && friction <= 1e6))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%sfriction = %g: must be in [0, 1e+06]", owner,
+                          friction);
+    if (!(restitution >= 0 && restitution <= 1))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%srestitution = %g: must be in [0, 1]", owner,
+                          restitution);
+    return SADMM_OK;
+}
+
+static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_shape_def *def, double orientation[4],
+                              struct sadmm_error *error)
+{
+    TRY(sadmm_shape_form_check(def, orientation, error));
+    const struct sadmm_geometry geometry = sadmm_shape_form_geometry(def);
+    static const enum sadmm_motion motion[] = {[SADMM_BODY_DYNAMIC] = SADMM_MOTION_DYNAMIC,
+                                               [SADMM_BODY_STATIC] = SADMM_MOTION_NONE,
+                                               [SADMM_BODY_KINEMATIC] = SADMM_MOTION_KINEMATIC};
+    TRY(sadmm_geometry_check(&geometry, motion[body->type], "def->", error));
+    if (def->sensor && def->type == SADMM_SHAPE_MESH)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->sensor = true: must be false where def->type is %d, a mesh, which has no inside",
+                          (int)def->type);
+    return check_material("def->", def->friction, def->restitution, error);
+}
+
+static bool has_block(int type)
+{
+    return type == SADMM_SHAPE_HULL || type == SADMM_SHAPE_MESH;
+}
+
+static void retain_hull(const void *hull) { sadmm_hull_retain((const sadmm_hull *)hull); }
+static void release_hull(const void *hull) { sadmm_hull_release((const sadmm_hull *)hull); }
+static void retain_mesh(const void *mesh) { sadmm_mesh_retain((const sadmm_mesh *)mesh); }
+static void release_mesh(const void *mesh) { sadmm_mesh_release((const sadmm_mesh *)mesh); }
+
+static struct sadmm_shape_data_owner block_owner(const sadmm_shape_def *def)
+{
+    if (def->type == SADMM_SHAPE_HULL)
+        return (struct sadmm_shape_data_owner){def->hull, def->hull->block, def->hull->doubles, retain_hull,
+                                               release_hull};
+    return (struct sadmm_shape_data_owner){def->mesh, def->mesh->block, def->mesh->doubles, retain_mesh, release_mesh};
+}
+
+/* Room for what a shape with a block in `slot` has beside it, and its block in the shape data. Errors leave the world
+ * as it is. */
+static sadmm_status add_block(sadmm_world *world, size_t slot, const sadmm_shape_def *def, uint32_t *offset,
+                              struct sadmm_error *error)
+{
+    const struct sadmm_shape_data_owner owner = block_owner(def);
+    if (!sadmm_grow(&world->block_shapes, &world->block_shape_capacity, world->block_shape_slots, slot + 1,
+                    sizeof *world->block_shapes))
+        return sadmm_fail_memory(error, "a shape");
+    TRY(sadmm_shape_data_add(&world->shape_data, &owner, offset, error));
+    if (slot >= world->block_shape_slots) world->block_shape_slots = slot + 1;
+    return SADMM_OK;
+}
+
+/* What was given, to be read back. */
+static void keep_given(sadmm_world *world, size_t slot, const sadmm_shape_def *def, const double orientation[4])
+{
+    struct sadmm_world_block_shape *kept = &world->block_shapes[slot];
+    kept->hull = def->hull;
+    kept->mesh = def->mesh;
+    memcpy(kept->position, def->position, sizeof kept->position);
+    memcpy(kept->orientation, orientation, sizeof kept->orientation);
+}
+
+static struct sadmm_link *link_at(sadmm_world *world, uint32_t name) { return &world->shape_links[name - 1]; }
+
+bool sadmm_world_reserve_shapes(sadmm_world *world, size_t slots)
+{
+    const size_t used = world->shape_slots;
+    return sadmm_grow(&world->shapes, &world->shape_capacity, used, slots, sizeof *world->shapes) &&
+           sadmm_grow(&world->shape_generations, &world->shape_generation_capacity, used, slots,
+                      sizeof *world->shape_generations) &&
+           sadmm_grow(&world->geometries, &world->geometry_capacity, used, slots, sizeof *world->geometries) &&
+           sadmm_grow(&world->shape_links, &world->shape_link_capacity, used, slots, sizeof *world->shape_links) &&
+           sadmm_slots_reserve(&world->shapes_taken, slots);
+}
+
+sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body_slot, const sadmm_shape_def *def,
+                                   struct sadmm_error *error)
+{
+    struct sadmm_world_body *body = &world->bodies[body_slot];
+    double orientation[4];
+    uint32_t offset = 0;
+    TRY(check_def(body, def, orientation, error));
+    const struct sadmm_geometry geometry = sadmm_shape_form_geometry(def);
+    if (has_block(def->type)) TRY(add_block(world, slot, def, &offset, error));
+    else if (geometry_is_smooth(&geometry)) TRY(sadmm_shape_data_hold(&world->shape_data, error));
+
+    struct sadmm_shape *shape = &world->shapes[slot];
+    memset(shape, 0, sizeof *shape);
+    shape->geometry = (uint32_t)slot;
+    world->geometries[shape->geometry] = geometry;
+    world->geometries[shape->geometry].hull = offset;
+    sadmm_shape_form_place(def, orientation, shape->position, shape->orientation);
+    if (has_block(def->type)) keep_given(world, slot, def, orientation);
+    shape->friction = def->friction;
+    shape->restitution = def->restitution;
+    shape->category = def->category;
+    shape->mask = def->mask;
+    shape->sensor = def->sensor;
+    shape->body = body_slot;
+    shape->alive = true;
+    shape->revision = ++world->shape_revisions;
+    ++world->shape_count;
+    world->sensor_count += def->sensor;
+    world->bouncing_count += def->restitution > 0;
+    sadmm_world_reshaped(world);
+    sadmm_slots_take(&world->shapes_taken, slot);
+    sadmm_link_add(world, link_at, &body->first_shape, (uint32_t)slot + 1);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *given,
+                                   sadmm_shape_id *id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, body_id, "body", error);
+    sadmm_shape_def def;
+    double ignored[4];
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_growing_take(&sadmm_growing_shape, &def, given, "def", error));
+    TRY(check_def(body, &def, ignored, error)); /* before the world is detached */
+    TRY(sadmm_world_detach(world));
+
+    const size_t slot = sadmm_slots_free(&world->shapes_taken);
+    if (slot >= (size_t)1 << 28)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d shapes: a world holds at most 2^28", world->shape_count);
+    if (!sadmm_world_reserve_shapes(world, slot + 1)) return sadmm_fail_memory(error, "a shape");
+    TRY(sadmm_world_put_shape(world, slot, (int32_t)body_id.slot - 1, &def, error));
+    if (slot == world->shape_slots) {
+        ++world->shape_slots;
+        world->shape_generations[slot] = 1;
+    }
+    if (id) {
+        id->slot = (uint32_t)slot + 1;
+        id->generation = world->shape_generations[slot];
+    }
+    return SADMM_OK;
+}
+
+static void remove_block(sadmm_world *world, size_t slot)
+{
+    const struct sadmm_world_block_shape *kept = &world->block_shapes[slot];
+    const void *owner = kept->hull ? (const void *)kept->hull : kept->mesh;
+    world->geometries[world->shapes[slot].geometry].hull = 0;
+    sadmm_shape_data_remove(&world->shape_data, owner, world->geometries, world->shape_slots);
+}
+
+void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
+{
+    const struct sadmm_geometry *geometry = &world->geometries[world->shapes[slot].geometry];
+    if (has_block(geometry->type)) remove_block(world, slot);
+    else if (geometry_is_smooth(geometry)) sadmm_shape_data_release(&world->shape_data);
+    world->shapes[slot].alive = false;
+    sadmm_world_reshaped(world);
+    ++world->shape_generations[slot];
+    --world->shape_count;
+    world->sensor_count -= world->shapes[slot].sensor;
+    world->bouncing_count -= world->shapes[slot].restitution > 0;
+    sadmm_link_remove(world, link_at, &world->bodies[world->shapes[slot].body].first_shape, (uint32_t)slot + 1);
+    sadmm_slots_release(&world->shapes_taken, slot);
+    sadmm_pair_table_forget(&world->friction_pairs, (uint32_t)slot);
+    world->contacts_readable = false;
+}
+
+sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_detach(world));
+    sadmm_world_kill_shape(world, id.slot - 1);
+    return SADMM_OK;
+}
+
+int32_t sadmm_world_shape_count(const sadmm_world *world)
+{
+    return world ? world->shape_count : 0;
+}
+
+sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape_id *id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(id, "id", error));
+    if (index < 0 || index >= world->shape_count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
+                          world->shape_count);
+    const size_t slot = sadmm_slots_at(&world->shapes_taken, index);
+    id->slot = (uint32_t)slot + 1;
+    id->generation = world->shape_generations[slot];
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_shape_index(sadmm_world *world, sadmm_shape_id id, int32_t *index)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(index, "index", &world->error));
+    *index = sadmm_slots_index(&world->shapes_taken, id.slot - 1);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_shape_def_sized(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *out, size_t size,
+                                         sadmm_body_id *body)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
+    if (!shape) return SADMM_ERROR_STALE_ID;
+    const struct sadmm_geometry *geometry = &world->geometries[shape->geometry];
+    sadmm_shape_def def = {.type = (sadmm_shape_type)geometry->type,
+                           .friction = shape->friction,
+                           .restitution = shape->restitution,
+                           .category = shape->category,
+                           .mask = shape->mask,
+                           .sensor = shape->sensor};
+    memcpy(def.size, geometry->size, sizeof def.size);
+    memcpy(def.position, shape->position, sizeof def.position);
+    memcpy(def.orientation, shape->orientation, sizeof def.orientation);
+    if (has_block(geometry->type)) {
+        const struct sadmm_world_block_shape *kept = &world->block_shapes[id.slot - 1];
+        def.hull = kept->hull;
+        def.mesh = kept->mesh;
+        memcpy(def.position, kept->position, sizeof def.position);
+        memcpy(def.orientation, kept->orientation, sizeof def.orientation);
+    }
+    TRY(sadmm_growing_give(&sadmm_growing_shape, out, size, 0, &def, "def", error));
+    if (body) {
+        body->slot = (uint32_t)shape->body + 1;
+        body->generation = world->bodies[shape->body].generation;
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id id, double friction, double restitution)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
+    if (!shape) return SADMM_ERROR_STALE_ID;
+    TRY(check_material("", friction, restitution, error));
+    TRY(sadmm_world_detach(world));
+    world->bouncing_count += (restitution > 0) - (shape->restitution > 0);
+    shape->friction = friction;
+    shape->restitution = restitution;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b, double friction)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    if (!sadmm_world_find_shape(world, a, "a", error) || !sadmm_world_find_shape(world, b, "b", error))
+        return SADMM_ERROR_STALE_ID;
+    if (a.slot == b.slot) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "a and b are the same shape");
+    uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
+    if (friction == -1) {
+        TRY(sadmm_world_detach(world));
+        sadmm_pair_table_remove(&world->friction_pairs, key);
+        return SADMM_OK;
+    }
+    TRY(sadmm_check_range("friction (or -1 for the geometric mean)", friction, 0, 1e6, error));
+    TRY(sadmm_world_detach(world));
+    return sadmm_pair_table_set(&world->friction_pairs, key, friction, error);
+}
+
+int32_t sadmm_world_pair_friction_count(const sadmm_world *world)
+{
+    return world ? (int32_t)sadmm_pair_table_count(&world->friction_pairs) : 0;
+}
+
+sadmm_status sadmm_world_pair_friction_at(sadmm_world *world, int32_t index, sadmm_shape_id *a, sadmm_shape_id *b,
+                                          double *friction)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(a, "a", error));
+    TRY(sadmm_check_given(b, "b", error));
+    TRY(sadmm_check_given(friction, "friction", error));
+    const size_t count = sadmm_pair_table_count(&world->friction_pairs);
+    if (index < 0 || (size_t)index >= count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %zu)", index, count);
+    const uint64_t key = sadmm_pair_table_at(&world->friction_pairs, (size_t)index, friction);
+    const uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
+    *a = (sadmm_shape_id){low + 1, world->shape_generations[low]};
+    *b = (sadmm_shape_id){high + 1, world->shape_generations[high]};
+    return SADMM_OK;
+}

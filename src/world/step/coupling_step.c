@@ -1,0 +1,27 @@
+/* Couplings of a world in a step by the host (core/model/coupling_law.h). */
+#include "world/state/world_internal.h"
+
+void sadmm_world_begin_couplings(sadmm_world *world)
+{
+    for (size_t slot = 0; world->coupling_count > 0 && slot < world->coupling_slots; ++slot) {
+        struct sadmm_world_coupling *coupling = &world->couplings[slot];
+        coupling->next = coupling->last;
+        coupling_begin(&coupling->next);
+    }
+}
+
+void sadmm_world_move_targets(sadmm_world *world, double dt)
+{
+    for (size_t slot = 0; world->coupling_count > 0 && slot < world->coupling_slots; ++slot)
+        coupling_move(&world->couplings[slot].next.target, dt);
+}
+
+void sadmm_world_commit_couplings(sadmm_world *world, int substeps)
+{
+    for (size_t slot = 0; world->coupling_count > 0 && slot < world->coupling_slots; ++slot) {
+        struct sadmm_world_coupling *coupling = &world->couplings[slot];
+        if (!coupling->alive) continue;
+        coupling->last = coupling->next;
+        coupling_end(&coupling->last, substeps);
+    }
+}

@@ -1,0 +1,268 @@
+/* What is locked, closed at the end of a (sub-)step (core/model/joint_close.h): rows of the poses that it has moved bodies
+ * to, solved for displacements by the order of the step's own. */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/model/joint_close.h"
+#include "core/model/forces.h"
+#include "core/model/joint_trapezoid.h"
+#include "core/solve/articulation.h"
+#include "world/state/world_internal.h"
+
+/* A joint's ends as the step began, and where it has left its bodies; what moves there is of account for its scale. */
+struct ends {
+    struct joint_end start[2], end[2];
+    double scale;
+};
+
+static struct joint_end end_of(const sadmm_world *world, const struct sadmm_world_joint *joint, int s)
+{
+    const struct joint_frame *frame = &joint->frame[s];
+    if (s == 0 && joint->coupling) return joint_end_on(frame, &world->couplings[joint->coupling - 1].next.target);
+    const struct joint_body body = sadmm_world_joint_body(world, joint->body[s]);
+    if (body.system_body >= 0) return joint_end_on(frame, &world->next[body.system_body]);
+    if (body.prescribed)
+        return joint_end_on(frame, &world->kinematic[sadmm_kinematic(world->bodies[joint->body[s]].system_body)].next);
+    return joint_end_on(frame, body.rigid);
+}
+
+/* Targets of couplings have no start of their own left: their ends are where the step has left them. */
+static struct ends ends_of(const sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    struct ends e;
+    e.scale = 0;
+    for (int s = 0; s < 2; ++s) {
+        const struct joint_body body = sadmm_world_joint_body(world, joint->body[s]);
+        e.end[s] = end_of(world, joint, s);
+        e.start[s] = s == 0 && joint->coupling ? e.end[s] : joint_end_on(&joint->frame[s], body.rigid);
+        e.scale += joint_closing_scale(&e.end[s], body.system_body >= 0 ? body.rigid : NULL);
+    }
+    return e;
+}
+
+static bool closes(const struct sadmm_world_joint *joint)
+{
+    return joint->alive && joint->def.enabled && joint->def.locks;
+}
+
+static struct joint_closing closing_of(const sadmm_world *world, const struct sadmm_world_joint *joint,
+                                       const sadmm_settings *settings)
+{
+    const struct ends e = ends_of(world, joint);
+    return joint_closing_of(&joint->def, e.start, e.end, e.scale, settings);
+}
+
+/* Is it of a part that folds? */
+static bool folds(const sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    for (int s = 0; s < 2; ++s) {
+        const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
+        if (body >= 0 && world->folding[body]) return true;
+    }
+    return false;
+}
+
+static void mark_bodies(const sadmm_world *world, const struct sadmm_world_joint *joint, uint8_t *bodies)
+{
+    for (int s = 0; s < 2; ++s) {
+        const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
+        if (body >= 0) bodies[body] = true;
+    }
+}
+
+static bool may_open(const sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    for (int s = 0; s < 2; ++s) {
+        const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
+        if (body >= 0 && joint_island_may_open(world->joint_touch[world->joint_labels[body]])) return true;
+    }
+    return false;
+}
+
+/* Is it off by more than a little? off: of its translations. */
+static bool opens(const sadmm_world *world, const struct sadmm_world_joint *joint, const struct joint_end end[2],
+                  double off)
+{
+    const bool moves[2] = {sadmm_world_joint_body(world, joint->body[0]).system_body >= 0,
+                           sadmm_world_joint_body(world, joint->body[1]).system_body >= 0};
+    return !joint_opens_little(&joint->def, end, moves, off);
+}
+
+/* Which bodies have joints that are to be closed; the largest error, m. Are there any? */
+static bool find_open(sadmm_world *world, const sadmm_settings *settings, double *off)
+{
+    bool any = false;
+    *off = 0;
+    for (size_t slot = 0; slot < world->joint_slots; ++slot) {
+        const struct sadmm_world_joint *joint = &world->joints[slot];
+        if (!closes(joint)) continue;
+        const struct joint_end end[2] = {end_of(world, joint, 0), end_of(world, joint, 1)};
+        const double own = joint_opening(&joint->def, end);
+        const bool folding = folds(world, joint);
+        *off = own > *off ? own : *off;
+        if (!folding && (!opens(world, joint, end, own) || !may_open(world, joint))) continue;
+        if (!(closing_of(world, joint, settings).share > (folding ? JOINT_CLOSE_FOLDING : JOINT_CLOSE_FROM))) continue;
+        if (!any) memset(world->opened, 0, (size_t)world->dynamic_count);
+        mark_bodies(world, joint, world->opened);
+        any = true;
+    }
+    return any;
+}
+
+static void mark_islands(const sadmm_world *world, const uint8_t *bodies)
+{
+    for (int32_t i = 0; i < world->dynamic_count; ++i)
+        if (bodies[i]) world->joint_touch[world->joint_labels[i]] |= ISLAND_CLOSED;
+}
+
+/* ---- what folds -------------------------------------------------------------------------------------------------- */
+
+/* Which bodies are of parts that fold; what is left of rows is kept for the next step. Are there any? */
+static sadmm_status find_folding(sadmm_world *world, bool *any)
+{
+    const size_t n = (size_t)world->dynamic_count, rows = world->start.rows.row_count;
+    *any = false;
+    if (!sadmm_grow_empty(&world->folding, &world->folding_capacity, n, sizeof *world->folding))
+        return sadmm_fail_memory(&world->error, "joints that fold");
+    memset(world->folding, 0, n);
+    if (!sadmm_articulations_has_loops(world->articulations)) return SADMM_OK;
+    if (!sadmm_grow_empty(&world->row_left, &world->row_left_capacity, rows, sizeof *world->row_left))
+        return sadmm_fail_memory(&world->error, "joints that fold");
+    memset(world->row_left, 0, rows * sizeof *world->row_left);
+    sadmm_articulations_find_left(world->articulations, world->joint_constraints, world->row_left);
+    for (size_t r = 0; r < world->joint_rows; ++r) {
+        const struct sadmm_joint_source *source = &world->joint_sources[r];
+        struct sadmm_world_joint *joint = &world->joints[source->joint];
+        double *was = &joint->next.left[source->coordinate];
+        if (source->role != SADMM_ROLE_LOCK) continue;
+        if (joint_row_folds(*was, world->row_left[r])) {
+            *any = true;
+            mark_bodies(world, joint, world->folding);
+        }
+        *was = world->row_left[r];
+    }
+    if (*any) sadmm_articulations_mark_parts(world->articulations, world->folding);
+    return SADMM_OK;
+}
+
+/* ---- rows -------------------------------------------------------------------------------------------------------- */
+
+/* Rows of locks, a constraint each, in the places of the step's own. */
+static bool add_rows(sadmm_world *world, const struct sadmm_row_constraint *place,
+                     const struct sadmm_world_joint *joint, const sadmm_settings *settings)
+{
+    struct sadmm_rows *rows = &world->closing;
+    const struct joint_closing c = closing_of(world, joint, settings);
+    const int32_t first = sadmm_rows_add(rows, c.count, place->body_a, place->body_b);
+    if (first < 0) return false;
+    for (int i = 0; i < c.count; ++i) {
+        const size_t r = (size_t)(first + i);
+        if (place->body_a >= 0) joint_closing_row(&c, i, 0, rows->jacobian_a + 6 * r);
+        if (place->body_b >= 0) joint_closing_row(&c, i, 1, rows->jacobian_b + 6 * r);
+        sadmm_row_hard(rows, (int32_t)r, c.error[i]);
+    }
+    return true;
+}
+
+static bool make_rows(sadmm_world *world, const sadmm_settings *settings)
+{
+    size_t at = 0;
+    sadmm_rows_clear(&world->closing);
+    if (!sadmm_grow_empty(&world->closing_slots, &world->closing_slot_capacity, world->joint_constraint_count,
+                          sizeof *world->closing_slots))
+        return false;
+    for (size_t k = 0; k < world->joint_constraint_count; ++k) {
+        world->closing_slots[k] = world->joint_constraints[k];
+        world->closing_slots[k].first = world->closing_slots[k].count = 0;
+    }
+    for (size_t slot = 0; slot < world->joint_slots; ++slot) {
+        const struct sadmm_world_joint *joint = &world->joints[slot];
+        if (!joint->alive) continue;
+        const size_t before = world->closing.constraint_count, places = (size_t)sadmm_joint_constraints(joint);
+        if (places > 0 && closes(joint) && !add_rows(world, &world->closing_slots[at], joint, settings)) return false;
+        if (world->closing.constraint_count > before) world->closing_slots[at] = world->closing.constraints[before];
+        at += places;
+    }
+    return true;
+}
+
+/* ---- what it costs ----------------------------------------------------------------------------------------------- */
+
+static double energy2(const struct sadmm_rigid *body, const sadmm_settings *settings)
+{
+    return joint_energy2(body, body->position, body->orientation, body->velocity, settings);
+}
+
+/* Of a body; then by island, at its first body. */
+struct joint_closing_cost {
+    double gained, moving; /* twice the energy that closing has given it, and that of its motion, J */
+};
+
+static void begin_costs(sadmm_world *world, const sadmm_settings *settings)
+{
+    for (int32_t i = 0; i < world->dynamic_count; ++i)
+        world->closing_costs[i].gained = -energy2(&world->next[i], settings);
+}
+
+static void end_costs(sadmm_world *world, const sadmm_settings *settings)
+{
+    for (int32_t i = 0; i < world->dynamic_count; ++i)
+        world->closing_costs[i].gained += energy2(&world->next[i], settings);
+}
+
+static void pay_costs(sadmm_world *world)
+{
+    struct joint_closing_cost *costs = world->closing_costs;
+    for (int32_t i = 0; i < world->dynamic_count; ++i) { /* an island's first body comes first */
+        struct joint_closing_cost *sum = &costs[world->joint_labels[i]];
+        costs[i].moving = joint_motion_energy2(&world->next[i], world->next[i].orientation, world->next[i].velocity);
+        if (sum == &costs[i]) continue;
+        sum->gained += costs[i].gained;
+        sum->moving += costs[i].moving;
+    }
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        const struct joint_closing_cost *sum = &costs[world->joint_labels[i]];
+        if (!(world->joint_touch[world->joint_labels[i]] & ISLAND_CLOSED)) continue;
+        const double keep = joint_closing_keep(sum->gained, sum->moving);
+        for (int k = 0; k < 6; ++k) world->next[i].velocity[k] *= keep;
+    }
+}
+
+/* Velocities of what folds, along what its joints leave it at the end. What they are off by in a direction that is about to
+ * vanish would be taken for errors as large as that is short, once the next step is past the pose. */
+static sadmm_status turn_speeds(sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings)
+{
+    if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
+    memset(world->closing.bias, 0, world->closing.row_count * sizeof *world->closing.bias);
+    mark_islands(world, world->folding);
+    return sadmm_articulations_close(world->articulations, system, world->closing_slots, world->joint_constraint_count,
+                                     settings, world->folding, true, world->next, &world->error);
+}
+
+sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *settings, double *off)
+{
+    struct sadmm_system system = sadmm_world_system(world);
+    const size_t n = (size_t)world->dynamic_count;
+    if (!sadmm_grow_empty(&world->opened, &world->opened_capacity, n, sizeof *world->opened) ||
+        !sadmm_grow_empty(&world->closing_costs, &world->closing_cost_capacity, n, sizeof *world->closing_costs))
+        return sadmm_fail_memory(&world->error, "joints that close");
+    bool any = false, folding = false;
+    TRY(find_folding(world, &folding));
+    system.rows = &world->closing;
+    if (folding) begin_costs(world, settings);
+    for (int step = 0; find_open(world, settings, off) && step < JOINT_CLOSE_STEPS; ++step) {
+        if (!any && !folding) begin_costs(world, settings);
+        any = true;
+        if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");
+        sadmm_articulations_mark_parts(world->articulations, world->opened);
+        mark_islands(world, world->opened);
+        TRY(sadmm_articulations_close(world->articulations, &system, world->closing_slots,
+                                      world->joint_constraint_count, settings, world->opened, false, world->next,
+                                          &world->error));
+    }
+    if (!any && !folding) return SADMM_OK;
+    end_costs(world, settings);
+    if (folding) TRY(turn_speeds(world, &system, settings));
+    pay_costs(world);
+    return SADMM_OK;
+}

@@ -1,0 +1,102 @@
+/* Positions after a (sub-)step in islands with joints, from the velocities that the solve found
+ * (core/model/joint_trapezoid.h). */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/math/momentum.h"
+#include "core/model/islands.h"
+#include "core/model/joint_trapezoid.h"
+#include "world/state/world_internal.h"
+
+static struct joint_trapezoid trapezoid_of(const sadmm_world *world, int32_t body, double dt)
+{
+    return body >= 0 ? joint_trapezoid_of(&world->start.rigid[body], world->velocity + 6 * (size_t)body, dt)
+                     : joint_trapezoid_of(NULL, NULL, dt);
+}
+
+static uint16_t *island_of(const sadmm_world *world, int32_t a, int32_t b)
+{
+    return &world->joint_touch[world->joint_labels[a >= 0 ? a : b]];
+}
+
+static void add_constraint(const sadmm_world *world, const struct sadmm_row_constraint *constraint,
+                           const sadmm_settings *settings)
+{
+    const struct sadmm_rows *rows = &world->start.rows;
+    const struct joint_trapezoid bodies[2] = {trapezoid_of(world, constraint->body_a, settings->dt),
+                                              trapezoid_of(world, constraint->body_b, settings->dt)};
+    uint16_t *island = island_of(world, constraint->body_a, constraint->body_b);
+    int moorings = 0;
+    *island |= ISLAND_ARTICULATED;
+    for (int32_t k = 0; k < constraint->count; ++k) {
+        const size_t r = (size_t)(constraint->first + k);
+        moorings |= joint_mooring(&world->joint_sources[r], rows->lambda[r], bodies);
+        *island |= (uint16_t)joint_row_touches(&world->joint_sources[r], rows->lambda[r], rows->jacobian_a + 6 * r,
+                                              rows->jacobian_b + 6 * r, bodies, settings);
+    }
+    if (moorings == JOINT_MOORED_WHOLLY) *island |= ISLAND_ANCHORED;
+}
+
+/* A static pair that leaves its island no motion. */
+static bool anchors(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
+{
+    struct arm_sums arms = {0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
+    if (pair->body_a >= 0 && pair->body_b >= 0) return false;
+    for (int32_t p = pair->first; p < pair->first + pair->count; ++p)
+        add_arm(&arms, pair->body_a >= 0 ? contacts->points[p].arm_a : contacts->points[p].arm_b, 1);
+    return momentum_is_anchored(pair->friction, &arms);
+}
+
+static void find_islands(const sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings)
+{
+    const struct sadmm_contact_set *contacts = system->contacts;
+    sadmm_islands(system, world->joint_labels);
+    memset(world->joint_touch, 0, (size_t)system->body_count * sizeof *world->joint_touch);
+    for (size_t k = 0; k < system->rows->constraint_count; ++k)
+        add_constraint(world, &system->rows->constraints[k], settings);
+    for (size_t k = 0; k < contacts->pair_count; ++k) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[k];
+        uint16_t *island = island_of(world, pair->body_a, pair->body_b);
+        if (!(*island & ISLAND_ARTICULATED)) continue;
+        *island |= ISLAND_TOUCHED | (anchors(contacts, pair) ? ISLAND_ANCHORED : 0);
+        if (*island & ISLAND_TRAPEZOID_OFF) continue;
+        const struct joint_trapezoid bodies[2] = {trapezoid_of(world, pair->body_a, settings->dt),
+                                                  trapezoid_of(world, pair->body_b, settings->dt)};
+        struct trapezoid_touch touch = {0, {0, 0}};
+        for (int32_t p = pair->first; p < pair->first + pair->count; ++p)
+            joint_contact_touches(pair->normal, &contacts->points[p],
+                                  sadmm_migration_of(contacts->points, contacts->migrations, p), bodies, settings,
+                                  &touch);
+        if (sadmm_pair_is_kinematic(system, pair) || joint_contacts_hold(&touch, bodies))
+            *island |= ISLAND_TRAPEZOID_OFF;
+    }
+}
+
+sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settings *settings, double *off)
+{
+    const struct sadmm_system system = sadmm_world_system(world);
+    const size_t n = (size_t)system.body_count;
+    if (!sadmm_grow_empty(&world->joint_labels, &world->joint_label_capacity, n, sizeof *world->joint_labels) ||
+        !sadmm_grow_empty(&world->joint_touch, &world->joint_touch_capacity, n, sizeof *world->joint_touch))
+        return sadmm_fail_memory(&world->error, "islands of joints");
+    find_islands(world, &system, settings);
+    for (size_t i = 0; i < n; ++i) {
+        const uint16_t island = world->joint_touch[world->joint_labels[i]];
+        struct sadmm_rigid *next = &world->next[i];
+        if (world->start.rigid[i].rolls & ROLLING_IS_STIFFENED)
+            world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
+        if (!(island & ISLAND_ARTICULATED)) continue;
+        next->mean = !(island & ISLAND_TRAPEZOID_OFF);
+        double halfway[4];
+        q_store(spin_turned_halfway(&world->start.rigid[i], settings->dt), halfway);
+        joint_move(&world->start.rigid[i], halfway, world->velocity + 6 * i, island & ISLAND_TRAPEZOID_OFF,
+                   settings->dt, next->position, next->orientation, next->velocity);
+    }
+    for (size_t k = 0; k < system.rows->constraint_count; ++k) {
+        const struct sadmm_row_constraint *constraint = &system.rows->constraints[k];
+        world->joints[world->joint_sources[constraint->first].joint].next.trapezoid_off =
+            *island_of(world, constraint->body_a, constraint->body_b) & ISLAND_TRAPEZOID_OFF;
+    }
+    TRY(sadmm_world_close_joints(world, settings, off));
+    return sadmm_world_restore_articulated(world, settings);
+}

@@ -1,0 +1,197 @@
+/* Joints as constraint rows (docs/internals/algorithm.md, "Joints"): their laws (core/model/joint_law.h) into the
+ * step's rows, multipliers from the forces of the last step, and the solution's back into what joints keep. */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "world/state/world_internal.h"
+
+/* Six locks, or what acts along six free coordinates. */
+struct all_laws {
+    struct joint_law law[JOINT_COORDINATES * JOINT_COORDINATE_LAWS];
+    int count;
+};
+
+/* Locked coordinates first: they are held together. */
+static void find_laws(struct sadmm_world_joint *joint, const struct acting_joint *acting,
+                      const sadmm_settings *settings, struct all_laws *all)
+{
+    all->count = 0;
+    for (int locked = 1; locked >= 0; --locked)
+        for (int k = 0; k < JOINT_COORDINATES; ++k) {
+            struct joint_laws laws;
+            if ((int)(joint->def.locks >> k & 1) != locked || !joint_has_coordinate(&joint->def, k)) continue;
+            const struct joint_moving m = joint_moving_of(&joint->def, &joint->next, acting, k, settings);
+            if (joint_winds(joint->def.locks, k)) joint->next.angle[k] = m.value;
+            const struct joint_table table = {joint->table[k],
+                                              joint->table[k] ? joint->table[k] + joint->table_count[k] : NULL,
+                                              joint->table_count[k]};
+            joint_coordinate_laws(&joint->def, k, &m, joint->table[k] ? &table : NULL, &laws);
+            for (int i = 0; i < laws.count; ++i) all->law[all->count++] = laws.law[i];
+        }
+}
+
+/* ---- rows -------------------------------------------------------------------------------------------------------- */
+
+static bool add_constraints(sadmm_world *world, int32_t slot, const struct acting_joint *acting,
+                            const struct all_laws *laws, double dt)
+{
+    struct sadmm_rows *rows = &world->start.rows;
+    const struct sadmm_world_joint *joint = &world->joints[slot];
+    const size_t all = rows->row_count + (size_t)laws->count;
+    if (!sadmm_grow(&world->joint_sources, &world->joint_source_capacity, rows->row_count, all,
+                    sizeof *world->joint_sources) ||
+        !sadmm_grow(&world->start.multiplier, &world->start.multiplier_capacity, rows->row_count, all,
+                    sizeof *world->start.multiplier))
+        return false;
+    for (int i = 0; i < laws->count; ++i) {
+        const struct joint_law *law = &laws->law[i];
+        if (i % SADMM_MAX_ROWS == 0) {
+            const int left = laws->count - i, count = left < SADMM_MAX_ROWS ? left : SADMM_MAX_ROWS;
+            if (sadmm_rows_add(rows, count, acting->side[0].system_body, acting->side[1].system_body) < 0)
+                return false;
+        }
+        const size_t r = all - (size_t)laws->count + (size_t)i;
+        for (int s = 0; s < 2; ++s) {
+            double *row = (s ? rows->jacobian_b : rows->jacobian_a) + 6 * r;
+            if (acting->side[s].system_body < 0) continue;
+            joint_step_row(acting, s, law->coordinate, row);
+            for (int j = 0; j < 6; ++j) row[j] *= law->sign;
+        }
+        sadmm_row_set(rows, (int32_t)r, law->gain, law->bias, law->compliance, law->lo, law->hi);
+        rows->lambda[r] = world->start.multiplier[r] =
+            law->sign * joint->next.force[law->role][law->coordinate] * dt;
+        world->joint_sources[r] = (struct sadmm_joint_source){slot, (int8_t)law->role, (int8_t)law->coordinate,
+                                                              (int8_t)law->sign, law->separation, law->slack,
+                                                              law->prescribed};
+    }
+    return true;
+}
+
+int32_t sadmm_joint_constraints(const struct sadmm_world_joint *joint)
+{
+    int laws = joint_most_laws(&joint->def);
+    for (int k = 0; k < JOINT_COORDINATES; ++k) { /* a spring that has nothing but its table */
+        const sadmm_joint_coordinate *c = &joint->def.coordinates[k];
+        laws += joint->table[k] && !(c->spring_stiffness > 0 || c->spring_damping > 0);
+    }
+    return joint->coupling ? 1 : (laws + SADMM_MAX_ROWS - 1) / SADMM_MAX_ROWS;
+}
+
+/* The constraints that the joint may have: those from `first` on that it has, and others without rows. */
+static bool add_slots(sadmm_world *world, const struct sadmm_world_joint *joint, size_t first)
+{
+    const size_t count = (size_t)sadmm_joint_constraints(joint), begin = world->joint_constraint_count;
+    const struct sadmm_rows *rows = &world->start.rows;
+    if (!sadmm_grow(&world->joint_constraints, &world->joint_constraint_capacity, begin, begin + count,
+                    sizeof *world->joint_constraints))
+        return false;
+    for (size_t k = 0; k < count; ++k)
+        world->joint_constraints[begin + k] =
+            first + k < rows->constraint_count
+                ? rows->constraints[first + k]
+                : (struct sadmm_row_constraint){.body_a = sadmm_world_joint_body(world, joint->body[0]).system_body,
+                                                .body_b = sadmm_world_joint_body(world, joint->body[1]).system_body};
+    world->joint_constraint_count += count;
+    return true;
+}
+
+sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings)
+{
+    sadmm_rows_clear(&world->start.rows);
+    world->joints_acting = world->couplings_acting = 0;
+    world->joint_constraint_count = 0;
+    for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
+        struct sadmm_world_joint *joint = &world->joints[slot];
+        struct all_laws laws;
+        if (!joint->alive) continue;
+        const size_t before = world->start.rows.constraint_count;
+        if (!joint->def.enabled) {
+            if (!add_slots(world, joint, before)) return sadmm_fail_memory(&world->error, "the joints' rows");
+            continue;
+        }
+        const struct acting_joint acting = sadmm_world_act_joint(world, joint, settings);
+        find_laws(joint, &acting, settings, &laws);
+        if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
+        if (!add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt) || !add_slots(world, joint, before))
+            return sadmm_fail_memory(&world->error, "the joints' rows");
+        joint_forget_forces(&joint->next); /* the solution says */
+    }
+    bool any;
+    TRY(sadmm_world_make_gear_rows(world, settings));
+    return sadmm_world_stiffen(world, settings, &any);
+}
+
+/* ---- from step to step ------------------------------------------------------------------------------------------- */
+
+/* Both lists, sorted; a pair that is in both stands there twice. */
+static sadmm_status filter_pairs(sadmm_world *world)
+{
+    struct sadmm_pair_table *own = &world->disabled_pairs, *jointed = &world->jointed_pairs;
+    const size_t of_own = sadmm_pair_table_count(own), of_jointed = sadmm_pair_table_count(jointed),
+                 count = of_own + of_jointed;
+    TRY(sadmm_pair_table_list(own, &world->error));
+    TRY(sadmm_pair_table_list(jointed, &world->error));
+    TRY(sadmm_pair_table_list(&world->friction_pairs, &world->error));
+    if (of_jointed == 0) return SADMM_OK;
+    if (!sadmm_grow_empty(&world->filtered_pairs, &world->filtered_capacity, count, sizeof *world->filtered_pairs))
+        return sadmm_fail_memory(&world->error, "pairs of jointed bodies");
+    for (size_t k = 0, i = 0, j = 0; k < count; ++k) {
+        const bool from_own = j == of_jointed || (i < of_own && own->keys[i] < jointed->keys[j]);
+        world->filtered_pairs[k] = from_own ? own->keys[i++] : jointed->keys[j++];
+    }
+    world->filtered_count = count;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_begin_joints(sadmm_world *world)
+{
+    for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
+        struct sadmm_world_joint *joint = &world->joints[slot];
+        joint->next = joint->last;
+        if (!joint->def.enabled) joint_forget_forces(&joint->next);
+    }
+    sadmm_world_begin_gears(world);
+    return filter_pairs(world);
+}
+
+/* All rows of the joint have been kept. */
+static void end_joint(sadmm_world *world, struct sadmm_world_joint *joint, const struct acting_joint *acting, double dt)
+{
+    joint_end_wrench(&joint->next, &joint->def, acting->frame);
+    if (joint->coupling)
+        coupling_keep(&world->couplings[joint->coupling - 1].next, joint->next.wrench, acting->middle.point,
+                      acting->middle.arm_b, dt);
+}
+
+void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
+{
+    const struct sadmm_rows *rows = &world->start.rows;
+    struct sadmm_world_joint *joint = NULL;
+    struct acting_joint acting;
+    for (size_t r = 0; r < world->joint_rows; ++r) {
+        const struct sadmm_joint_source *source = &world->joint_sources[r];
+        if (!joint || joint != &world->joints[source->joint]) {
+            if (joint) end_joint(world, joint, &acting, settings->dt);
+            joint = &world->joints[source->joint];
+            acting = sadmm_world_act_joint(world, joint, settings);
+            v3_store(acting.middle.point, joint->next.point);
+        }
+        const double force = source->sign * rows->lambda[r] / settings->dt;
+        joint_keep_row(&joint->next, acting.middle.axis, source->role, source->coordinate, force);
+    }
+    if (joint) end_joint(world, joint, &acting, settings->dt);
+    sadmm_world_keep_gear_rows(world, settings->dt);
+}
+
+static void commit_joint(struct sadmm_world_joint *joint)
+{
+    joint->last = joint->next;
+    joint->def.enabled = joint->def.enabled && !joint->last.broken;
+}
+
+void sadmm_world_commit_joints(sadmm_world *world)
+{
+    for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot)
+        if (world->joints[slot].alive) commit_joint(&world->joints[slot]);
+    sadmm_world_commit_gears(world);
+}

@@ -1,0 +1,103 @@
+/* Geometric stiffness of a (sub-)step's joints, by the forces that their rows have (core/model/stiffening.h). */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/model/stiffening.h"
+#include "world/state/world_internal.h"
+
+/* What is done with the force of a joint on a dynamic body of it. */
+typedef void on_force(sadmm_world *world, int32_t body, vec3 place, vec3 force);
+
+static vec3 force_of(const double *jacobian, const double *lambda, const struct sadmm_joint_source *source,
+                     size_t count, double dt)
+{
+    vec3 force = v3(0, 0, 0);
+    for (size_t r = 0; r < count; ++r)
+        force = stiffening_add_row(force, source[r].coordinate, jacobian + 6 * r, lambda[r], dt);
+    return force;
+}
+
+static void each_force(sadmm_world *world, double dt, on_force *f)
+{
+    const struct sadmm_rows *rows = &world->start.rows;
+    size_t end;
+    for (size_t r = 0; r < world->joint_rows; r = end) {
+        const struct sadmm_joint_source *source = &world->joint_sources[r];
+        const struct sadmm_world_joint *joint = &world->joints[source->joint];
+        for (end = r + 1; end < world->joint_rows && world->joint_sources[end].joint == source->joint;) ++end;
+        for (int s = 0; s < 2; ++s) {
+            const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
+            if (body < 0 || (s == 0 && joint->coupling)) continue;
+            f(world, body, joint->frame[s].position,
+              force_of((s ? rows->jacobian_b : rows->jacobian_a) + 6 * r, rows->lambda + r, source, end - r, dt));
+        }
+    }
+}
+
+static void add_most(sadmm_world *world, int32_t body, vec3 place, vec3 force)
+{
+    stiffening_add_most(world->joint_load + 3 * (size_t)body, place, v3_norm(force));
+}
+
+static void add_stiffness(sadmm_world *world, int32_t body, vec3 place, vec3 force)
+{
+    struct joint_stiffening *s = &world->stiffening[body];
+    if (world->stiffened[body]) stiffening_add(s->K, place, m3_tmul(s->frame, force));
+}
+
+static bool is_stiffened(const struct sadmm_rigid *body) { return body->rolls & ROLLING_IS_STIFFENED; }
+
+/* May it be stiff, or is it? */
+static bool is_of_account(const sadmm_world *world, int32_t i, double dt)
+{
+    const struct sadmm_rigid *body = &world->start.rigid[i];
+    return is_stiffened(body) || stiffening_may_be(body->inertia, dt, world->joint_load + 3 * (size_t)i);
+}
+
+/* A body's own stiffness is kept beside, and there is none yet of joints where none has been found before. */
+static void begin_body(sadmm_world *world, int32_t i, double dt)
+{
+    const struct sadmm_rigid *body = &world->start.rigid[i];
+    struct joint_stiffening *s = &world->stiffening[i];
+    memset(s->K, 0, sizeof s->K);
+    s->frame = stiffening_frame(body, dt);
+    if (is_stiffened(body)) return;
+    memset(s->more, 0, sizeof s->more);
+    if (rolling_is_stiff(body)) memcpy(s->own, body->stiffness, sizeof s->own);
+}
+
+/* Is its inertia another one than before? */
+static bool stiffen_body(sadmm_world *world, int32_t i, double dt)
+{
+    struct sadmm_rigid *body = &world->start.rigid[i];
+    struct joint_stiffening *s = &world->stiffening[i];
+    if (!stiffening_renew(body->inertia, s->frame, dt, s->K, is_stiffened(body), s->more)) return false;
+    stiffening_set(body, s->own, dt, s->more);
+    return true;
+}
+
+sadmm_status sadmm_world_stiffen(sadmm_world *world, const sadmm_settings *settings, bool *any)
+{
+    const size_t n = (size_t)world->dynamic_count;
+    bool may = false;
+    *any = false;
+    if (world->joint_rows == 0) return SADMM_OK;
+    if (!sadmm_grow_empty(&world->joint_load, &world->joint_load_capacity, 3 * n, sizeof *world->joint_load) ||
+        !sadmm_grow_empty(&world->stiffening, &world->stiffening_capacity, n, sizeof *world->stiffening) ||
+        !sadmm_grow_empty(&world->stiffened, &world->stiffened_capacity, n, sizeof *world->stiffened))
+        return sadmm_fail_memory(&world->error, "the stiffness of joints");
+    memset(world->joint_load, 0, 3 * n * sizeof *world->joint_load);
+    each_force(world, settings->dt, add_most);
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        world->stiffened[i] = is_of_account(world, i, settings->dt);
+        if (world->stiffened[i]) begin_body(world, i, settings->dt);
+        may = may || world->stiffened[i];
+    }
+    if (!may) return SADMM_OK;
+    each_force(world, settings->dt, add_stiffness);
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        world->stiffened[i] = world->stiffened[i] && stiffen_body(world, i, settings->dt);
+        *any = *any || world->stiffened[i];
+    }
+    return SADMM_OK;
+}
