@@ -21,15 +21,15 @@
     M(double, contact_margin, ) M(sadmm_tasks, tasks, ) M(struct first_settings, settings, )
 
 #define FIRST_body_def(M) \
-    M(size_t, struct_size, ) M(sadmm_body_type, type, ) M(double, mass, ) M(double, inertia, [3]) \
+    M(size_t, struct_size, ) M(const char *, name, ) M(sadmm_body_type, type, ) M(double, mass, ) M(double, inertia, [3]) \
     M(double, position, [3]) M(double, orientation, [4]) M(double, linear_velocity, [3]) \
-    M(double, angular_velocity, [3]) M(int32_t, environment, ) M(const char *, name, ) M(double, gravity_scale, ) \
+    M(double, angular_velocity, [3]) M(int32_t, environment, ) M(double, gravity_scale, ) \
     M(double, linear_damping, ) M(double, angular_damping, )
 
 #define FIRST_shape_def(M) \
     M(size_t, struct_size, ) M(sadmm_shape_type, type, ) M(double, size, [3]) M(double, position, [3]) \
     M(double, orientation, [4]) M(double, friction, ) M(double, restitution, ) M(uint32_t, category, ) \
-    M(uint32_t, mask, ) M(const sadmm_hull *, hull, ) M(const sadmm_mesh *, mesh, ) M(bool, sensor, )
+    M(uint32_t, mask, ) M(bool, sensor, ) M(const sadmm_hull *, hull, ) M(const sadmm_mesh *, mesh, )
 
 #define FIRST_joint_coordinate(M) \
     M(bool, limited, ) M(double, lower, ) M(double, upper, ) M(sadmm_drive, drive, ) M(double, target_position, ) \
@@ -51,7 +51,7 @@
     M(double, angular_damping, ) M(double, max_force, ) M(double, max_torque, ) M(bool, enabled, )
 
 #define FIRST_gear_def(M) \
-    M(size_t, struct_size, ) M(sadmm_joint_id, joint_1, ) M(sadmm_joint_id, joint_2, ) M(int32_t, coordinate_1, ) \
+    M(size_t, struct_size, ) M(sadmm_joint_id, joint_1, ) M(int32_t, coordinate_1, ) M(sadmm_joint_id, joint_2, ) \
     M(int32_t, coordinate_2, ) M(double, ratio, ) M(double, offset, ) M(bool, enabled, )
 
 #define FIRST_hull_def(M) \

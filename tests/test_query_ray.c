@@ -4,6 +4,7 @@
 
 #include "collision/query/ray.h"
 #include "collision/query/ray_box.h"
+#include "core/base/names.h"
 #include "convex_tools.h"
 #include "mesh_tools.h"
 #include "run_suite.h"
@@ -134,7 +135,7 @@ START_TEST(enters_solids)
         struct pair_of t = {.shape_data = test_shape_data_new()};
         const double scale = pow(10, random_in(&r, -3, 3));
         random_shape_of(&r, &t, 0, type, scale);
-        if (n % 4 == 3 && type != SADMM_SHAPE_HULL) t.g[0].size[n / 4 % geometry_sizes(type)] *= 1e-3; /* a needle */
+        if (n % 4 == 3 && type != SADMM_SHAPE_HULL) t.g[0].size[n / 4 % sadmm_shape_sizes[type]] *= 1e-3; /* a needle */
         random_rotation(&r, t.R[0]);
         for (int k = 0; k < 3; ++k) t.x[0][k] = n % 3 ? scale * random_in(&r, -3, 3) : 0;
         const double radius = geometry_radius(&t.g[0]);
@@ -143,7 +144,7 @@ START_TEST(enters_solids)
             double from[3], to[3], own[3];
             for (int k = 0; k < 3; ++k) {
                 from[k] = t.x[0][k] + far * radius * random_in(&r, -1, 1);
-                own[k] = 1.1 * (geometry_sizes(type) == 1 ? radius : t.g[0].size[k]) * random_in(&r, -1, 1);
+                own[k] = 1.1 * (sadmm_shape_sizes[type] == 1 ? radius : t.g[0].size[k]) * random_in(&r, -1, 1);
             }
             if (type == SADMM_SHAPE_CYLINDER || type == SADMM_SHAPE_CONE || type == SADMM_SHAPE_CAPSULE) {
                 own[0] = 1.1 * t.g[0].size[0] * random_in(&r, -1, 1);

@@ -108,7 +108,7 @@ CASES = [
     ("bodies[1].shapes[0]", {"type": "plane"}, "bodies[1].shapes[0].type ="),
     ("bodies[1].shapes[0].size", GONE, "bodies[1].shapes[0].size: is missing, 3 numbers"),
     ("bodies[1].shapes[0].size", [1, 1], "bodies[1].shapes[0].size: must be an array of 3 numbers, is an array of 2"),
-    ("bodies[1].shapes[0].size", [1, -1, 1], "bodies[1].shapes[0].size[1] = -1: must be in [1e-6, 1e6] m"),
+    ("bodies[1].shapes[0].size", [1, -1, 1], "bodies[1].shapes[0].size[1] = -1: must be in [1e-06, 1e+06] m"),
     ("bodies[1].shapes[0].friction", -0.1, "bodies[1].shapes[0].friction = -0.1: must be in"),
     ("bodies[1].shapes[0].restitution", 2, "bodies[1].shapes[0].restitution = 2: must be in [0, 1]"),
     ("bodies[1].shapes[0].mask", -1, "bodies[1].shapes[0].mask: must be a whole number in [0, 4294967295], is -1"),

@@ -5,7 +5,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/definition_fields.h"
 #include "core/base/growing.h"
+#include "core/base/settings_fields.h"
 #include "first_version.h"
 #include "run_suite.h"
 
@@ -91,6 +93,39 @@ START_TEST(members_are_where_they_were)
     COMPARE(solve_report, "");
     COMPARE(step_report, "");
     COMPARE(mesh_file_info, "");
+}
+END_TEST
+
+/* A member that came later does not begin in the padding of the first version, which an older program leaves as it is. */
+static void all_were_there(const struct sadmm_field *fields, size_t count, size_t first_size, const char *const *names,
+                           size_t name_count)
+{
+    for (size_t k = 0; k < count; ++k) {
+        bool there = fields[k].offset >= first_size;
+        for (size_t i = 0; i < name_count; ++i) there = there || strcmp(fields[k].name, names[i]) == 0;
+        ck_assert_msg(there, "%s begins at byte %zu of %zu that were there before it", fields[k].name, fields[k].offset,
+                      first_size);
+    }
+}
+
+#define NAME(type, name, dimensions) #name,
+#define NO_PADDING_IS_USED(table, of)                                                                           \
+    do {                                                                                                        \
+        static const char *const names[] = {FIRST_##of(NAME)};                                                  \
+        all_were_there(table, sizeof table / sizeof *table, sizeof(struct first_##of), names,                   \
+                       sizeof names / sizeof *names);                                                           \
+    } while (0)
+
+START_TEST(later_members_are_behind_the_first_version)
+{
+    NO_PADDING_IS_USED(sadmm_settings_table, settings);
+    NO_PADDING_IS_USED(sadmm_body_table, body_def);
+    NO_PADDING_IS_USED(sadmm_shape_table, shape_def);
+    NO_PADDING_IS_USED(sadmm_joint_table, joint_def);
+    NO_PADDING_IS_USED(sadmm_coordinate_table, joint_coordinate);
+    NO_PADDING_IS_USED(sadmm_coupling_table, coupling_def);
+    NO_PADDING_IS_USED(sadmm_gear_table, gear_def);
+    NO_PADDING_IS_USED(sadmm_hull_table, hull_def);
 }
 END_TEST
 
@@ -363,6 +398,7 @@ int main(void)
     tcase_add_checked_fixture(cases, begin, end);
     tcase_add_test(cases, header_and_library_have_one_version);
     tcase_add_test(cases, members_are_where_they_were);
+    tcase_add_test(cases, later_members_are_behind_the_first_version);
     tcase_add_test(cases, programs_of_the_first_version_go_on);
     tcase_add_test(cases, programs_of_a_later_version_may_leave_out_what_is_new);
     tcase_add_test(cases, parts_may_be_larger_than_the_library_knows);

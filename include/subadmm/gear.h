@@ -29,9 +29,11 @@ typedef struct sadmm_gear_id { uint32_t slot, generation; } sadmm_gear_id;
 
 typedef struct sadmm_gear_def {
     size_t struct_size;          /* set by sadmm_gear_def_default() */
-    sadmm_joint_id joint_1, joint_2; /* may be the same, with two coordinates. No default */
-    int32_t coordinate_1, coordinate_2; /* free ones, in [0, 6): any translation or distance; rotations that are the
-                                           only free one or one of two. No default */
+    sadmm_joint_id joint_1;      /* No default */
+    int32_t coordinate_1;        /* a free one of joint_1, in [0, 6): any translation or distance; a rotation that is the
+                                    only free one or one of two. No default */
+    sadmm_joint_id joint_2;      /* may be joint_1, with another coordinate. No default */
+    int32_t coordinate_2;        /* likewise */
     double ratio;                /* |ratio| in [1e-9, 1e9], unit of coordinate 1 over that of 2; default 1 */
     double offset;               /* |offset| <= 1e9, unit of coordinate 1, or NaN: the value when the gear is added (in
                                     the same range, and read back); default NaN */

@@ -97,6 +97,7 @@ typedef enum sadmm_body_type {
 
 typedef struct sadmm_body_def {
     size_t struct_size;          /* set by sadmm_body_def_default() */
+    const char *name;            /* UTF-8; copied, as many whole characters as fit into 63 bytes; NULL = "" */
     sadmm_body_type type;        /* default DYNAMIC */
     double mass;                 /* kg, in [1e-9, 1e12]; of dynamic bodies, ignored for others; no default */
     double inertia[3]; /* principal moments, kg m^2, in [1e-24, 1e24], each <= the sum of the other two (relative
@@ -107,7 +108,6 @@ typedef struct sadmm_body_def {
     double angular_velocity[3];  /* rad/s, |w| <= 1e6; 0 for static bodies */
     int32_t environment;         /* bodies of different environments never collide; >= 0, or -1 (not for dynamic
                                     bodies): collides with all; default 0 (static: -1 is the usual choice) */
-    const char *name;            /* UTF-8; copied, as many whole characters as fit into 63 bytes; NULL = "" */
     /* Of dynamic bodies, ignored for others: */
     double gravity_scale;        /* the body's gravity over settings.gravity, in [-1e6, 1e6]; default 1 */
     double linear_damping;       /* 1/s, in [0, 1e6]; default 0. c: a force -c mass velocity, so that free motion decays
@@ -246,12 +246,12 @@ typedef struct sadmm_shape_def {
     double friction;             /* mu >= 0, <= 1e6; a pair uses the geometric mean; default 0.5 */
     double restitution;          /* in [0, 1]; a pair uses the larger; default 0 */
     uint32_t category, mask; /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1, all */
+    bool sensor;                 /* has no contacts but reports what overlaps it (events.h); not for a MESH, which has
+                                    no inside; default false */
     const sadmm_hull *hull;      /* of HULL; NULL, the default, for all others. The world keeps its own reference while
                                     it has shapes of it, so the caller may destroy it at once. Read back: the same
                                     pointer */
     const sadmm_mesh *mesh;      /* of MESH; likewise */
-    bool sensor;                 /* has no contacts but reports what overlaps it (events.h); not for a MESH, which has
-                                    no inside; default false */
 } sadmm_shape_def;
 
 /* The defaults named above. Thread-safe. */

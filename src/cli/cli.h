@@ -50,6 +50,8 @@ void cli_print_help(const struct cli_command *command);
 /* Whole strings only, no blanks; a message that names the option and the range. False: CLI_USAGE. */
 bool cli_read_int(const char *option, const char *text, long lo, long hi, long *out);
 bool cli_read_real(const char *option, const char *text, double lo, double hi, double *out);
+/* One of `count` names: its number. */
+bool cli_read_name(const char *option, const char *text, const char *const *names, int count, int *out);
 bool cli_read_backend(const char *option, const char *text, sadmm_backend *out);
 bool cli_read_precision(const char *option, const char *text, sadmm_precision *out);
 bool cli_read_method(const char *option, const char *text, sadmm_method *out);

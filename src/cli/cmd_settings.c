@@ -8,7 +8,7 @@
 #include "cli.h"
 #include "core/base/settings_fields.h"
 
-static const struct sadmm_setting list[SADMM_SETTING_COUNT] = {SADMM_SETTINGS(SADMM_SETTING_ROW, )};
+static const struct sadmm_field *const list = sadmm_settings_table;
 
 /* ---- --set ------------------------------------------------------------------------------------------------------- */
 
@@ -40,21 +40,23 @@ bool cli_read_setting(const char *text, sadmm_settings *settings)
     const char *equals = strchr(text, '=');
     const size_t length = equals ? (size_t)(equals - text) : 0;
     for (int k = 0; equals && k < SADMM_SETTING_COUNT; ++k) {
-        const struct sadmm_setting *s = &list[k];
+        const struct sadmm_field *s = &list[k];
         void *at = (char *)settings + s->offset;
         char name[64];
         long whole;
         if (strlen(s->name) != length || strncmp(s->name, text, length) != 0) continue;
         snprintf(name, sizeof name, "--set %s", s->name);
         switch (s->kind) {
-        case SADMM_SETTING_REAL: return cli_read_real(name, equals + 1, -HUGE_VAL, HUGE_VAL, at);
-        case SADMM_SETTING_VECTOR: return read_vector(s->name, equals + 1, at);
-        case SADMM_SETTING_FLAG: return read_flag(s->name, equals + 1, at);
-        case SADMM_SETTING_METHOD: return cli_read_method(name, equals + 1, at);
-        case SADMM_SETTING_WHOLE:
+        case SADMM_FIELD_REALS:
+            return s->count == 1 ? cli_read_real(name, equals + 1, -HUGE_VAL, HUGE_VAL, at)
+                                 : read_vector(s->name, equals + 1, at);
+        case SADMM_FIELD_FLAG: return read_flag(s->name, equals + 1, at);
+        case SADMM_FIELD_NAMED: return cli_read_name(name, equals + 1, s->names, s->count, at);
+        case SADMM_FIELD_WHOLE:
             if (!cli_read_int(name, equals + 1, INT_MIN, INT_MAX, &whole)) return false;
             *(int *)at = (int)whole;
             return true;
+        default: break; /* no setting is */
         }
     }
     cli_error(CLI_USAGE, "--set '%s': must be NAME=VALUE; subadmm settings lists the names", text);
@@ -75,51 +77,58 @@ static int set_option(void *target, size_t index, const char *value)
     return cli_read_output("--json", value, target) ? CLI_DONE : CLI_USAGE;
 }
 
-static const void *default_of(const sadmm_settings *defaults, const struct sadmm_setting *s)
+static const void *default_of(const sadmm_settings *defaults, const struct sadmm_field *s)
 {
     return (const char *)defaults + s->offset;
 }
 
-static json_t *number_json(const struct sadmm_setting *s, double x)
+static json_t *number_json(const struct sadmm_field *s, double x)
 {
-    return s->kind == SADMM_SETTING_WHOLE || x == floor(x) ? json_integer((json_int_t)x) : json_real(x);
+    return s->kind == SADMM_FIELD_WHOLE || x == floor(x) ? json_integer((json_int_t)x) : json_real(x);
 }
 
-static void put_range(json_t *o, const struct sadmm_setting *s)
+static void put_range(json_t *o, const struct sadmm_field *s)
 {
-    const bool above = s->ends == SADMM_SETTING_ABOVE, below = s->ends == SADMM_SETTING_BELOW;
-    if (s->ends == SADMM_SETTING_ANY) return;
+    const bool above = s->ends == SADMM_ENDS_ABOVE, below = s->ends == SADMM_ENDS_BELOW;
+    if (s->ends == SADMM_ENDS_ANY) return;
     json_object_set_new(o, above ? "exclusiveMinimum" : "minimum", number_json(s, s->lo));
-    if (below || s->ends == SADMM_SETTING_CLOSED)
+    if (below || s->ends == SADMM_ENDS_CLOSED)
         json_object_set_new(o, below ? "exclusiveMaximum" : "maximum", number_json(s, s->hi));
 }
 
-static json_t *setting_json(const struct sadmm_setting *s, const void *value)
+static json_t *setting_json(const struct sadmm_field *s, const void *value)
 {
-    static const char *const types[] = {[SADMM_SETTING_REAL] = "number", [SADMM_SETTING_VECTOR] = "array",
-                                        [SADMM_SETTING_WHOLE] = "integer", [SADMM_SETTING_FLAG] = "boolean"};
     json_t *o = json_object(), *array;
-    if (s->kind == SADMM_SETTING_METHOD) {
-        json_object_set_new(o, "enum", array = json_array());
-        for (int m = 0; m < SADMM_METHOD_COUNT; ++m) json_array_append_new(array, json_string(cli_method_name((sadmm_method)m)));
-        json_object_set_new(o, "default", json_string(cli_method_name(*(const sadmm_method *)value)));
-    } else {
-        json_object_set_new(o, "type", json_string(types[s->kind]));
-    }
     switch (s->kind) {
-    case SADMM_SETTING_REAL: json_object_set_new(o, "default", number_json(s, *(const double *)value)); break;
-    case SADMM_SETTING_VECTOR:
-        json_object_set_new(o, "minItems", json_integer(3));
-        json_object_set_new(o, "maxItems", json_integer(3));
+    case SADMM_FIELD_REALS:
+        if (s->count == 1) {
+            json_object_set_new(o, "type", json_string("number"));
+            json_object_set_new(o, "default", number_json(s, *(const double *)value));
+            break;
+        }
+        json_object_set_new(o, "type", json_string("array"));
+        json_object_set_new(o, "minItems", json_integer(s->count));
+        json_object_set_new(o, "maxItems", json_integer(s->count));
         json_object_set_new(o, "items", array = json_object());
         json_object_set_new(array, "type", json_string("number"));
         json_object_set_new(array, "minimum", number_json(s, s->lo));
         json_object_set_new(array, "maximum", number_json(s, s->hi));
-        json_object_set_new(o, "default", cli_json_reals(value, 3));
+        json_object_set_new(o, "default", cli_json_reals(value, (size_t)s->count));
         break;
-    case SADMM_SETTING_WHOLE: json_object_set_new(o, "default", json_integer(*(const int *)value)); break;
-    case SADMM_SETTING_FLAG: json_object_set_new(o, "default", json_boolean(*(const bool *)value)); break;
-    case SADMM_SETTING_METHOD: break;
+    case SADMM_FIELD_WHOLE:
+        json_object_set_new(o, "type", json_string("integer"));
+        json_object_set_new(o, "default", json_integer(*(const int *)value));
+        break;
+    case SADMM_FIELD_FLAG:
+        json_object_set_new(o, "type", json_string("boolean"));
+        json_object_set_new(o, "default", json_boolean(*(const bool *)value));
+        break;
+    case SADMM_FIELD_NAMED:
+        json_object_set_new(o, "enum", array = json_array());
+        for (int k = 0; k < s->count; ++k) json_array_append_new(array, json_string(s->names[k]));
+        json_object_set_new(o, "default", json_string(s->names[*(const int *)value]));
+        break;
+    default: break; /* no setting is */
     }
     put_range(o, s);
     json_object_set_new(o, "description", json_string(s->text));
@@ -137,29 +146,32 @@ static json_t *settings_json(const sadmm_settings *defaults)
     return root;
 }
 
-static void print_default(const struct sadmm_setting *s, const void *value)
+static void print_default(const struct sadmm_field *s, const void *value)
 {
     const double *x = value;
     char text[64];
     switch (s->kind) {
-    case SADMM_SETTING_REAL: snprintf(text, sizeof text, "%g", *x); break;
-    case SADMM_SETTING_VECTOR: snprintf(text, sizeof text, "%g,%g,%g", x[0], x[1], x[2]); break;
-    case SADMM_SETTING_WHOLE: snprintf(text, sizeof text, "%d", *(const int *)value); break;
-    case SADMM_SETTING_FLAG: snprintf(text, sizeof text, "%s", *(const bool *)value ? "true" : "false"); break;
-    case SADMM_SETTING_METHOD: snprintf(text, sizeof text, "%s", cli_method_name(*(const sadmm_method *)value)); break;
+    case SADMM_FIELD_REALS:
+        if (s->count == 1) snprintf(text, sizeof text, "%g", *x);
+        else snprintf(text, sizeof text, "%g,%g,%g", x[0], x[1], x[2]);
+        break;
+    case SADMM_FIELD_WHOLE: snprintf(text, sizeof text, "%d", *(const int *)value); break;
+    case SADMM_FIELD_FLAG: snprintf(text, sizeof text, "%s", *(const bool *)value ? "true" : "false"); break;
+    case SADMM_FIELD_NAMED: snprintf(text, sizeof text, "%s", s->names[*(const int *)value]); break;
+    default: break; /* no setting is */
     }
     printf("%-31s %-10s ", s->name, text);
 }
 
-static void print_range(const struct sadmm_setting *s)
+static void print_range(const struct sadmm_field *s)
 {
     char text[64] = "";
     switch (s->ends) {
-    case SADMM_SETTING_CLOSED: snprintf(text, sizeof text, "[%g, %.10g]", s->lo, s->hi); break;
-    case SADMM_SETTING_BELOW: snprintf(text, sizeof text, "[%g, %g)", s->lo, s->hi); break;
-    case SADMM_SETTING_FROM: snprintf(text, sizeof text, ">= %g", s->lo); break;
-    case SADMM_SETTING_ABOVE: snprintf(text, sizeof text, "> %g", s->lo); break;
-    case SADMM_SETTING_ANY: break;
+    case SADMM_ENDS_CLOSED: snprintf(text, sizeof text, "[%g, %.10g]", s->lo, s->hi); break;
+    case SADMM_ENDS_BELOW: snprintf(text, sizeof text, "[%g, %g)", s->lo, s->hi); break;
+    case SADMM_ENDS_FROM: snprintf(text, sizeof text, ">= %g", s->lo); break;
+    case SADMM_ENDS_ABOVE: snprintf(text, sizeof text, "> %g", s->lo); break;
+    case SADMM_ENDS_ANY: break;
     }
     printf("%-16s %s\n", text, s->text);
 }

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "cli.h"
-#include "scene_file/fields.h"
+#include "core/base/names.h"
 
 enum { MOST_OPTIONS = 32, HELP_COLUMN = 28, FIRST_VALUE = 1000 /* of an option, for getopt: no character */ };
 
@@ -151,22 +151,14 @@ bool cli_read_output(const char *option, const char *text, const char **out)
     return !before;
 }
 
-static const char *const backend_names[SADMM_BACKEND_COUNT] = {
-    [SADMM_BACKEND_AUTO] = "auto",
-    [SADMM_BACKEND_REF] = "ref",
-    [SADMM_BACKEND_CPU] = "cpu",
-    [SADMM_BACKEND_CUDA] = "cuda",
-};
-static const char *const precision_names[] = {[SADMM_F32] = "f32", [SADMM_F64] = "f64"};
-
 const char *cli_backend_name(sadmm_backend backend)
 {
-    return (unsigned)backend < SADMM_BACKEND_COUNT ? backend_names[backend] : "?";
+    return (unsigned)backend < SADMM_BACKEND_COUNT ? sadmm_backend_names[backend] : "?";
 }
 
 const char *cli_precision_name(sadmm_precision precision)
 {
-    return (unsigned)precision <= SADMM_F64 ? precision_names[precision] : "?";
+    return (unsigned)precision < SADMM_PRECISION_COUNT ? sadmm_precision_names[precision] : "?";
 }
 
 const char *cli_method_name(sadmm_method method)
@@ -174,35 +166,41 @@ const char *cli_method_name(sadmm_method method)
     return (unsigned)method < SADMM_METHOD_COUNT ? sadmm_method_names[method] : "?";
 }
 
-bool cli_read_backend(const char *option, const char *text, sadmm_backend *out)
+bool cli_read_name(const char *option, const char *text, const char *const *names, int count, int *out)
 {
-    for (int k = 0; k < SADMM_BACKEND_COUNT; ++k)
-        if (strcmp(text, backend_names[k]) == 0) {
-            *out = (sadmm_backend)k;
+    char all[160] = "";
+    size_t used = 0;
+    for (int k = 0; k < count; ++k) {
+        if (strcmp(text, names[k]) == 0) {
+            *out = k;
             return true;
         }
-    cli_error(CLI_USAGE, "%s '%s': must be auto, ref, cpu or cuda", option, text);
+        used += (size_t)snprintf(all + used, sizeof all - used, "%s%s", k == 0 ? "" : k < count - 1 ? ", " : " or ", names[k]);
+    }
+    cli_error(CLI_USAGE, "%s '%s': must be %s", option, text, all);
     return false;
+}
+
+bool cli_read_backend(const char *option, const char *text, sadmm_backend *out)
+{
+    int k;
+    if (!cli_read_name(option, text, sadmm_backend_names, SADMM_BACKEND_COUNT, &k)) return false;
+    *out = (sadmm_backend)k;
+    return true;
 }
 
 bool cli_read_precision(const char *option, const char *text, sadmm_precision *out)
 {
-    for (int k = SADMM_F32; k <= SADMM_F64; ++k)
-        if (strcmp(text, precision_names[k]) == 0) {
-            *out = (sadmm_precision)k;
-            return true;
-        }
-    cli_error(CLI_USAGE, "%s '%s': must be f32 or f64", option, text);
-    return false;
+    int k;
+    if (!cli_read_name(option, text, sadmm_precision_names, SADMM_PRECISION_COUNT, &k)) return false;
+    *out = (sadmm_precision)k;
+    return true;
 }
 
 bool cli_read_method(const char *option, const char *text, sadmm_method *out)
 {
-    for (int k = 0; k < SADMM_METHOD_COUNT; ++k)
-        if (strcmp(text, sadmm_method_names[k]) == 0) {
-            *out = (sadmm_method)k;
-            return true;
-        }
-    cli_error(CLI_USAGE, "%s '%s': must be paper or fast", option, text);
-    return false;
+    int k;
+    if (!cli_read_name(option, text, sadmm_method_names, SADMM_METHOD_COUNT, &k)) return false;
+    *out = (sadmm_method)k;
+    return true;
 }

@@ -180,31 +180,33 @@ static sadmm_status read_field(const struct sadmm_reader *r, const struct sadmm_
     uint32_t bits;
     bool flag;
     switch (field->kind) {
-    case FIELD_REALS:
+    case SADMM_FIELD_REALS:
+    case SADMM_FIELD_TURN:
         if (field->count == 1) return sadmm_read_real(r, field->name, value, (double *)at);
         return sadmm_read_reals(r, field->name, value, (double *)at, (size_t)field->count);
-    case FIELD_OR_INFINITY:
-    case FIELD_OR_NAN:
+    case SADMM_FIELD_BOUND:
+    case SADMM_FIELD_MEASURED:
         if (!json_is_null(value)) return sadmm_read_real(r, field->name, value, (double *)at);
-        *(double *)at = field->kind == FIELD_OR_NAN ? (double)NAN : (double)INFINITY;
+        *(double *)at = field->kind == SADMM_FIELD_MEASURED ? (double)NAN : (double)INFINITY;
         return SADMM_OK;
-    case FIELD_BOOL:
+    case SADMM_FIELD_FLAG:
         if (!json_is_boolean(value)) return sadmm_refuse_value(r, field->name, "true or false", value);
         flag = json_is_true(value);
         memcpy(at, &flag, sizeof flag);
         return SADMM_OK;
-    case FIELD_INT32:
+    case SADMM_FIELD_WHOLE:
         TRY(sadmm_read_whole(r, field->name, value, INT32_MIN, INT32_MAX, &number));
         whole = (int32_t)number;
         memcpy(at, &whole, sizeof whole);
         return SADMM_OK;
-    case FIELD_UINT32:
+    case SADMM_FIELD_BITS:
         TRY(sadmm_read_whole(r, field->name, value, 0, UINT32_MAX, &number));
         bits = (uint32_t)number;
         memcpy(at, &bits, sizeof bits);
         return SADMM_OK;
-    case FIELD_NAME: return read_name(r, field, value, at);
-    case FIELD_OTHER: break;
+    case SADMM_FIELD_NAMED: return read_name(r, field, value, at);
+    case SADMM_FIELD_ID:
+    case SADMM_FIELD_OTHER: break;
     }
     return SADMM_OK;
 }
@@ -225,7 +227,7 @@ sadmm_status sadmm_read_some(const struct sadmm_reader *r, const json_t *object,
 {
     for (size_t k = 0; k < fields->count; ++k) {
         const json_t *value = json_object_get(object, fields->list[k].name);
-        if (value && fields->list[k].kind != FIELD_OTHER) TRY(read_field(r, &fields->list[k], value, into));
+        if (value && fields->list[k].kind != SADMM_FIELD_OTHER) TRY(read_field(r, &fields->list[k], value, into));
     }
     return SADMM_OK;
 }

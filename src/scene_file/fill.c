@@ -79,7 +79,7 @@ static sadmm_status read_dynamic(const struct sadmm_filler *f, const json_t *obj
     for (size_t k = 0; k < fields->count; ++k)
         if (is_given(object, fields->list[k].name))
             return sadmm_refuse(&f->reader, fields->list[k].name, "must be null or left out, for the body is %s",
-                                type == SADMM_BODY_STATIC ? "static" : "kinematic");
+                                sadmm_body_type_names[type]);
     return SADMM_OK;
 }
 
@@ -125,7 +125,7 @@ static sadmm_status read_move(struct sadmm_filler *f, const json_t *object, sadm
     if (!is_given(object, "move")) return SADMM_OK;
     if (type != SADMM_BODY_KINEMATIC)
         return sadmm_refuse(&f->reader, "move", "must be null or left out, for the body is %s",
-                            type == SADMM_BODY_STATIC ? "static" : "dynamic");
+                            sadmm_body_type_names[type]);
     const size_t before = sadmm_enter(&f->reader, "move");
     TRY(sadmm_read_fields(&f->reader, json_object_get(object, "move"), &sadmm_move_fields, &target));
     TRY(sadmm_refuse_world(f, sadmm_world_move_body(f->world, id, target.position, target.orientation), "."));
@@ -225,14 +225,14 @@ static sadmm_status read_form(const struct sadmm_filler *f, const json_t *object
         def->hull = f->hulls[number];
     } else if (json_object_get(object, "hull")) {
         return sadmm_refuse(&f->reader, "hull", "must be left out, for the shape is a %s",
-                            sadmm_shape_names[def->type]);
+                            sadmm_shape_type_names[def->type]);
     }
     if (def->type == SADMM_SHAPE_MESH) {
         TRY(sadmm_read_number_in(f, object, "mesh", f->mesh_count, &number));
         def->mesh = f->meshes[number];
     } else if (json_object_get(object, "mesh")) {
         return sadmm_refuse(&f->reader, "mesh", "must be left out, for the shape is a %s",
-                            sadmm_shape_names[def->type]);
+                            sadmm_shape_type_names[def->type]);
     }
     return SADMM_OK;
 }
@@ -242,7 +242,7 @@ static sadmm_status read_shape(struct sadmm_filler *f, const json_t *object, siz
     sadmm_shape_def def = sadmm_shape_def_default();
     TRY(sadmm_read_fields(&f->reader, object, &sadmm_shape_fields, &def));
     if (!json_object_get(object, "type")) return sadmm_refuse(&f->reader, "type", "is missing");
-    const size_t sizes = sadmm_shape_sizes(def.type);
+    const size_t sizes = (size_t)sadmm_shape_sizes[def.type];
     const json_t *size = json_object_get(object, "size");
     if (sizes > 0 && !size)
         return sadmm_refuse(&f->reader, "size", "is missing, %zu number%s", sizes, sizes > 1 ? "s" : "");

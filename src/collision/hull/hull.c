@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "core/base/check.h"
+#include "core/base/definition_fields.h"
 #include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "core/math/quat.h"
@@ -29,7 +30,7 @@ enum { MANY_POINTS = 1 << 15 };
 static const double thinnest = 1e-6;    /* of the extent, and m */
 static const double straightest = 1e-9; /* of the extent: no contact feels what bends less */
 
-static const sadmm_hull_def defaults = {.merge = 1e-6};
+static const sadmm_hull_def defaults = {SADMM_HULL_FIELDS(SADMM_FIELD_DEFAULT, )};
 static const struct sadmm_growing growing = SADMM_GROWING(sadmm_hull_def, &defaults, convex_radius);
 
 void sadmm_hull_def_init(sadmm_hull_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
@@ -328,8 +329,7 @@ sadmm_status sadmm_hull_create(const sadmm_hull_def *given, sadmm_hull **out)
     if (def->point_count < LEAST_POINTS || def->point_count > MOST_POINTS)
         return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->point_count = %zu: must be in [%d, %d]",
                           def->point_count, LEAST_POINTS, MOST_POINTS);
-    TRY(sadmm_check_range("def->merge", def->merge, 0, 1e-2, NULL));
-    TRY(sadmm_check_range("def->convex_radius", def->convex_radius, 0, 1e6, NULL));
+    TRY(sadmm_fields_check(sadmm_hull_table, SADMM_HULL_FIELDS_COUNT, def, "def->", NULL));
     TRY(sadmm_check_vector("def->points", def->points, 3 * (int)def->point_count, 1e6, NULL));
     return make(def, out);
 }

@@ -7,24 +7,6 @@
 
 /* Every switch over the types names them all and has no default: the compiler says where a new one is missing. */
 
-/* Entries of `size` that the type uses. */
-SADMM_INLINE int geometry_sizes(int type)
-{
-    switch ((sadmm_shape_type)type) {
-    case SADMM_SHAPE_SPHERE: return 1;
-    case SADMM_SHAPE_CAPSULE:
-    case SADMM_SHAPE_CYLINDER:
-    case SADMM_SHAPE_CONE: return 2;
-    case SADMM_SHAPE_BOX:
-    case SADMM_SHAPE_ELLIPSOID: return 3;
-    case SADMM_SHAPE_HULL: /* the box around it comes with the hull */
-    case SADMM_SHAPE_MESH:
-    case SADMM_SHAPE_PLANE:
-    case SADMM_SHAPE_TYPE_COUNT: break;
-    }
-    return 0;
-}
-
 /* The order of the two shapes of a pair: by this, of equal ones by slot. As types are numbered, but for meshes, which are
  * what their triangles' other shapes are seen from: they come last. */
 SADMM_INLINE int geometry_rank(int type) { return type == SADMM_SHAPE_MESH ? (int)SADMM_SHAPE_TYPE_COUNT : type; }

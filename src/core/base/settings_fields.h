@@ -1,26 +1,14 @@
-/* The fields of sadmm_settings, once: defaults, ranges and their messages, what is compared, saved and restored, read from
- * and written to scene files, listed and set by the command, and Python's properties are made of this list. What a field
- * means in full is said in subadmm/settings.h; the text here is one line of it.
- *
- * F(X, kind, role, name, value, lo, hi, ends, text), X passed through:
- *   kind   REAL (double), VECTOR (double[3]), WHOLE (int), FLAG (bool), METHOD (sadmm_method)
- *   role   NUMBER: data of formulas, may change from step to step without another plan; PLAN: what a step consists of
- *   ends   CLOSED: in [lo, hi]; BELOW: in [lo, hi); FROM: finite, >= lo; ABOVE: finite, > lo; ANY: any value, or a rule of
- *          its own in sadmm_settings_validate
- */
+/* The members of sadmm_settings, once (fields.h). */
 #ifndef SADMM_CORE_BASE_SETTINGS_FIELDS_H
 #define SADMM_CORE_BASE_SETTINGS_FIELDS_H
 
-#include <stddef.h>
-
+#include "fields.h"
 #include "subadmm/settings.h"
-
-#define SADMM_THREE(x, y, z) {x, y, z}
 
 #define SADMM_SETTINGS(F, X)                                                                                            \
     F(X, REAL, NUMBER, dt, 0.005, 1e-6, 1, CLOSED, "Time step, s.")                                                     \
     F(X, WHOLE, PLAN, substeps, 1, 1, 64, CLOSED, "Sub-steps of a step, which share its iterations.")                   \
-    F(X, VECTOR, NUMBER, gravity, SADMM_THREE(0, 0, -9.81), -1e6, 1e6, ANY, "m/s^2, world frame; norm <= 1e6.")                      \
+    F(X, VECTOR, NUMBER, gravity, SADMM_NUMBERS(0, 0, -9.81), -1e6, 1e6, ANY, "m/s^2, world frame; norm <= 1e6.")                      \
     F(X, METHOD, PLAN, method, SADMM_METHOD_FAST, 0, 1, ANY, "'fast' or 'paper'.")                                      \
     F(X, WHOLE, PLAN, iterations, 20, 1, 1000000, CLOSED, "Iterations a step.")                                         \
     F(X, REAL, NUMBER, relaxation, 1.8, 1, 2, BELOW, "Over-relaxation of 'fast'.")                                      \
@@ -50,40 +38,16 @@
       "Hits of a body in flight that are taken at their moments, at most, a (sub-)step; 0: the solve has all.")         \
     F(X, WHOLE, PLAN, threads, 0, 0, 1024, CLOSED, "CPU threads at most; 0: no bound. Results do not depend on it.")
 
-/* The defaults, as an initialiser. */
-#define SADMM_SETTING_DEFAULT(X, kind, role, name, value, ...) .name = value,
-#define SADMM_DEFAULT_SETTINGS {SADMM_SETTINGS(SADMM_SETTING_DEFAULT, )}
+#define SADMM_DEFAULT_SETTINGS {SADMM_SETTINGS(SADMM_FIELD_DEFAULT, )}
 
-/* ---- as a table -------------------------------------------------------------------------------------------------- */
-
-enum sadmm_setting_kind {
-    SADMM_SETTING_REAL,
-    SADMM_SETTING_VECTOR,
-    SADMM_SETTING_WHOLE,
-    SADMM_SETTING_FLAG,
-    SADMM_SETTING_METHOD
-};
-enum sadmm_setting_ends {
-    SADMM_SETTING_ANY,
-    SADMM_SETTING_CLOSED,
-    SADMM_SETTING_BELOW,
-    SADMM_SETTING_FROM,
-    SADMM_SETTING_ABOVE
-};
-
-struct sadmm_setting {
-    const char *name;
-    enum sadmm_setting_kind kind;
-    size_t offset; /* in sadmm_settings */
-    double lo, hi;
-    enum sadmm_setting_ends ends;
-    const char *text;
-};
-
-#define SADMM_SETTING_ROW(X, kind, role, name, value, lo, hi, ends, text) \
-    {#name, SADMM_SETTING_##kind, offsetof(sadmm_settings, name), lo, hi, SADMM_SETTING_##ends, text},
-#define SADMM_COUNT_SETTING(X, ...) +1
-enum { SADMM_SETTING_COUNT = 0 SADMM_SETTINGS(SADMM_COUNT_SETTING, ) };
+enum { SADMM_SETTING_COUNT = 0 SADMM_SETTINGS(SADMM_FIELD_ONE, ) };
+#ifdef __cplusplus
+extern "C" {
+#endif
+extern const struct sadmm_field sadmm_settings_table[SADMM_SETTING_COUNT];
+#ifdef __cplusplus
+}
+#endif
 
 /* ---- numbers ----------------------------------------------------------------------------------------------------- */
 

@@ -3,21 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#define ROW_MEMBER(X, kind, role, name, ...) ROW_ZERO_##kind
-#define ROW_ZERO_REAL 0,
-#define ROW_ZERO_WHOLE 0,
-#define ROW_ZERO_FLAG 0,
-#define ROW_ZERO_METHOD 0,
-#define ROW_ZERO_VECTOR {0, 0, 0},
-
-/* A struct with too few initialisers is an error here: no member can be left out of the list. */
-#pragma GCC diagnostic push
-#pragma GCC diagnostic error "-Wmissing-field-initializers"
-_Static_assert(sizeof((sadmm_settings){0, SADMM_SETTINGS(ROW_MEMBER, )}) == sizeof(sadmm_settings), "every member is listed");
-#pragma GCC diagnostic pop
-
-static const struct sadmm_setting list[SADMM_SETTING_COUNT] = {SADMM_SETTINGS(SADMM_SETTING_ROW, )};
-
 static const sadmm_settings defaults = SADMM_DEFAULT_SETTINGS;
 const struct sadmm_growing sadmm_growing_settings = SADMM_GROWING(sadmm_settings, &defaults, threads);
 
@@ -34,46 +19,15 @@ sadmm_status sadmm_settings_take(sadmm_settings *settings, const sadmm_settings 
 
 /* ---- ranges ------------------------------------------------------------------------------------------------------ */
 
-/* Comparisons are written so that NaN fails them. */
-static bool in_range(const struct sadmm_setting *of, double x)
-{
-    switch (of->ends) {
-    case SADMM_SETTING_CLOSED: return x >= of->lo && x <= of->hi;
-    case SADMM_SETTING_BELOW: return x >= of->lo && x < of->hi;
-    case SADMM_SETTING_FROM: return x >= of->lo && x < INFINITY;
-    case SADMM_SETTING_ABOVE: return x > of->lo && x < INFINITY;
-    case SADMM_SETTING_ANY: break;
-    }
-    return true;
-}
-
-static sadmm_status check(const struct sadmm_setting *of, double x, struct sadmm_error *error)
-{
-    const bool to_hi = of->ends == SADMM_SETTING_CLOSED || of->ends == SADMM_SETTING_BELOW;
-    if (in_range(of, x)) return SADMM_OK;
-    if (to_hi)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %.10g: must be in [%.10g, %.10g%c", of->name,
-                          x, of->lo, of->hi, of->ends == SADMM_SETTING_BELOW ? ')' : ']');
-    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %.10g: must be finite and %s %.10g", of->name, x,
-                      of->ends == SADMM_SETTING_ABOVE ? ">" : ">=", of->lo);
-}
-
 _Static_assert((int)SADMM_MOST_SUBSTEPS == 64 && (int)SADMM_MOST_NCP_POINTS == 128 && (int)SADMM_MOST_HITS == 64,
                "ranges are as in the list");
 
 sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadmm_error *error)
 {
-    for (int i = 0; i < SADMM_SETTING_COUNT; ++i) {
-        const char *at = (const char *)s + list[i].offset;
-        if (list[i].kind == SADMM_SETTING_REAL) TRY(check(&list[i], *(const double *)(const void *)at, error));
-        if (list[i].kind == SADMM_SETTING_WHOLE) TRY(check(&list[i], *(const int *)(const void *)at, error));
-    }
+    TRY(sadmm_fields_check(sadmm_settings_table, SADMM_SETTING_COUNT, s, "settings.", error));
     if (s->dt < 1e-6 * s->substeps)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "settings.dt / settings.substeps = %g / %d: must be >= 1e-06", s->dt, s->substeps);
-    if ((int)s->method < 0 || s->method >= SADMM_METHOD_COUNT)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.method = %d: must be in [0, %d]",
-                          (int)s->method, SADMM_METHOD_COUNT - 1);
     if (!(s->penalty_mass_factor > 0) && !(s->penalty_offset > 0))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "settings.penalty_mass_factor = 0 and settings.penalty_offset = 0: one must be > 0");

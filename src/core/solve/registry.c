@@ -6,25 +6,24 @@
 #include "config.h"
 #include "core/base/check.h"
 #include "core/base/growing.h"
+#include "core/base/names.h"
 
 /* The one list: a backend is registered by adding its line here (backends.h declares the functions). */
-static const struct {
-    const char *name;
-    const struct sadmm_kernels *(*find)(sadmm_precision precision, const char **reason);
-} backends[SADMM_BACKEND_COUNT] = {
-    [SADMM_BACKEND_REF] = {"ref", sadmm_ref_find},
-    [SADMM_BACKEND_CPU] = {"cpu", sadmm_cpu_find},
-    [SADMM_BACKEND_CUDA] = {"cuda", sadmm_cuda_find},
+static const struct sadmm_kernels *(*const finders[SADMM_BACKEND_COUNT])(sadmm_precision precision,
+                                                                         const char **reason) = {
+    [SADMM_BACKEND_REF] = sadmm_ref_find,
+    [SADMM_BACKEND_CPU] = sadmm_cpu_find,
+    [SADMM_BACKEND_CUDA] = sadmm_cuda_find,
 };
 
 const struct sadmm_kernels *sadmm_kernels_find(sadmm_backend backend, sadmm_precision precision, const char **reason)
 {
     const char *unused;
-    if ((unsigned)backend >= SADMM_BACKEND_COUNT || !backends[backend].find || (unsigned)precision > SADMM_F64) {
+    if ((unsigned)backend >= SADMM_BACKEND_COUNT || !finders[backend] || (unsigned)precision > SADMM_F64) {
         if (reason) *reason = "no such backend or precision";
         return NULL;
     }
-    return backends[backend].find(precision, reason ? reason : &unused);
+    return finders[backend](precision, reason ? reason : &unused);
 }
 
 const struct sadmm_kernels *sadmm_kernels_at(size_t index)
@@ -45,7 +44,7 @@ sadmm_status sadmm_backend_query_sized(sadmm_backend backend, sadmm_backend_info
     if (backend < SADMM_BACKEND_REF || backend >= SADMM_BACKEND_COUNT)
         return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "backend = %d: must be in [%d, %d]", (int)backend,
                           SADMM_BACKEND_REF, SADMM_BACKEND_COUNT - 1);
-    info.name = backends[backend].name;
+    info.name = sadmm_backend_names[backend];
     /* An unavailable precision explains itself; else the f32 line says what it runs on. */
     const char *reasons[2] = {"", ""};
     for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision)
@@ -73,8 +72,8 @@ sadmm_status sadmm_backend_choose(sadmm_backend wanted, sadmm_precision precisio
         *out = sadmm_kernels_find(wanted, precision, &reason);
         if (!*out)
             return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "backend %s in %s is not available: %s",
-                              backends[wanted].name, precision == SADMM_F32 ? "f32" : "f64", reason);
-        if (why) snprintf(why, why_size, "%s (%s), as asked", backends[wanted].name, (*out)->variant);
+                              sadmm_backend_names[wanted], sadmm_precision_names[precision], reason);
+        if (why) snprintf(why, why_size, "%s (%s), as asked", sadmm_backend_names[wanted], (*out)->variant);
         return SADMM_OK;
     }
     const struct sadmm_kernels *cuda = sadmm_kernels_find(SADMM_BACKEND_CUDA, precision, &reason);

@@ -82,7 +82,7 @@ static sadmm_status check_none(const sadmm_world *world, size_t slot, const doub
     for (int k = 0; k < count; ++k)
         if (!(row[k] == 0))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "column %d = %g: must be 0, for the body is %s", k,
-                              row[k], world->bodies[slot].type == SADMM_BODY_STATIC ? "static" : "kinematic");
+                              row[k], sadmm_body_type_names[world->bodies[slot].type]);
     return SADMM_OK;
 }
 

@@ -10,18 +10,14 @@
 #include "core/model/extrapolation.h"
 #include "world/state/world_internal.h"
 
-static const double POSITION_LIMIT = 1e9, VELOCITY_LIMIT = 1e6, WRENCH_LIMIT = 1e15;
+static const double WRENCH_LIMIT = 1e15;
 /* Of a state that is set: whatever a step can make. */
 static const double ANY = HUGE_VAL;
 
-static const sadmm_body_def defaults = {.type = SADMM_BODY_DYNAMIC, .orientation = {1, 0, 0, 0}, .gravity_scale = 1};
+static const sadmm_body_def defaults = {SADMM_BODY_FIELDS(SADMM_FIELD_DEFAULT, )};
 static const struct sadmm_growing growing = SADMM_GROWING(sadmm_body_def, &defaults, angular_damping);
 
 void sadmm_body_def_init(sadmm_body_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
-
-/* The moments of all solids within the ranges of mass and size are 4e-22 (a ball of 1e-9 kg, 1e-6 m) to 7e23 kg m^2; an
- * arm of 1e6 m on the smallest, 1e12 / 1e-24, is still a number in single precision. */
-static const double INERTIA_MIN = 1e-24, INERTIA_MAX = 1e24;
 
 /* World-frame moments are sums of all three, so that the smallest is known to (unit roundoff x ratio): it and the
  * velocity about its axis are lost to 1 % at these ratios, wholly at some 100 times these. */
@@ -56,10 +52,11 @@ sadmm_status sadmm_world_check_inertias(sadmm_world *world, sadmm_precision prec
 static sadmm_status check_inertia(const char *name, const double inertia[3], sadmm_precision precision,
                                   struct sadmm_error *error)
 {
+    const struct sadmm_field *const range = SADMM_BODY_FIELD(inertia);
     for (int k = 0; k < 3; ++k)
-        if (!(inertia[k] >= INERTIA_MIN && inertia[k] <= INERTIA_MAX))
+        if (!(inertia[k] >= range->lo && inertia[k] <= range->hi))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be in [%g, %g] kg m^2", name, k,
-                              inertia[k], INERTIA_MIN, INERTIA_MAX);
+                              inertia[k], range->lo, range->hi);
     for (int k = 0; k < 3; ++k) {
         double others = inertia[(k + 1) % 3] + inertia[(k + 2) % 3];
         if (!(inertia[k] <= others * (1 + 1e-9)))
@@ -70,10 +67,8 @@ static sadmm_status check_inertia(const char *name, const double inertia[3], sad
     return check_inertia_ratio(name, inertia, precision, error);
 }
 
-static const double MASS_MIN = 1e-9, MASS_MAX = 1e12, GRAVITY_SCALE_MAX = 1e6, DAMPING_MAX = 1e6;
-
 static sadmm_status check_motion(const char *linear_name, const char *angular_name, const double linear[3],
-                                 const double angular[3], sadmm_body_type type, double limit, struct sadmm_error *error)
+                                 const double angular[3], sadmm_body_type type, struct sadmm_error *error)
 {
     for (int k = 0; k < 6 && type == SADMM_BODY_STATIC; ++k) {
         double x = k < 3 ? linear[k] : angular[k - 3];
@@ -81,31 +76,22 @@ static sadmm_status check_motion(const char *linear_name, const char *angular_na
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be 0, for the body is static",
                               k < 3 ? linear_name : angular_name, k % 3, x);
     }
-    TRY(sadmm_check_vector(linear_name, linear, 3, limit, error));
-    return sadmm_check_vector(angular_name, angular, 3, limit, error);
+    TRY(sadmm_check_vector(linear_name, linear, 3, ANY, error));
+    return sadmm_check_vector(angular_name, angular, 3, ANY, error);
 }
 
 static sadmm_status check_def(const sadmm_body_def *def, sadmm_precision precision, double orientation[4],
                               struct sadmm_error *error)
 {
-    if (def->type != SADMM_BODY_DYNAMIC && def->type != SADMM_BODY_STATIC && def->type != SADMM_BODY_KINEMATIC)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->type = %d: must be SADMM_BODY_DYNAMIC, _STATIC or _KINEMATIC", (int)def->type);
-    if (def->type == SADMM_BODY_DYNAMIC) {
-        TRY(sadmm_check_range("def->mass", def->mass, MASS_MIN, MASS_MAX, error));
-        TRY(check_inertia("def->inertia", def->inertia, precision, error));
-        TRY(sadmm_check_range("def->gravity_scale", def->gravity_scale, -GRAVITY_SCALE_MAX, GRAVITY_SCALE_MAX, error));
-        TRY(sadmm_check_range("def->linear_damping", def->linear_damping, 0, DAMPING_MAX, error));
-        TRY(sadmm_check_range("def->angular_damping", def->angular_damping, 0, DAMPING_MAX, error));
-    }
-    TRY(sadmm_check_vector("def->position", def->position, 3, POSITION_LIMIT, error));
+    for (int k = 0; k < SADMM_BODY_FIELDS_COUNT; ++k)
+        if (def->type == SADMM_BODY_DYNAMIC || sadmm_body_table[k].role != SADMM_IS_DYNAMIC)
+            TRY(sadmm_field_check(&sadmm_body_table[k], def, "def->", error));
+    if (def->type == SADMM_BODY_DYNAMIC) TRY(check_inertia("def->inertia", def->inertia, precision, error));
     TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
     TRY(check_motion("def->linear_velocity", "def->angular_velocity", def->linear_velocity, def->angular_velocity,
-                     def->type, VELOCITY_LIMIT, error));
-    int32_t lowest = def->type == SADMM_BODY_DYNAMIC ? 0 : -1;
-    if (def->environment < lowest)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->environment = %d: must be >= %d", def->environment,
-                          lowest);
+                     def->type, error));
+    if (def->type == SADMM_BODY_DYNAMIC && def->environment < 0)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->environment = %d: must be >= 0", def->environment);
     return SADMM_OK;
 }
 
@@ -255,7 +241,7 @@ sadmm_status sadmm_world_check_body_state(const struct sadmm_world_body *body, c
     TRY(sadmm_check_orientation("state->orientation", state->orientation, orientation, error));
     keep_if_unit(state->orientation, orientation);
     return check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity,
-                        state->angular_velocity, body->type, ANY, error);
+                        state->angular_velocity, body->type, error);
 }
 
 sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state)
@@ -293,7 +279,7 @@ sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id id, const d
     if (body->type != SADMM_BODY_KINEMATIC)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id = (slot %u, generation %u): must be kinematic",
                           id.slot, id.generation);
-    TRY(sadmm_check_vector("position", position, 3, POSITION_LIMIT, error));
+    TRY(sadmm_numbers_check(SADMM_BODY_FIELD(position), position, "position", error));
     TRY(sadmm_check_orientation("orientation", orientation, unit, error));
     keep_if_unit(orientation, unit);
     memcpy(body->target.position, position, sizeof body->target.position);
@@ -350,7 +336,7 @@ static sadmm_status check_dynamic(const struct sadmm_world_body *body, sadmm_bod
     if (body->type == SADMM_BODY_DYNAMIC) return SADMM_OK;
     return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                       "id = (slot %u, generation %u): is %s, and must be dynamic: %s", id.slot, id.generation,
-                      body->type == SADMM_BODY_STATIC ? "static" : "kinematic", why);
+                      sadmm_body_type_names[body->type], why);
 }
 
 sadmm_status sadmm_world_check_wrench(const double force[3], const double torque[3], struct sadmm_error *error)
@@ -398,7 +384,7 @@ sadmm_status sadmm_world_set_body_gravity_scale(sadmm_world *world, sadmm_body_i
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(check_dynamic(body, id, "gravity does not move it", error));
-    TRY(sadmm_check_range("scale", scale, -GRAVITY_SCALE_MAX, GRAVITY_SCALE_MAX, error));
+    TRY(sadmm_numbers_check(SADMM_BODY_FIELD(gravity_scale), &scale, "scale", error));
     if (body->system_body < 0) TRY(sadmm_world_detach(world));
     body->rigid.gravity_scale = scale;
     sadmm_world_update(world, body, SADMM_UPDATE_FORCES);
@@ -412,8 +398,8 @@ sadmm_status sadmm_world_set_body_damping(sadmm_world *world, sadmm_body_id id, 
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(check_dynamic(body, id, "it has no motion to damp", error));
-    TRY(sadmm_check_range("linear", linear, 0, DAMPING_MAX, error));
-    TRY(sadmm_check_range("angular", angular, 0, DAMPING_MAX, error));
+    TRY(sadmm_numbers_check(SADMM_BODY_FIELD(linear_damping), &linear, "linear", error));
+    TRY(sadmm_numbers_check(SADMM_BODY_FIELD(angular_damping), &angular, "angular", error));
     if (body->system_body < 0) TRY(sadmm_world_detach(world));
     body->rigid.damping[0] = linear;
     body->rigid.damping[1] = angular;
@@ -439,7 +425,7 @@ sadmm_status sadmm_world_add_body_force_at(sadmm_world *world, sadmm_body_id id,
     TRY(sadmm_check_given(force, "force", error));
     TRY(sadmm_check_given(point, "point", error));
     TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
-    TRY(sadmm_check_vector("point", point, 3, POSITION_LIMIT, error));
+    TRY(sadmm_numbers_check(SADMM_BODY_FIELD(position), point, "point", error));
     TRY(sadmm_world_download_bodies(world));
     moment_of(&body->rigid, force, point, sum + 3);
     for (int k = 0; k < 6; ++k) sum[k] = body->rigid.wrench[k] + (k < 3 ? force[k] : sum[k]);
@@ -459,7 +445,7 @@ sadmm_status sadmm_world_apply_body_impulse_at(sadmm_world *world, sadmm_body_id
     TRY(sadmm_check_given(point, "point", error));
     TRY(check_dynamic(body, id, "no impulse moves it", error));
     TRY(sadmm_check_vector("impulse", impulse, 3, ANY, error));
-    TRY(sadmm_check_vector("point", point, 3, POSITION_LIMIT, error));
+    TRY(sadmm_numbers_check(SADMM_BODY_FIELD(position), point, "point", error));
     TRY(sadmm_world_body_state(world, id, &state));
     moment_of(&body->rigid, impulse, point, moment);
     const double *I = body->rigid.inertia;
@@ -473,7 +459,7 @@ sadmm_status sadmm_world_apply_body_impulse_at(sadmm_world *world, sadmm_body_id
 sadmm_status sadmm_world_check_mass(const sadmm_world *world, double mass, const double inertia[3],
                                     struct sadmm_error *error)
 {
-    TRY(sadmm_check_range("mass", mass, MASS_MIN, MASS_MAX, error));
+    TRY(sadmm_numbers_check(SADMM_BODY_FIELD(mass), &mass, "mass", error));
     return check_inertia("inertia", inertia, world->def.precision, error);
 }
 

@@ -9,85 +9,52 @@
 #include "core/math/rigid.h"
 #include "world/state/world_internal.h"
 
-static const double FRAME_LIMIT = 1e9, GAIN_LIMIT = 1e15;
-
-static const sadmm_coupling_def defaults = {.orientation = {1, 0, 0, 0},
-                                            .target_orientation = {1, 0, 0, 0},
-                                            .max_force = INFINITY,
-                                            .max_torque = INFINITY,
-                                            .enabled = true};
+static const sadmm_coupling_def defaults = {SADMM_COUPLING_FIELDS(SADMM_FIELD_DEFAULT, )};
 static const struct sadmm_growing growing = SADMM_GROWING(sadmm_coupling_def, &defaults, enabled);
 
 void sadmm_coupling_def_init(sadmm_coupling_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
 
 /* ---- checks ------------------------------------------------------------------------------------------------------ */
 
-/* prefix: what stands before the fields' names, "def->" say. */
-static sadmm_status check_numbers(const char *prefix, const sadmm_coupling_def *def, struct sadmm_error *error)
+sadmm_status sadmm_world_check_coupling(const sadmm_coupling_def *def, struct sadmm_error *error)
 {
-    const struct {
-        const char *field;
-        double value, most;
-    } numbers[] = {
-        {"linear_stiffness", def->linear_stiffness, GAIN_LIMIT},
-        {"linear_damping", def->linear_damping, GAIN_LIMIT},
-        {"angular_stiffness", def->angular_stiffness, GAIN_LIMIT},
-        {"angular_damping", def->angular_damping, GAIN_LIMIT},
-        {"max_force", def->max_force, INFINITY},
-        {"max_torque", def->max_torque, INFINITY},
-    };
-    for (size_t k = 0; k < sizeof numbers / sizeof *numbers; ++k)
-        if (!(numbers[k].value >= 0 && numbers[k].value <= numbers[k].most))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s = %g: must be in [0, %g]", prefix,
-                              numbers[k].field, numbers[k].value, numbers[k].most);
-    return SADMM_OK;
+    return sadmm_fields_check(sadmm_coupling_table, SADMM_COUPLING_FIELDS_COUNT, def, "def->", error);
 }
 
-/* names: of the three. */
-static sadmm_status check_target(const char *const names[3], const double position[3], const double orientation[4],
-                                 const double velocity[6], struct sadmm_rigid *target, struct sadmm_error *error)
+/* Gains and limits, under their own names. */
+static sadmm_status check_numbers(const sadmm_coupling_def *def, struct sadmm_error *error)
 {
-    TRY(sadmm_check_vector(names[0], position, 3, FRAME_LIMIT, error));
-    if (velocity) TRY(sadmm_check_vector(names[2], velocity, 6, FRAME_LIMIT, error));
-    TRY(sadmm_check_orientation(names[1], orientation, target->orientation, error));
+    const size_t count = SADMM_COUPLING_PLACE_max_torque - SADMM_COUPLING_PLACE_linear_stiffness + 1;
+    return sadmm_fields_check(SADMM_COUPLING_FIELD(linear_stiffness), count, def, "", error);
+}
+
+sadmm_status sadmm_world_check_target(const double position[3], const double orientation[4], const double velocity[6],
+                                      struct sadmm_rigid *target, struct sadmm_error *error)
+{
+    TRY(sadmm_numbers_check(SADMM_COUPLING_FIELD(target_position), position, "position", error));
+    if (velocity) TRY(sadmm_numbers_check(SADMM_COUPLING_FIELD(target_velocity), velocity, "velocity", error));
+    TRY(sadmm_check_orientation("orientation", orientation, target->orientation, error));
     memcpy(target->position, position, sizeof target->position);
     if (velocity) memcpy(target->velocity, velocity, sizeof target->velocity);
     else memset(target->velocity, 0, sizeof target->velocity);
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_check_coupling(const sadmm_coupling_def *def, struct sadmm_error *error)
-{
-    double ignored[4];
-    TRY(sadmm_check_vector("def->position", def->position, 3, FRAME_LIMIT, error));
-    TRY(sadmm_check_orientation("def->orientation", def->orientation, ignored, error));
-    return check_numbers("def->", def, error);
-}
-
-sadmm_status sadmm_world_check_target(const double position[3], const double orientation[4], const double velocity[6],
-                                      struct sadmm_rigid *target, struct sadmm_error *error)
-{
-    static const char *const names[] = {"position", "orientation", "velocity"};
-    return check_target(names, position, orientation, velocity, target, error);
-}
-
 static sadmm_status check_def(const sadmm_world *world, const sadmm_coupling_def *def, struct joint_frame *frame,
                               struct sadmm_rigid *target, struct sadmm_error *error)
 {
-    static const char *const names[] = {"def->target_position", "def->target_orientation", "def->target_velocity"};
     const struct sadmm_world_body *body = sadmm_world_find_body(world, def->body, "def->body", error);
     double unit[4];
     if (!body) return SADMM_ERROR_STALE_ID;
     if (body->type != SADMM_BODY_DYNAMIC)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "def->body = (slot %u, generation %u): must be dynamic, it is %s", def->body.slot,
-                          def->body.generation, body->type == SADMM_BODY_STATIC ? "static" : "kinematic");
-    TRY(sadmm_check_vector("def->position", def->position, 3, FRAME_LIMIT, error));
+                          def->body.generation, sadmm_body_type_names[body->type]);
+    TRY(sadmm_world_check_coupling(def, error));
     TRY(sadmm_check_orientation("def->orientation", def->orientation, unit, error));
     frame->position = v3_load(def->position);
     frame->orientation = q_load(unit);
-    TRY(check_target(names, def->target_position, def->target_orientation, def->target_velocity, target, error));
-    return check_numbers("def->", def, error);
+    return sadmm_world_check_target(def->target_position, def->target_orientation, def->target_velocity, target, error);
 }
 
 /* ---- life -------------------------------------------------------------------------------------------------------- */
@@ -218,7 +185,7 @@ sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_
 /* Gains, limits and whether it acts: those of `def` from here on. */
 static sadmm_status change(sadmm_world *world, struct sadmm_world_coupling *coupling, const sadmm_coupling_def *def)
 {
-    TRY(check_numbers("", def, &world->error));
+    TRY(check_numbers(def, &world->error));
     coupling->def = *def;
     struct sadmm_world_joint *joint = &world->joints[coupling->joint];
     set_drives(&joint->def, def);

@@ -80,7 +80,7 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
     line(&t, "backend      %s\n", world->why[0] ? world->why : "chosen at the first step");
     sadmm_world_synchronise_quietly(world);
     if (!world->stepped) return t.length;
-    line(&t, "precision    %s, %d thread%s\n", world->report.precision == SADMM_F32 ? "f32" : "f64",
+    line(&t, "precision    %s, %d thread%s\n", sadmm_precision_names[world->report.precision],
          world->report.threads, world->report.threads == 1 ? "" : "s");
     if (world->resident.loaded)
         line(&t, "world        kept by the backend: contacts are found there, the host reads on demand\n");

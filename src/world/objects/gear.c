@@ -10,7 +10,7 @@
 static const double OFFSET_LIMIT = 1e9, RATIO_LEAST = 1e-9, RATIO_MOST = 1e9;
 enum { MOST_GEARS = 1 << 24 };
 
-static const sadmm_gear_def defaults = {.coordinate_1 = -1, .coordinate_2 = -1, .ratio = 1, .offset = NAN, .enabled = true};
+static const sadmm_gear_def defaults = {SADMM_GEAR_FIELDS(SADMM_FIELD_DEFAULT, )};
 static const struct sadmm_growing growing = SADMM_GROWING(sadmm_gear_def, &defaults, enabled);
 
 void sadmm_gear_def_init(sadmm_gear_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }

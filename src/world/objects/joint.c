@@ -11,36 +11,8 @@
 static const double FRAME_LIMIT = 1e9, FORCE_LIMIT = 1e15;
 enum { MOST_JOINTS = 1 << 24 };
 
-enum { TX = 1, TY = 2, TZ = 4, RX = 8, RY = 16, RZ = 32 };
-
-/* CUSTOM names its own. */
-static const uint32_t locks_of[SADMM_JOINT_KIND_COUNT] = {
-    [SADMM_JOINT_FIXED] = JOINT_ALL_LOCKED,
-    [SADMM_JOINT_REVOLUTE] = JOINT_ALL_LOCKED & ~RZ,
-    [SADMM_JOINT_PRISMATIC] = JOINT_ALL_LOCKED & ~TZ,
-    [SADMM_JOINT_CYLINDRICAL] = JOINT_ALL_LOCKED & ~(TZ | RZ),
-    [SADMM_JOINT_SPHERICAL] = TX | TY | TZ,
-    [SADMM_JOINT_UNIVERSAL] = TX | TY | TZ | RZ,
-    [SADMM_JOINT_PLANAR] = TZ | RX | RY,
-    [SADMM_JOINT_CARTESIAN] = RX | RY | RZ,
-    [SADMM_JOINT_DISTANCE] = TX,
-    [SADMM_JOINT_SPRING] = 0,
-    [SADMM_JOINT_LINK] = TX | TZ,
-};
-
-#define DEFAULT_COORDINATE {.drive_force = INFINITY}
-static const sadmm_joint_coordinate default_coordinate = DEFAULT_COORDINATE;
-static const sadmm_joint_def defaults = {
-    .kind = SADMM_JOINT_FIXED,
-    .orientation_a = {1, 0, 0, 0},
-    .orientation_b = {1, 0, 0, 0},
-    .length = -1,
-    .enabled = true,
-    .break_force = INFINITY,
-    .break_torque = INFINITY,
-    .coordinates = {DEFAULT_COORDINATE, DEFAULT_COORDINATE, DEFAULT_COORDINATE, DEFAULT_COORDINATE, DEFAULT_COORDINATE,
-                    DEFAULT_COORDINATE},
-};
+static const sadmm_joint_coordinate default_coordinate = SADMM_DEFAULT_COORDINATE;
+static const sadmm_joint_def defaults = {SADMM_JOINT_FIELDS(SADMM_FIELD_DEFAULT, )};
 enum { LEAST_COORDINATE = SADMM_SIZE_TO(sadmm_joint_coordinate, armature) };
 static const struct sadmm_growing growing = {
     .size = sizeof(sadmm_joint_def),
@@ -80,30 +52,8 @@ static sadmm_status check_limits(const char *name, const sadmm_joint_coordinate 
 /* name: what stands before the fields, "coordinate->" say. */
 static sadmm_status check_coordinate(const char *name, const sadmm_joint_coordinate *c, struct sadmm_error *error)
 {
-    const struct {
-        const char *field;
-        double value, least, most;
-    } numbers[] = {
-        {"target_position", c->target_position, -FRAME_LIMIT, FRAME_LIMIT},
-        {"target_speed", c->target_speed, -FRAME_LIMIT, FRAME_LIMIT},
-        {"drive_stiffness", c->drive_stiffness, 0, FORCE_LIMIT},
-        {"drive_damping", c->drive_damping, 0, FORCE_LIMIT},
-        {"drive_force", c->drive_force, 0, INFINITY},
-        {"friction", c->friction, 0, FORCE_LIMIT},
-        {"spring_stiffness", c->spring_stiffness, 0, FORCE_LIMIT},
-        {"spring_damping", c->spring_damping, 0, FORCE_LIMIT},
-        {"spring_rest", c->spring_rest, -FRAME_LIMIT, FRAME_LIMIT},
-        {"armature", c->armature, 0, FORCE_LIMIT},
-    };
     TRY(check_limits(name, c, error));
-    if ((unsigned)c->drive >= SADMM_DRIVE_COUNT)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%sdrive = %d: must be in [0, %d]", name, (int)c->drive,
-                          SADMM_DRIVE_COUNT - 1);
-    for (size_t k = 0; k < sizeof numbers / sizeof *numbers; ++k)
-        if (!(numbers[k].value >= numbers[k].least && numbers[k].value <= numbers[k].most))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s = %g: must be in [%g, %g]", name,
-                              numbers[k].field, numbers[k].value, numbers[k].least, numbers[k].most);
-    return SADMM_OK;
+    return sadmm_fields_check(sadmm_coordinate_table, SADMM_COORDINATE_FIELDS_COUNT, c, name, error);
 }
 
 static bool has_coordinate(const sadmm_joint_def *def, int k) { return k == 0 || !joint_is_radial(def->kind); }
@@ -158,14 +108,11 @@ static sadmm_status find_sides(const sadmm_world *world, const sadmm_joint_def *
 
 static sadmm_status check_frames(const sadmm_joint_def *def, struct joint_frame frames[2], struct sadmm_error *error)
 {
-    static const char *const positions[2] = {"def->position_a", "def->position_b"},
-                             *const orientations[2] = {"def->orientation_a", "def->orientation_b"};
     for (int s = 0; s < 2; ++s) {
-        const double *position = s ? def->position_b : def->position_a;
         double unit[4];
-        TRY(sadmm_check_vector(positions[s], position, 3, FRAME_LIMIT, error));
-        TRY(sadmm_check_orientation(orientations[s], s ? def->orientation_b : def->orientation_a, unit, error));
-        frames[s].position = v3_load(position);
+        TRY(sadmm_check_orientation(s ? "def->orientation_b" : "def->orientation_a",
+                                    s ? def->orientation_b : def->orientation_a, unit, error));
+        frames[s].position = v3_load(s ? def->position_b : def->position_a);
         frames[s].orientation = q_load(unit);
     }
     return SADMM_OK;
@@ -173,16 +120,12 @@ static sadmm_status check_frames(const sadmm_joint_def *def, struct joint_frame 
 
 static sadmm_status check_def(const sadmm_joint_def *def, uint32_t *locks, struct sadmm_error *error)
 {
-    if ((unsigned)def->kind >= SADMM_JOINT_KIND_COUNT)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->kind = %d: must be in [0, %d]", (int)def->kind,
-                          SADMM_JOINT_KIND_COUNT - 1);
-    *locks = def->kind == SADMM_JOINT_CUSTOM ? def->locks : locks_of[def->kind];
+    TRY(sadmm_fields_check(sadmm_joint_table, SADMM_JOINT_FIELDS_COUNT, def, "def->", error));
+    *locks = def->kind == SADMM_JOINT_CUSTOM ? def->locks : sadmm_joint_locks[def->kind];
     if (*locks > JOINT_ALL_LOCKED)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->locks = %u: must be in [0, %d]", def->locks,
                           JOINT_ALL_LOCKED);
     if (def->length != -1) TRY(sadmm_check_range("def->length (or -1: as it is)", def->length, 0, FRAME_LIMIT, error));
-    TRY(sadmm_check_range("def->break_force", def->break_force, 0, INFINITY, error));
-    TRY(sadmm_check_range("def->break_torque", def->break_torque, 0, INFINITY, error));
     return check_coordinates(def, *locks, error);
 }
 

@@ -8,18 +8,6 @@
 #include "world/state/shape_form.h"
 #include "world/state/world_internal.h"
 
-/* owner: what stands before the names, "def->" say. */
-static sadmm_status check_material(const char *owner, double friction, double restitution, struct sadmm_error *error)
-{
-    if (!(friction >= 0 && friction <= 1e6))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%sfriction = %g: must be in [0, 1e+06]", owner,
-                          friction);
-    if (!(restitution >= 0 && restitution <= 1))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%srestitution = %g: must be in [0, 1]", owner,
-                          restitution);
-    return SADMM_OK;
-}
-
 static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_shape_def *def, double orientation[4],
                               struct sadmm_error *error)
 {
@@ -33,7 +21,8 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "def->sensor = true: must be false where def->type is %d, a mesh, which has no inside",
                           (int)def->type);
-    return check_material("def->", def->friction, def->restitution, error);
+    TRY(sadmm_field_check(SADMM_SHAPE_FIELD(friction), def, "def->", error));
+    return sadmm_field_check(SADMM_SHAPE_FIELD(restitution), def, "def->", error);
 }
 
 static bool has_block(int type)
@@ -255,7 +244,8 @@ sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id i
     struct sadmm_error *error = &world->error;
     struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
     if (!shape) return SADMM_ERROR_STALE_ID;
-    TRY(check_material("", friction, restitution, error));
+    TRY(sadmm_numbers_check(SADMM_SHAPE_FIELD(friction), &friction, "friction", error));
+    TRY(sadmm_numbers_check(SADMM_SHAPE_FIELD(restitution), &restitution, "restitution", error));
     TRY(sadmm_world_detach(world));
     world->bouncing_count += (restitution > 0) - (shape->restitution > 0);
     shape->friction = friction;
@@ -276,7 +266,7 @@ sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a,
         sadmm_pair_table_remove(&world->friction_pairs, key);
         return SADMM_OK;
     }
-    TRY(sadmm_check_range("friction (or -1 for the geometric mean)", friction, 0, 1e6, error));
+    TRY(sadmm_numbers_check(SADMM_SHAPE_FIELD(friction), &friction, "friction (or -1 for the geometric mean)", error));
     TRY(sadmm_world_detach(world));
     return sadmm_pair_table_set(&world->friction_pairs, key, friction, error);
 }

@@ -8,7 +8,7 @@
 #include "save.h"
 
 /* Raised with every change of what is written. */
-enum { FORMAT = 4 };
+enum { FORMAT = 5 };
 
 struct header {
     char magic[8];

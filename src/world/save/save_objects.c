@@ -13,11 +13,7 @@
 #define LISTED(type, size) _Static_assert(sizeof(type) == (size), #type " has other members than the list of a saved world")
 LISTED(struct sadmm_rigid, 320);
 LISTED(struct sadmm_extrapolation, 72);
-LISTED(sadmm_joint_coordinate, 112);
-LISTED(sadmm_joint_def, 856);
 LISTED(struct sadmm_joint_memory, 560);
-LISTED(sadmm_gear_def, 56);
-LISTED(sadmm_coupling_def, 232);
 
 enum { MOST_SLOTS = 1 << 28 };
 
@@ -54,17 +50,32 @@ static void archive_pair_table(struct sadmm_archive *archive, struct sadmm_pair_
         if (sadmm_pair_table_set(table, table->keys[k], table->values[k], archive->error) != SADMM_OK) fail_memory(archive);
 }
 
-/* ---- settings ---------------------------------------------------------------------------------------------------- */
+/* ---- settings and definitions ------------------------------------------------------------------------------------ */
+
+static void archive_field(struct sadmm_archive *archive, const struct sadmm_field *field, void *at)
+{
+    switch (field->kind) {
+    case SADMM_FIELD_REALS:
+    case SADMM_FIELD_TURN:
+    case SADMM_FIELD_BOUND:
+    case SADMM_FIELD_MEASURED: sadmm_archive_bytes(archive, at, (size_t)field->count * sizeof(double)); break;
+    case SADMM_FIELD_WHOLE: sadmm_archive_bytes(archive, at, sizeof(int)); break;
+    case SADMM_FIELD_BITS: sadmm_archive_bytes(archive, at, sizeof(uint32_t)); break;
+    case SADMM_FIELD_NAMED: sadmm_archive_bytes(archive, at, sizeof(sadmm_method)); break; /* as all enumerations */
+    case SADMM_FIELD_ID: sadmm_archive_bytes(archive, at, sizeof(sadmm_body_id)); break;   /* as all ids */
+    case SADMM_FIELD_FLAG: sadmm_archive_flag(archive, (bool *)at); break;
+    case SADMM_FIELD_OTHER: break; /* the caller's */
+    }
+}
+
+static void archive_fields(struct sadmm_archive *archive, const struct sadmm_field *fields, size_t count, void *object)
+{
+    for (size_t k = 0; k < count; ++k) archive_field(archive, &fields[k], (char *)object + fields[k].offset);
+}
 
 void sadmm_archive_settings(struct sadmm_archive *archive, sadmm_settings *s)
 {
-#define ARCHIVE(X, kind, role, name, ...) ARCHIVE_##kind(name)
-#define ARCHIVE_REAL(name) SADMM_ARCHIVE(archive, s->name);
-#define ARCHIVE_VECTOR(name) SADMM_ARCHIVE(archive, s->name);
-#define ARCHIVE_WHOLE(name) SADMM_ARCHIVE(archive, s->name);
-#define ARCHIVE_METHOD(name) SADMM_ARCHIVE(archive, s->name);
-#define ARCHIVE_FLAG(name) sadmm_archive_flag(archive, &s->name);
-    SADMM_SETTINGS(ARCHIVE, )
+    archive_fields(archive, sadmm_settings_table, SADMM_SETTING_COUNT, s);
     if (archive->reading && archive->status == SADMM_OK)
         sadmm_archive_expect(archive, sadmm_settings_validate(s, archive->error) == SADMM_OK, "settings");
 }
@@ -305,15 +316,7 @@ static void archive_shape(struct sadmm_archive *archive, sadmm_world *world, siz
     SADMM_ARCHIVE(archive, world->shape_generations[slot]);
     if (!alive) return;
     if (!archive->reading) kept = keep_shape(world, slot, owners);
-    SADMM_ARCHIVE(archive, kept.def.type);
-    SADMM_ARCHIVE(archive, kept.def.size);
-    SADMM_ARCHIVE(archive, kept.def.position);
-    SADMM_ARCHIVE(archive, kept.def.orientation);
-    SADMM_ARCHIVE(archive, kept.def.friction);
-    SADMM_ARCHIVE(archive, kept.def.restitution);
-    SADMM_ARCHIVE(archive, kept.def.category);
-    SADMM_ARCHIVE(archive, kept.def.mask);
-    sadmm_archive_flag(archive, &kept.def.sensor);
+    archive_fields(archive, sadmm_shape_table, SADMM_SHAPE_FIELDS_COUNT, &kept.def);
     SADMM_ARCHIVE(archive, kept.owner);
     SADMM_ARCHIVE(archive, kept.position);
     SADMM_ARCHIVE(archive, kept.orientation);
@@ -342,40 +345,11 @@ static void archive_shapes(struct sadmm_archive *archive, sadmm_world *world)
 
 /* ---- joints ------------------------------------------------------------------------------------------------------ */
 
-static void archive_coordinate(struct sadmm_archive *archive, sadmm_joint_coordinate *c)
-{
-    sadmm_archive_flag(archive, &c->limited);
-    SADMM_ARCHIVE(archive, c->lower);
-    SADMM_ARCHIVE(archive, c->upper);
-    SADMM_ARCHIVE(archive, c->drive);
-    SADMM_ARCHIVE(archive, c->target_position);
-    SADMM_ARCHIVE(archive, c->target_speed);
-    SADMM_ARCHIVE(archive, c->drive_stiffness);
-    SADMM_ARCHIVE(archive, c->drive_damping);
-    SADMM_ARCHIVE(archive, c->drive_force);
-    SADMM_ARCHIVE(archive, c->friction);
-    SADMM_ARCHIVE(archive, c->spring_stiffness);
-    SADMM_ARCHIVE(archive, c->spring_damping);
-    SADMM_ARCHIVE(archive, c->spring_rest);
-    SADMM_ARCHIVE(archive, c->armature);
-}
-
 static void archive_joint_def(struct sadmm_archive *archive, sadmm_joint_def *def)
 {
-    SADMM_ARCHIVE(archive, def->kind);
-    SADMM_ARCHIVE(archive, def->locks);
-    SADMM_ARCHIVE(archive, def->body_a);
-    SADMM_ARCHIVE(archive, def->body_b);
-    SADMM_ARCHIVE(archive, def->position_a);
-    SADMM_ARCHIVE(archive, def->orientation_a);
-    SADMM_ARCHIVE(archive, def->position_b);
-    SADMM_ARCHIVE(archive, def->orientation_b);
-    SADMM_ARCHIVE(archive, def->length);
-    sadmm_archive_flag(archive, &def->collide);
-    sadmm_archive_flag(archive, &def->enabled);
-    SADMM_ARCHIVE(archive, def->break_force);
-    SADMM_ARCHIVE(archive, def->break_torque);
-    for (int k = 0; k < JOINT_COORDINATES; ++k) archive_coordinate(archive, &def->coordinates[k]);
+    archive_fields(archive, sadmm_joint_table, SADMM_JOINT_FIELDS_COUNT, def);
+    for (int k = 0; k < JOINT_COORDINATES; ++k)
+        archive_fields(archive, sadmm_coordinate_table, SADMM_COORDINATE_FIELDS_COUNT, &def->coordinates[k]);
 }
 
 static void archive_joint_memory(struct sadmm_archive *archive, struct sadmm_joint_memory *m)
@@ -486,13 +460,7 @@ static void archive_gear(struct sadmm_archive *archive, sadmm_world *world, size
     sadmm_archive_flag(archive, &gear->alive);
     SADMM_ARCHIVE(archive, gear->generation);
     if (!gear->alive) return;
-    SADMM_ARCHIVE(archive, gear->def.joint_1);
-    SADMM_ARCHIVE(archive, gear->def.joint_2);
-    SADMM_ARCHIVE(archive, gear->def.coordinate_1);
-    SADMM_ARCHIVE(archive, gear->def.coordinate_2);
-    SADMM_ARCHIVE(archive, gear->def.ratio);
-    SADMM_ARCHIVE(archive, gear->def.offset);
-    sadmm_archive_flag(archive, &gear->def.enabled);
+    archive_fields(archive, sadmm_gear_table, SADMM_GEAR_FIELDS_COUNT, &gear->def);
     SADMM_ARCHIVE(archive, joint);
     SADMM_ARCHIVE(archive, gear->last);
     if (!archive->reading) return;
@@ -539,24 +507,11 @@ static bool coupling_fits(const sadmm_world *world, size_t slot, struct sadmm_er
 static void archive_coupling(struct sadmm_archive *archive, sadmm_world *world, size_t slot)
 {
     struct sadmm_world_coupling *coupling = &world->couplings[slot];
-    sadmm_coupling_def *def = &coupling->def;
     uint64_t joint = coupling->joint;
     sadmm_archive_flag(archive, &coupling->alive);
     SADMM_ARCHIVE(archive, coupling->generation);
     if (!coupling->alive) return;
-    SADMM_ARCHIVE(archive, def->body);
-    SADMM_ARCHIVE(archive, def->position);
-    SADMM_ARCHIVE(archive, def->orientation);
-    SADMM_ARCHIVE(archive, def->target_position);
-    SADMM_ARCHIVE(archive, def->target_orientation);
-    SADMM_ARCHIVE(archive, def->target_velocity);
-    SADMM_ARCHIVE(archive, def->linear_stiffness);
-    SADMM_ARCHIVE(archive, def->linear_damping);
-    SADMM_ARCHIVE(archive, def->angular_stiffness);
-    SADMM_ARCHIVE(archive, def->angular_damping);
-    SADMM_ARCHIVE(archive, def->max_force);
-    SADMM_ARCHIVE(archive, def->max_torque);
-    sadmm_archive_flag(archive, &def->enabled);
+    archive_fields(archive, sadmm_coupling_table, SADMM_COUPLING_FIELDS_COUNT, &coupling->def);
     SADMM_ARCHIVE(archive, joint);
     SADMM_ARCHIVE(archive, coupling->last.target.position);
     SADMM_ARCHIVE(archive, coupling->last.target.orientation);

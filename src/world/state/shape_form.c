@@ -6,16 +6,11 @@
 #include "collision/mesh/mesh.h"
 #include "collision/shapes/geometry.h"
 #include "core/base/check.h"
+#include "core/base/definition_fields.h"
 #include "core/math/quat.h"
 
-static const sadmm_shape_def defaults = {
-    .type = SADMM_SHAPE_SPHERE,
-    .orientation = {1, 0, 0, 0},
-    .friction = 0.5,
-    .category = 1,
-    .mask = UINT32_MAX,
-};
-const struct sadmm_growing sadmm_growing_shape = SADMM_GROWING(sadmm_shape_def, &defaults, sensor);
+static const sadmm_shape_def defaults = {SADMM_SHAPE_FIELDS(SADMM_FIELD_DEFAULT, )};
+const struct sadmm_growing sadmm_growing_shape = SADMM_GROWING(sadmm_shape_def, &defaults, mesh);
 
 void sadmm_shape_def_init(sadmm_shape_def *def, size_t size) { sadmm_growing_init(&sadmm_growing_shape, def, size, 0); }
 
@@ -33,16 +28,15 @@ static sadmm_status check_part(const char *name, const void *part, int of_type, 
 
 sadmm_status sadmm_shape_form_check(const sadmm_shape_def *def, double orientation[4], struct sadmm_error *error)
 {
-    if ((int)def->type < 0 || def->type >= SADMM_SHAPE_TYPE_COUNT)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: must be in [0, %d)", (int)def->type,
-                          SADMM_SHAPE_TYPE_COUNT);
+    TRY(sadmm_field_check(SADMM_SHAPE_FIELD(type), def, "def->", error));
+    const struct sadmm_field *const size = SADMM_SHAPE_FIELD(size);
     TRY(check_part("hull", def->hull, SADMM_SHAPE_HULL, (int)def->type, error));
     TRY(check_part("mesh", def->mesh, SADMM_SHAPE_MESH, (int)def->type, error));
-    for (int k = 0; k < geometry_sizes(def->type); ++k)
-        if (!(def->size[k] >= 1e-6 && def->size[k] <= 1e6))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->size[%d] = %g: must be in [1e-6, 1e6] m", k,
-                              def->size[k]);
-    TRY(sadmm_check_vector("def->position", def->position, 3, 1e6, error));
+    for (int k = 0; k < sadmm_shape_sizes[def->type]; ++k)
+        if (!(def->size[k] >= size->lo && def->size[k] <= size->hi))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->size[%d] = %g: must be in [%g, %g] m", k,
+                              def->size[k], size->lo, size->hi);
+    TRY(sadmm_field_check(SADMM_SHAPE_FIELD(position), def, "def->", error));
     return sadmm_check_orientation("def->orientation", def->orientation, orientation, error);
 }
 

@@ -22,6 +22,7 @@
 #include "collision/collision.h"
 #include "collision/query/query_tree.h"
 #include "core/base/check.h"
+#include "core/base/definition_fields.h"
 #include "core/base/error.h"
 #include "core/base/growing.h"
 #include "core/base/parallel.h"
@@ -602,7 +603,7 @@ sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_d
 
 /* ---- coupling.c ---- */
 
-/* The numbers of a definition; not its body and its target. */
+/* The numbers of a definition; not its body. */
 sadmm_status sadmm_world_check_coupling(const sadmm_coupling_def *def, struct sadmm_error *error);
 /* A target that may be set, else INVALID_ARGUMENT, into the pose and velocity of `target`. velocity: NULL is 0. */
 sadmm_status sadmm_world_check_target(const double position[3], const double orientation[4], const double velocity[6],
