@@ -332,7 +332,7 @@ START_TEST(bad_shapes)
     REFUSED(SADMM_ERROR_INVALID_ARGUMENT, text, sadmm_world_closest_to_shape(world, def, position, orientation, id, &c))
     sadmm_shape_def bad = ball;
     bad.size[0] = -1;
-    BOTH("def->size[0] = -1: must be in [1e-6, 1e6] m", &bad, origin, as_it_is);
+    BOTH("def->size[0] = -1: must be in [1e-06, 1e+06] m", &bad, origin, as_it_is);
     bad = shape_of(SADMM_SHAPE_MESH, 1, 1, 1);
     BOTH("def->type = 5: must not be a mesh", &bad, origin, as_it_is);
     bad = shape_of(SADMM_SHAPE_HULL, 1, 1, 1);

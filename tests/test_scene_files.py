@@ -316,6 +316,11 @@ def main():
     if jsonschema:
         jsonschema.Draft202012Validator.check_schema(document)
         schema = jsonschema.Draft202012Validator(document)
+    lists = subprocess.run([sys.executable, os.path.join(project, "scripts", "lists.py"), "--check", project],
+                           capture_output=True, text=True, check=False)
+    if lists.returncode:
+        failures.append(lists.stdout + lists.stderr)
+        print(failures[-1])
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         check_good(project, command, schema)

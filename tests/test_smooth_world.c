@@ -316,7 +316,7 @@ START_TEST(definitions)
         for (int i = 0; i < (k < 2 ? 2 : 3); ++i) {
             char text[60];
             shape.size[i] = 0;
-            snprintf(text, sizeof text, "def->size[%d] = 0: must be in [1e-6, 1e6] m", i);
+            snprintf(text, sizeof text, "def->size[%d] = 0: must be in [1e-06, 1e+06] m", i);
             ck_assert_int_eq(sadmm_world_add_shape(world, body, &shape, NULL), SADMM_ERROR_INVALID_ARGUMENT);
             ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), text));
             shape.size[i] = 0.3;

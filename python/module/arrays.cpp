@@ -3,20 +3,22 @@
 
 #include "common.h"
 
-static constexpr std::pair<const char *, sadmm_array> array_names[] = {
-    {"body_state", SADMM_ARRAY_BODY_STATE},
-    {"body_wrench", SADMM_ARRAY_BODY_WRENCH},
-    {"body_contact_wrench", SADMM_ARRAY_BODY_CONTACT_WRENCH},
-    {"body_inertia", SADMM_ARRAY_BODY_INERTIA},
-    {"joint_position", SADMM_ARRAY_JOINT_POSITION},
-    {"joint_speed", SADMM_ARRAY_JOINT_SPEED},
-    {"joint_drive_force", SADMM_ARRAY_JOINT_DRIVE_FORCE},
-    {"joint_wrench", SADMM_ARRAY_JOINT_WRENCH},
-    {"joint_target_position", SADMM_ARRAY_JOINT_TARGET_POSITION},
-    {"joint_target_speed", SADMM_ARRAY_JOINT_TARGET_SPEED},
-    {"coupling_target", SADMM_ARRAY_COUPLING_TARGET},
-    {"coupling_reaction", SADMM_ARRAY_COUPLING_REACTION},
+// In the order of sadmm_array.
+static constexpr const char *array_names[SADMM_ARRAY_COUNT] = {
+    "body_state",
+    "body_wrench",
+    "body_contact_wrench",
+    "body_inertia",
+    "joint_position",
+    "joint_speed",
+    "joint_drive_force",
+    "joint_wrench",
+    "joint_target_position",
+    "joint_target_speed",
+    "coupling_target",
+    "coupling_reaction",
 };
+NAMES_OF(sadmm_array, array_names, SADMM_ARRAY_COUNT)
 
 using matrix = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
 using out_rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
@@ -57,7 +59,7 @@ struct range {
 
 static nb::object get(world &w, const std::string &name, whole first, std::optional<whole> count, nb::object out)
 {
-    const sadmm_array array = named("array", name, array_names);
+    const sadmm_array array = named<sadmm_array>("array", name);
     const size_t columns = (size_t)sadmm_array_columns(array);
     range r{0, (int32_t)first.in("first", 0, INT32_MAX), count ? (int32_t)count->in("count", 0, INT32_MAX) : 0, !count};
     const auto is_sized = [&](const out_rows &to) { return to.shape(0) == (size_t)r.count && to.shape(1) == columns; };
@@ -86,7 +88,7 @@ static nb::object get(world &w, const std::string &name, whole first, std::optio
 
 static void set(world &w, const std::string &name, nb::object given, whole first)
 {
-    const sadmm_array array = named("array", name, array_names);
+    const sadmm_array array = named<sadmm_array>("array", name);
     const int32_t columns = sadmm_array_columns(array), begin = (int32_t)first.in("first", 0, INT32_MAX);
     in_rows values;
     if (!nb::try_cast(given, values, false) || values.shape(1) != (size_t)columns)
@@ -99,7 +101,7 @@ static void set(world &w, const std::string &name, nb::object given, whole first
 // the numbers are there is said below.
 static nb::object device_array(world &w, const std::string &name)
 {
-    const sadmm_array array = named("array", name, array_names);
+    const sadmm_array array = named<sadmm_array>("array", name);
     sadmm_device_array a;
     call(w, [&](sadmm_world *h) { return sadmm_world_device_array(h, array, &a); });
     const size_t shape[2] = {(size_t)a.rows, (size_t)a.columns};
@@ -155,7 +157,8 @@ static nb::list contact_members()
 void bind_arrays(nb::module_ &m, nb::class_<world> &w)
 {
     nb::list names;
-    for (const auto &entry : array_names) names.append(nb::make_tuple(entry.first, sadmm_array_columns(entry.second), sadmm_array_is_settable(entry.second)));
+    for (int k = 0; k < SADMM_ARRAY_COUNT; ++k)
+        names.append(nb::make_tuple(array_names[k], sadmm_array_columns((sadmm_array)k), sadmm_array_is_settable((sadmm_array)k)));
     m.attr("_arrays") = names;
     m.attr("_contact_members") = contact_members();
     m.attr("_contact_size") = sizeof(sadmm_contact);

@@ -14,6 +14,7 @@
 #include <mutex>
 #include <string>
 
+#include "core/base/names.h"
 #include "scene_file/scene_file.h"
 #include "scenes/scenes.h"
 #include "subadmm/subadmm.h"
@@ -245,30 +246,35 @@ template <class T> nb::object numpy_of(std::vector<T> values, std::vector<size_t
     return nb::cast(nb::ndarray<nb::numpy, T>(kept->data(), shape.size(), shape.data(), owner));
 }
 
-// One of a list of names, or ValueError.
-template <class E, size_t N> E named(const char *what, const std::string &name, const std::pair<const char *, E> (&names)[N])
+// The names of an enumeration's values (core/base/names.h).
+template <class E> struct names_of;
+#define NAMES_OF(type, names, of)                              \
+    template <> struct names_of<type> {                        \
+        static constexpr const char *const *list = names;      \
+        static constexpr int count = of;                       \
+    };
+NAMES_OF(sadmm_backend, sadmm_backend_names, SADMM_BACKEND_COUNT)
+NAMES_OF(sadmm_precision, sadmm_precision_names, SADMM_PRECISION_COUNT)
+NAMES_OF(sadmm_method, sadmm_method_names, SADMM_METHOD_COUNT)
+NAMES_OF(sadmm_body_type, sadmm_body_type_names, SADMM_BODY_TYPE_COUNT)
+NAMES_OF(sadmm_shape_type, sadmm_shape_type_names, SADMM_SHAPE_TYPE_COUNT)
+NAMES_OF(sadmm_joint_kind, sadmm_joint_kind_names, SADMM_JOINT_KIND_COUNT)
+NAMES_OF(sadmm_drive, sadmm_drive_names, SADMM_DRIVE_COUNT)
+
+// The value with that name, or ValueError.
+template <class E> E named(const char *what, const std::string &name)
 {
     std::string all;
-    for (const auto &entry : names) {
-        if (name == entry.first) return entry.second;
-        all += std::string(all.empty() ? "" : ", ") + "'" + entry.first + "'";
+    for (int k = 0; k < names_of<E>::count; ++k) {
+        if (name == names_of<E>::list[k]) return (E)k;
+        all += std::string(k == 0 ? "" : ", ") + "'" + names_of<E>::list[k] + "'";
     }
     throw nb::value_error((std::string(what) + " = '" + name + "': must be one of " + all).c_str());
 }
-template <class E, size_t N> const char *name_of(E value, const std::pair<const char *, E> (&names)[N])
+template <class E> std::enable_if_t<(names_of<E>::count > 0), const char *> name_of(E value)
 {
-    for (const auto &entry : names)
-        if (entry.second == value) return entry.first;
-    return "?";
+    return (int)value >= 0 && (int)value < names_of<E>::count ? names_of<E>::list[value] : "?";
 }
-
-inline constexpr std::pair<const char *, sadmm_backend> backend_names[] = {
-    {"auto", SADMM_BACKEND_AUTO}, {"ref", SADMM_BACKEND_REF}, {"cpu", SADMM_BACKEND_CPU}, {"cuda", SADMM_BACKEND_CUDA}};
-inline constexpr std::pair<const char *, sadmm_precision> precision_names[] = {{"f32", SADMM_F32}, {"f64", SADMM_F64}};
-inline constexpr std::pair<const char *, sadmm_method> method_names[] = {{"paper", SADMM_METHOD_PAPER},
-                                                                         {"fast", SADMM_METHOD_FAST}};
-inline constexpr std::pair<const char *, sadmm_body_type> body_type_names[] = {
-    {"dynamic", SADMM_BODY_DYNAMIC}, {"static", SADMM_BODY_STATIC}, {"kinematic", SADMM_BODY_KINEMATIC}};
 
 void bind_settings(nb::module_ &m);
 void bind_shapes(nb::module_ &m);

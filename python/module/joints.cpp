@@ -1,62 +1,37 @@
 // Joints, gears and virtual couplings.
-#include "common.h"
-
-static constexpr std::pair<const char *, sadmm_joint_kind> kind_names[] = {
-    {"fixed", SADMM_JOINT_FIXED}, {"revolute", SADMM_JOINT_REVOLUTE}, {"prismatic", SADMM_JOINT_PRISMATIC},
-    {"cylindrical", SADMM_JOINT_CYLINDRICAL}, {"spherical", SADMM_JOINT_SPHERICAL},
-    {"universal", SADMM_JOINT_UNIVERSAL}, {"planar", SADMM_JOINT_PLANAR}, {"cartesian", SADMM_JOINT_CARTESIAN},
-    {"custom", SADMM_JOINT_CUSTOM}, {"distance", SADMM_JOINT_DISTANCE}, {"spring", SADMM_JOINT_SPRING},
-    {"link", SADMM_JOINT_LINK}};
-static constexpr std::pair<const char *, sadmm_drive> drive_names[] = {
-    {"off", SADMM_DRIVE_OFF}, {"speed", SADMM_DRIVE_SPEED}, {"position", SADMM_DRIVE_POSITION}};
+#include "fields.h"
 
 using C = sadmm_joint_coordinate;
 
+#define BIND(X, kind, role, name, ...) \
+    bind_##kind(c, #name, [](auto &o) -> auto & { return o.name; }, documented(*field++));
+
 static void bind_coordinate(nb::module_ &m)
 {
-    nb::class_<C>(m, "Coordinate", "What acts along one free coordinate of a joint; m and N, or rad and N m. Coordinate(limited=True, "
-                                   "lower=-1, upper=1): the defaults, with changes.")
-        .def("__init__", [](nb::pointer_and_handle<C> self, nb::kwargs values) {
-            new (self.p) C(sadmm_joint_def_default().coordinates[0]);
-            nb::inst_mark_ready(self.h);
-            set_members(self.h, values);
-        })
-        .def_rw("limited", &C::limited)
-        .def_rw("lower", &C::lower)
-        .def_rw("upper", &C::upper)
-        .def_prop_rw("drive", [](const C &c) { return name_of(c.drive, drive_names); },
-                     [](C &c, const std::string &name) { c.drive = named("drive", name, drive_names); },
-                     "'off', 'speed' or 'position'.")
-        .def_rw("target_position", &C::target_position)
-        .def_rw("target_speed", &C::target_speed)
-        .def_rw("drive_stiffness", &C::drive_stiffness)
-        .def_rw("drive_damping", &C::drive_damping)
-        .def_rw("drive_force", &C::drive_force, "Largest force of the drive.")
-        .def_rw("friction", &C::friction)
-        .def_rw("spring_stiffness", &C::spring_stiffness)
-        .def_rw("spring_damping", &C::spring_damping)
-        .def_rw("spring_rest", &C::spring_rest)
-        .def_rw("armature", &C::armature);
+    nb::class_<C> c(m, "Coordinate", "What acts along one free coordinate of a joint; m and N, or rad and N m. Coordinate(limited=True, "
+                                     "lower=-1, upper=1): the defaults, with changes.");
+    c.def("__init__", [](nb::pointer_and_handle<C> self, nb::kwargs values) {
+        new (self.p) C(sadmm_joint_def_default().coordinates[0]);
+        nb::inst_mark_ready(self.h);
+        set_members(self.h, values);
+    });
+    const sadmm_field *field = sadmm_coordinate_table;
+    SADMM_COORDINATE_FIELDS(BIND, )
 }
 
 static joint add_joint(nb::handle_t<world> self, const std::string &kind, const std::optional<body> &a,
-                       const std::optional<body> &b, std::optional<numbers<3>> position, std::optional<numbers<4>> orientation,
-                       numbers<3> position_a, numbers<4> orientation_a, numbers<3> position_b, numbers<4> orientation_b,
-                       whole locks, double length,
-                       bool collide, bool enabled, double break_force, double break_torque, const nb::dict &coordinates)
+                       const std::optional<body> &b, std::optional<numbers<3>> position, std::optional<numbers<4>> orientation
+                       SADMM_JOINT_FIELDS(PARAMETER, ), const nb::dict &coordinates)
 {
     world &w = nb::cast<world &>(self);
     joint out{nb::borrow(self), &w, {}};
     sadmm_joint_def def = sadmm_joint_def_default();
-    def.kind = named("kind", kind, kind_names);
+    def.kind = named<sadmm_joint_kind>("kind", kind);
     if (a) def.body_a = id_in(w, *a, "a");
     if (b) def.body_b = id_in(w, *b, "b");
-    put(position_a.as("position_a"), def.position_a), put(orientation_a.as("orientation_a"), def.orientation_a);
-    put(position_b.as("position_b"), def.position_b), put(orientation_b.as("orientation_b"), def.orientation_b);
+    SADMM_JOINT_FIELDS(PUT, def)
     const vec3 place = position ? position->as("position") : vec3{};
     const quat turn = orientation ? orientation->as("orientation") : quat{1, 0, 0, 0};
-    def.locks = locks.as_bits("locks"), def.length = length, def.collide = collide, def.enabled = enabled;
-    def.break_force = break_force, def.break_torque = break_torque;
     for (auto [k, value] : coordinates) {
         const int64_t index = whole{nb::borrow(k)}.in("key of coordinates", 0, 5);
         const std::string which = "coordinates[" + std::to_string(index) + "]";
@@ -91,6 +66,18 @@ static nb::object body_of(const joint &j, sadmm_body_id id)
 
 static int index_of(const whole &index) { return (int)index.in("index", 0, 5); }
 
+// Frames, bodies, coordinates and flags have forms of their own below.
+#define JOINT_IS(X, kind, role, name, value, lo, hi, ends, text) JOINT_IS_##kind(name, text)
+#define JOINT_IS_REAL(name, text) READ_ONLY(c, joint, name, text);
+#define JOINT_IS_BOUND(name, text) READ_ONLY(c, joint, name, text);
+#define JOINT_IS_BITS(name, text) READ_ONLY(c, joint, name, "Bit k: coordinate k is locked.");
+#define JOINT_IS_JOINT_KIND(name, text) READ_ONLY(c, joint, name, text);
+#define JOINT_IS_VECTOR(name, text)
+#define JOINT_IS_TURN(name, text)
+#define JOINT_IS_FLAG(name, text)
+#define JOINT_IS_ID(name, text)
+#define JOINT_IS_OTHER(name, text)
+
 static void bind_joint(nb::module_ &m)
 {
     nb::class_<joint> c(m, "Joint", collected<sadmm_joint_id>(), "A joint of a world. Coordinates 0 to 2 are translations along the axes of a's frame, 3 to 5 rotations.");
@@ -102,12 +89,11 @@ static void bind_joint(nb::module_ &m)
             call(j.in(), [&](sadmm_world *h) { return sadmm_world_joint_index(h, j.id, &index); });
             return index;
         }, "Row of the world's arrays.")
-        .def_prop_ro("kind", [](const joint &j) { return name_of(def_of(j).kind, kind_names); })
-        .def_prop_ro("locks", [](const joint &j) { return def_of(j).locks; }, "Bit k: coordinate k is locked.")
         .def_prop_ro("body_a", [](const joint &j) { return body_of(j, def_of(j).body_a); }, "None: the static world.")
         .def_prop_ro("body_b", [](const joint &j) { return body_of(j, def_of(j).body_b); })
         .def_prop_ro("frame_a", [](const joint &j) { const auto d = def_of(j); return std::make_pair(array_of<3>(d.position_a), array_of<4>(d.orientation_a)); }, "(position, orientation) in a's body frame.")
         .def_prop_ro("frame_b", [](const joint &j) { const auto d = def_of(j); return std::make_pair(array_of<3>(d.position_b), array_of<4>(d.orientation_b)); })
+        .def_prop_ro("collide", [](const joint &j) { return def_of(j).collide; }, "Whether the two bodies collide.")
         .def_prop_rw("enabled", [](const joint &j) { return def_of(j).enabled; },
                      [](const joint &j, bool on) { call(j.in(), [&](sadmm_world *h) { return sadmm_world_set_joint_enabled(h, j.id, on); }); })
         .def("coordinate", [](const joint &j, whole index) { return def_of(j).coordinates[index_of(index)]; }, "index"_a, "What acts along the coordinate.")
@@ -133,6 +119,7 @@ static void bind_joint(nb::module_ &m)
             call(j.in(), [&](sadmm_world *h) { return sadmm_world_set_joint_spring_table(h, j.id, k, x.data(), f.data(), (int32_t)x.size()); });
         }, "index"_a, "positions"_a, "forces"_a, "A nonlinear spring: loads at positions; empty lists: none.")
         .def("remove", [](const joint &j) { call(j.in(), [&](sadmm_world *h) { return sadmm_world_remove_joint(h, j.id); }); });
+    SADMM_JOINT_FIELDS(JOINT_IS, )
 #define OF_STATE(name, doc) .def_prop_ro(#name, [](const joint &j) { return array_of<6>(state_of(j).name); }, doc)
     c OF_STATE(position, "Coordinates, m and rad; of locked ones the error.")
         OF_STATE(speed, "m/s and rad/s.")
@@ -163,22 +150,13 @@ static gear add_gear(nb::handle_t<world> self, const joint &a, whole coordinate_
     return out;
 }
 
-static coupling add_coupling(nb::handle_t<world> self, const body &b, numbers<3> position, numbers<4> orientation,
-                             std::optional<numbers<3>> target_position, std::optional<numbers<4>> target_orientation,
-                             double linear_stiffness,
-                             double linear_damping, double angular_stiffness, double angular_damping, double max_force,
-                             double max_torque, bool enabled)
+static coupling add_coupling(nb::handle_t<world> self, const body &b SADMM_COUPLING_FIELDS(PARAMETER, ))
 {
     world &w = nb::cast<world &>(self);
     coupling out{nb::borrow(self), &w, {}};
     sadmm_coupling_def def = sadmm_coupling_def_default();
     def.body = id_in(w, b, "body");
-    put(position.as("position"), def.position), put(orientation.as("orientation"), def.orientation);
-    if (target_position) put(target_position->as("target_position"), def.target_position);
-    if (target_orientation) put(target_orientation->as("target_orientation"), def.target_orientation);
-    def.linear_stiffness = linear_stiffness, def.linear_damping = linear_damping;
-    def.angular_stiffness = angular_stiffness, def.angular_damping = angular_damping;
-    def.max_force = max_force, def.max_torque = max_torque, def.enabled = enabled;
+    SADMM_COUPLING_FIELDS(PUT, def)
     call(w, [&](sadmm_world *h) { return sadmm_world_add_coupling(h, &def, &out.id); });
     return out;
 }
@@ -197,10 +175,20 @@ static sadmm_coupling_def def_of(const coupling &c)
     return def;
 }
 
+// Frame, target and body have forms of their own below.
+#define COUPLING_IS(X, kind, role, name, value, lo, hi, ends, text) COUPLING_IS_##kind(name, text)
+#define COUPLING_IS_REAL(name, text) READ_ONLY(c, coupling, name, text);
+#define COUPLING_IS_BOUND(name, text) READ_ONLY(c, coupling, name, text);
+#define COUPLING_IS_FLAG(name, text) READ_ONLY(c, coupling, name, text);
+#define COUPLING_IS_VECTOR(name, text)
+#define COUPLING_IS_TURN(name, text)
+#define COUPLING_IS_TWIST(name, text)
+#define COUPLING_IS_ID(name, text)
+
 static void bind_coupling(nb::module_ &m)
 {
-    nb::class_<coupling>(m, "Coupling", collected<sadmm_coupling_id>(), "A spring and damper that pulls a body to a target pose.")
-        .def("__eq__", [](const coupling &a, const coupling &b) { return same_id(a, b); }, nb::is_operator())
+    nb::class_<coupling> c(m, "Coupling", collected<sadmm_coupling_id>(), "A spring and damper that pulls a body to a target pose.");
+    c.def("__eq__", [](const coupling &a, const coupling &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_coupling_id>)
         .def_prop_ro("world", [](const coupling &c) { return c.owner; })
         .def_prop_ro("index", [](const coupling &c) {
@@ -211,9 +199,6 @@ static void bind_coupling(nb::module_ &m)
         .def_prop_ro("body", [](const coupling &c) { return body{c.owner, c.w, def_of(c).body}; })
         .def_prop_ro("frame", [](const coupling &c) { const auto d = def_of(c); return std::make_pair(array_of<3>(d.position), array_of<4>(d.orientation)); }, "(position, orientation) on the body, in its body frame.")
         .def_prop_ro("target", [](const coupling &c) { const auto d = def_of(c); return std::make_pair(array_of<3>(d.target_position), array_of<4>(d.target_orientation)); }, "(position, orientation) now, world.")
-        .def_prop_ro("max_force", [](const coupling &c) { return def_of(c).max_force; }, "N, along each axis of the target.")
-        .def_prop_ro("max_torque", [](const coupling &c) { return def_of(c).max_torque; }, "N m.")
-        .def_prop_ro("enabled", [](const coupling &c) { return def_of(c).enabled; })
         .def("set_target", [](const coupling &c, numbers<3> position, numbers<4> orientation, std::optional<numbers<6>> velocity) {
             const vec3 x = position.as("position");
             const quat q = orientation.as("orientation");
@@ -234,6 +219,7 @@ static void bind_coupling(nb::module_ &m)
         .def_prop_ro("position_error", [](const coupling &c) { return array_of<3>(state_of(c).position_error); }, "m.")
         .def_prop_ro("rotation_error", [](const coupling &c) { return array_of<3>(state_of(c).rotation_error); }, "Rotation vector, rad.")
         .def("remove", [](const coupling &c) { call(c.in(), [&](sadmm_world *h) { return sadmm_world_remove_coupling(h, c.id); }); });
+    SADMM_COUPLING_FIELDS(COUPLING_IS, )
     nb::class_<gear>(m, "Gear", collected<sadmm_gear_id>(), "A ratio between two coordinates of joints.")
         .def_prop_ro("world", [](const gear &g) { return g.owner; })
         .def("set_enabled", [](const gear &g, bool on) { call(g.in(), [&](sadmm_world *h) { return sadmm_world_set_gear_enabled(h, g.id, on); }); }, "enabled"_a)
@@ -245,25 +231,21 @@ static void bind_coupling(nb::module_ &m)
         .def("remove", [](const gear &g) { call(g.in(), [&](sadmm_world *h) { return sadmm_world_remove_gear(h, g.id); }); });
 }
 
+#define KIND_AND_USE(X, value, name, locks, free, use) "  '" name "': " use "\n"
+
 void bind_joints(nb::module_ &m, nb::class_<world> &w)
 {
-    const double infinite = std::numeric_limits<double>::infinity();
     bind_coordinate(m);
     bind_joint(m);
     bind_coupling(m);
     w.def("add_joint", &add_joint, "kind"_a, "a"_a.none() = nb::none(), "b"_a.none() = nb::none(), nb::kw_only(), "position"_a = nb::none(),
-          "orientation"_a = nb::none(), "position_a"_a = vec3{}, "orientation_a"_a = quat{1, 0, 0, 0}, "position_b"_a = vec3{},
-          "orientation_b"_a = quat{1, 0, 0, 0}, "locks"_a = 0, "length"_a = -1.0, "collide"_a = false, "enabled"_a = true,
-          "break_force"_a = infinite, "break_torque"_a = infinite, "coordinates"_a = nb::dict(),
-          "A joint between body a and body b (None: the static world). kind: 'fixed', 'revolute' (about z), 'prismatic' (along z),\n"
-          "'cylindrical', 'spherical', 'universal', 'planar', 'cartesian', 'custom' (locks: bits), 'distance', 'spring', 'link'.\n"
+          "orientation"_a = nb::none() SADMM_JOINT_FIELDS(ARGUMENT, ), "coordinates"_a = nb::dict(),
+          "A joint between body a and body b (None: the static world). kind:\n" SADMM_JOINT_KINDS(KIND_AND_USE, )
           "Frames: `position` and `orientation` in the world at the current poses, or position_a ... in the bodies' frames.\n"
           "coordinates: {5: Coordinate(drive='speed', target_speed=2)}, what acts along free ones.");
     w.def("add_gear", &add_gear, "joint_1"_a, "coordinate_1"_a, "joint_2"_a, "coordinate_2"_a, "ratio"_a = 1.0, "offset"_a = nb::none(),
           "enabled"_a = true, "q_1 + ratio q_2 = offset; None: the current value.");
-    w.def("add_coupling", &add_coupling, "body"_a, nb::kw_only(), "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0},
-          "target_position"_a = nb::none(), "target_orientation"_a = nb::none(), "linear_stiffness"_a = 0.0, "linear_damping"_a = 0.0,
-          "angular_stiffness"_a = 0.0, "angular_damping"_a = 0.0, "max_force"_a = infinite, "max_torque"_a = infinite, "enabled"_a = true,
+    w.def("add_coupling", &add_coupling, "body"_a, nb::kw_only() SADMM_COUPLING_FIELDS(ARGUMENT, ),
           "A virtual coupling of a frame on the body to a target pose in the world. N/m, N s/m, N m/rad, N m s/rad.");
     w.def_prop_ro("joints", [](nb::handle_t<world> self) {
         return all_of<joint>(self, &sadmm_world_joint_count, &sadmm_world_joint_at);

@@ -11,7 +11,7 @@ static sadmm_query_filter filter_of(world &w, const std::optional<body> &ignore,
     sadmm_query_filter filter = sadmm_query_filter_default();
     if (ignore) filter.ignored = id_in(w, *ignore, "ignore");
     if (!types.empty()) filter.body_types = 0;
-    for (const std::string &type : types) filter.body_types |= 1u << named("types", type, body_type_names);
+    for (const std::string &type : types) filter.body_types |= 1u << named<sadmm_body_type>("types", type);
     filter.category = category.as_bits("category"), filter.mask = mask.as_bits("mask");
     filter.from_inside = from_inside, filter.from_behind = from_behind, filter.sensors = sensors;
     return filter;

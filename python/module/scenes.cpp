@@ -33,10 +33,10 @@ static std::unique_ptr<world> build(const std::string &spec, bool is_text, const
     check_error(is_text ? sadmm_scene_open_text(spec.data(), spec.size(), nullptr, &made->scene, &error)
                         : sadmm_scene_open(spec.c_str(), &made->scene, &error), error);
     sadmm_world_def &def = made->scene.def;
-    def.backend = named("backend", backend, backend_names);
+    def.backend = named<sadmm_backend>("backend", backend);
     def.device = device.as_int("device");
-    if (precision) def.precision = named("precision", *precision, precision_names);
-    if (method) sadmm_scene_set_method(&made->scene, named("method", *method, method_names));
+    if (precision) def.precision = named<sadmm_precision>("precision", *precision);
+    if (method) sadmm_scene_set_method(&made->scene, named<sadmm_method>("method", *method));
     if (!settings.is_none()) {
         if (!nb::isinstance<nb::dict>(settings)) refuse_type("settings", settings, "must be a dict of changes, as {'dt': 0.002}");
         nb::object changed = nb::cast(def.settings);

@@ -1,44 +1,42 @@
 // Settings of steps, and what a step reports.
-#include "common.h"
-#include "core/base/settings_fields.h"
+#include "fields.h"
 
 using S = sadmm_settings;
-using settings_class = nb::class_<S>;
 
-static void bind_REAL(settings_class &c, const char *name, double S::*at, const char *doc) { c.def_rw(name, at, doc); }
-static void bind_FLAG(settings_class &c, const char *name, bool S::*at, const char *doc) { c.def_rw(name, at, doc); }
-static void bind_WHOLE(settings_class &c, const char *name, int S::*at, const char *doc)
+static std::string shown_number(const sadmm_field &field, double x)
 {
-    c.def_prop_rw(name, [at](const S &s) { return s.*at; },
-                  [at, name](S &s, const whole &x) { s.*at = x.as_int(name); }, doc);
-}
-static void bind_VECTOR(settings_class &c, const char *name, double (S::*at)[3], const char *doc)
-{
-    c.def_prop_rw(name, [at](const S &s) { return array_of<3>(s.*at); },
-                  [at, name](S &s, numbers<3> x) { put(x.as(name), s.*at); }, doc);
-}
-static void bind_METHOD(settings_class &c, const char *name, sadmm_method S::*at, const char *doc)
-{
-    c.def_prop_rw(name, [at](const S &s) { return name_of(s.*at, method_names); },
-                  [at, name](S &s, const std::string &method) { s.*at = named(name, method, method_names); }, doc);
+    char text[32];
+    snprintf(text, sizeof text, field.kind == SADMM_FIELD_WHOLE ? "%.10g" : "%g", x);
+    return text;
 }
 
-#define RANGE_ANY(lo, hi) ""
-#define RANGE_CLOSED(lo, hi) " In [" #lo ", " #hi "]."
-#define RANGE_BELOW(lo, hi) " In [" #lo ", " #hi ")."
-#define RANGE_FROM(lo, hi) " Finite, >= " #lo "."
-#define RANGE_ABOVE(lo, hi) " Finite, > " #lo "."
-#define BIND(X, kind, role, name, value, lo, hi, ends, text) bind_##kind(c, #name, &S::name, text RANGE_##ends(lo, hi));
+std::string documented(const sadmm_field &field)
+{
+    const std::string lo = shown_number(field, field.lo), hi = shown_number(field, field.hi), text = field.text;
+    if (field.kind == SADMM_FIELD_BOUND) return text + " >= " + lo + ", may be infinite.";
+    switch (field.ends) {
+    case SADMM_ENDS_CLOSED: return text + " In [" + lo + ", " + hi + "].";
+    case SADMM_ENDS_BELOW: return text + " In [" + lo + ", " + hi + ").";
+    case SADMM_ENDS_FROM: return text + " Finite, >= " + lo + ".";
+    case SADMM_ENDS_ABOVE: return text + " Finite, > " + lo + ".";
+    case SADMM_ENDS_ANY: break;
+    }
+    return text;
+}
+
+#define BIND(X, kind, role, name, ...) \
+    bind_##kind(c, #name, [](auto &o) -> auto & { return o.name; }, documented(*field++));
 
 void bind_settings(nb::module_ &m)
 {
-    settings_class c(m, "Settings", "Settings of steps. Settings(dt=0.002, iterations=50): the defaults, with changes. "
+    nb::class_<S> c(m, "Settings", "Settings of steps. Settings(dt=0.002, iterations=50): the defaults, with changes. "
                                     "Checked when they are set in a world.");
     c.def("__init__", [](nb::pointer_and_handle<S> self, nb::kwargs values) {
         new (self.p) S(sadmm_settings_default());
         nb::inst_mark_ready(self.h);
         set_members(self.h, values);
     });
+    const sadmm_field *field = sadmm_settings_table;
     SADMM_SETTINGS(BIND, )
 #undef BIND
 
@@ -54,8 +52,8 @@ void bind_settings(nb::module_ &m)
 
     using R = sadmm_step_report;
     nb::class_<R>(m, "Report", "What the last step did.")
-        .def_prop_ro("backend", [](const R &r) { return name_of(r.backend, backend_names); }, "'ref', 'cpu' or 'cuda'.")
-        .def_prop_ro("precision", [](const R &r) { return name_of(r.precision, precision_names); }, "'f32' or 'f64'.")
+        .def_prop_ro("backend", [](const R &r) { return name_of(r.backend); }, "'ref', 'cpu' or 'cuda'.")
+        .def_prop_ro("precision", [](const R &r) { return name_of(r.precision); }, "'f32' or 'f64'.")
         .def_ro("threads", &R::threads, "CPU threads that worked on the step.")
         .def_ro("step", &R::step, "Steps done since creation.")
         .def_ro("time", &R::time, "Simulated time after the step, s.")

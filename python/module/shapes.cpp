@@ -1,24 +1,5 @@
 // Shapes' definitions, hulls, meshes, and the mass of solids.
-#include "common.h"
-
-static constexpr std::pair<const char *, sadmm_shape_type> type_names[] = {
-    {"plane", SADMM_SHAPE_PLANE}, {"sphere", SADMM_SHAPE_SPHERE}, {"capsule", SADMM_SHAPE_CAPSULE},
-    {"box", SADMM_SHAPE_BOX}, {"hull", SADMM_SHAPE_HULL}, {"mesh", SADMM_SHAPE_MESH},
-    {"cylinder", SADMM_SHAPE_CYLINDER}, {"cone", SADMM_SHAPE_CONE}, {"ellipsoid", SADMM_SHAPE_ELLIPSOID}};
-
-// Numbers that a shape made by its size has.
-static size_t size_count(sadmm_shape_type type)
-{
-    switch (type) {
-    case SADMM_SHAPE_SPHERE: return 1;
-    case SADMM_SHAPE_CAPSULE:
-    case SADMM_SHAPE_CYLINDER:
-    case SADMM_SHAPE_CONE: return 2;
-    case SADMM_SHAPE_BOX:
-    case SADMM_SHAPE_ELLIPSOID: return 3;
-    default: return 0;
-    }
-}
+#include "fields.h"
 
 using points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using triangles = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
@@ -140,36 +121,37 @@ static nb::object geometry_of(const shape_def &s)
     return nb::make_tuple(numpy_of(std::move(x), {vertices, 3}), numpy_of(std::move(corners), {count, 3}));
 }
 
+#define BIND(X, kind, role, name, ...) BIND_##kind(kind, name) ++field;
+#define BIND_AS(kind, name) bind_##kind(c, #name, [](auto &o) -> auto & { return o.def.name; }, documented(*field));
+#define BIND_REAL BIND_AS
+#define BIND_FLAG BIND_AS
+#define BIND_BITS BIND_AS
+#define BIND_VECTOR BIND_AS
+#define BIND_TURN BIND_AS
+#define BIND_SHAPE_TYPE(kind, name) // stays what it is
+#define BIND_OTHER(kind, name)
+
 void bind_shapes(nb::module_ &m)
 {
     using S = shape_def;
-    nb::class_<S>(m, "Shape", "A shape's definition; made by subadmm.sphere, box, hull, ... and given to World.add_shape "
-                              "or World.add_solid.")
-        .def("__init__", [](S *self, const std::string &type, const std::vector<double> &size) {
+    nb::class_<S> c(m, "Shape", "A shape's definition; made by subadmm.sphere, box, hull, ... and given to World.add_shape "
+                              "or World.add_solid.");
+    c.def("__init__", [](S *self, const std::string &type, const std::vector<double> &size) {
             new (self) S();
-            self->def.type = named("type", type, type_names);
+            self->def.type = named<sadmm_shape_type>("type", type);
             if (self->def.type == SADMM_SHAPE_HULL || self->def.type == SADMM_SHAPE_MESH)
                 throw nb::value_error("a hull is made by subadmm.hull, a mesh by subadmm.mesh or subadmm.heightfield");
-            const size_t count = size_count(self->def.type);
+            const size_t count = (size_t)sadmm_shape_sizes[self->def.type];
             if (size.size() != count) throw nb::value_error(("size: must have " + std::to_string(count) + " numbers").c_str());
             for (size_t k = 0; k < size.size(); ++k) self->def.size[k] = size[k];
         }, "type"_a, "size"_a = std::vector<double>())
-        .def_prop_ro("type", [](const S &s) { return name_of(s.def.type, type_names); })
-        .def_prop_rw("size", [](const S &s) { return array_of<3>(s.def.size); }, [](S &s, numbers<3> x) { put(x.as("size"), s.def.size); }, "m, as sadmm_shape_def.size.")
-        .def_prop_rw("position", [](const S &s) { return array_of<3>(s.def.position); },
-                     [](S &s, numbers<3> x) { put(x.as("position"), s.def.position); }, "In the body's frame, m.")
-        .def_prop_rw("orientation", [](const S &s) { return array_of<4>(s.def.orientation); },
-                     [](S &s, numbers<4> q) { put(q.as("orientation"), s.def.orientation); }, "To the body's frame, w x y z.")
-        .def_prop_rw("friction", [](const S &s) { return s.def.friction; }, [](S &s, double x) { s.def.friction = x; }, "mu, in [0, 1e6].")
-        .def_prop_rw("restitution", [](const S &s) { return s.def.restitution; }, [](S &s, double x) { s.def.restitution = x; }, "In [0, 1].")
-        .def_prop_rw("category", [](const S &s) { return s.def.category; }, [](S &s, whole x) { s.def.category = x.as_bits("category"); }, "Bits of its own categories.")
-        .def_prop_rw("mask", [](const S &s) { return s.def.mask; }, [](S &s, whole x) { s.def.mask = x.as_bits("mask"); }, "Categories that it collides with.")
-        .def_prop_rw("sensor", [](const S &s) { return s.def.sensor; }, [](S &s, bool x) { s.def.sensor = x; },
-                     "A sensor has no contacts and reports overlaps: World.record_events, World.sensor_overlaps.")
+        .def_prop_ro("type", [](const S &s) { return name_of(s.def.type); })
         .def("copy", [](const S &s) { return S(s); }, "A copy of the definition; hulls and meshes are shared.")
         .def("geometry", &geometry_of, "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.")
         .def_prop_ro("convex_radius", [](const S &s) { return sadmm_hull_convex_radius(s.def.hull); },
                      "Convex radius of a hull, m; geometry() is the polyhedron without it. 0 for other types.");
+    const sadmm_field *field = sadmm_shape_table;
+    SADMM_SHAPE_FIELDS(BIND, )
 
     m.def("_hull", &make_hull, "points"_a.noconvert(), "merge"_a, "convex_radius"_a);
     m.def("_mesh", &make_mesh, "vertices"_a.noconvert(), "triangles"_a.noconvert());

@@ -1,7 +1,7 @@
 // Worlds: bodies, shapes, steps, saved states.
 #include <chrono>
 
-#include "common.h"
+#include "fields.h"
 
 static sadmm_settings read_settings(nb::handle given)
 {
@@ -14,8 +14,8 @@ static void init_world(world *self, const std::string &backend, const std::strin
                        double contact_margin, nb::object settings)
 {
     sadmm_world_def def = sadmm_world_def_default();
-    def.backend = named("backend", backend, backend_names);
-    def.precision = named("precision", precision, precision_names);
+    def.backend = named<sadmm_backend>("backend", backend);
+    def.precision = named<sadmm_precision>("precision", precision);
     def.device = device.as_int("device");
     def.contact_margin = contact_margin;
     if (!settings.is_none()) def.settings = read_settings(settings);
@@ -84,23 +84,13 @@ static sadmm_status add_shapes(sadmm_world *h, sadmm_body_id body, const std::ve
 }
 
 // All of it or nothing, and nobody sees a part of it: under one lock.
-static body add_body(nb::handle_t<world> self, const std::string &type, double mass, numbers<3> inertia, numbers<3> position,
-                     numbers<4> orientation, numbers<3> linear_velocity, numbers<3> angular_velocity, whole environment,
-                     const std::string &name, double gravity_scale, double linear_damping, double angular_damping,
-                     nb::object shapes)
+static body add_body(nb::handle_t<world> self, const std::string &name SADMM_BODY_FIELDS(PARAMETER, ), nb::object shapes)
 {
     world &w = nb::cast<world &>(self);
     sadmm_body_def def = sadmm_body_def_default();
     body out{nb::borrow(self), &w, {}};
-    def.type = named("type", type, body_type_names);
-    def.mass = mass;
-    put(inertia.as("inertia"), def.inertia), put(position.as("position"), def.position);
-    put(orientation.as("orientation"), def.orientation);
-    put(linear_velocity.as("linear_velocity"), def.linear_velocity);
-    put(angular_velocity.as("angular_velocity"), def.angular_velocity);
-    def.environment = environment.as_int("environment");
+    SADMM_BODY_FIELDS(PUT, def)
     def.name = without_null("name", name).c_str();
-    def.gravity_scale = gravity_scale, def.linear_damping = linear_damping, def.angular_damping = angular_damping;
     const std::vector<shape_def> parts = read_shapes("shapes", shapes);
     std::string message;
     sadmm_status status;
@@ -170,6 +160,16 @@ static shape add_shape(const body &b, const shape_def &given)
     return out;
 }
 
+// Poses and velocities are those of the state, and can be set.
+#define BODY_IS(X, kind, role, name, value, lo, hi, ends, text) BODY_IS_##role##_##kind(name, text)
+#define BODY_IS_OWN_OTHER(name, text) c.def_prop_ro(#name, [](const body &b) { return name_of(b); }, text);
+#define BODY_IS_PLAIN_BODY_TYPE(name, text) READ_ONLY(c, body, name, text);
+#define BODY_IS_PLAIN_WHOLE(name, text) READ_ONLY(c, body, name, text);
+#define BODY_IS_DYNAMIC_REAL(name, text) READ_ONLY(c, body, name, text);
+#define BODY_IS_DYNAMIC_VECTOR(name, text) READ_ONLY(c, body, name, text);
+#define BODY_IS_PLAIN_VECTOR(name, text) bind_member<3>(c, #name, &sadmm_body_state::name, text);
+#define BODY_IS_PLAIN_TURN(name, text) bind_member<4>(c, #name, &sadmm_body_state::name, text);
+
 static void bind_body(nb::module_ &m)
 {
     nb::class_<body> c(m, "Body", collected<sadmm_body_id>(), "A body of a world. Body(...) is made by World.add_body, World.add_solid, World.bodies.");
@@ -182,18 +182,11 @@ static void bind_body(nb::module_ &m)
             call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_index(h, b.id, &index); });
             return index;
         }, "Row of the world's arrays.")
-        .def_prop_ro("name", [](const body &b) { return name_of(b); }, "The name, up to 63 bytes of UTF-8.")
-        .def_prop_ro("type", [](const body &b) { return name_of(def_of(b).type, body_type_names); }, "'dynamic', 'static' or 'kinematic'.")
-        .def_prop_ro("mass", [](const body &b) { return def_of(b).mass; }, "kg.")
-        .def_prop_ro("inertia", [](const body &b) { return array_of<3>(def_of(b).inertia); }, "Principal moments, kg m^2.")
         .def("set_mass", [](const body &b, double mass, numbers<3> moments) {
             const vec3 inertia = moments.as("inertia");
             call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_mass(h, b.id, mass, inertia.data()); });
         }, "mass"_a, "inertia"_a, "From the next step on.");
-    bind_member<3>(c, "position", &sadmm_body_state::position, "Centre of mass, m.");
-    bind_member<4>(c, "orientation", &sadmm_body_state::orientation, "w x y z, body to world.");
-    bind_member<3>(c, "linear_velocity", &sadmm_body_state::linear_velocity, "m/s.");
-    bind_member<3>(c, "angular_velocity", &sadmm_body_state::angular_velocity, "rad/s, world frame.");
+    SADMM_BODY_FIELDS(BODY_IS, )
     c.def("add_shape", &add_shape, "shape"_a, "Put a shape on the body, at the definition's position and orientation.")
         .def("move_to", [](const body &b, numbers<3> position, numbers<4> orientation) {
             const vec3 x = position.as("position");
@@ -279,17 +272,15 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
                   "A copy: change it and assign it. From the next step on.");
     w.def("set_backend", [](world &w, const std::string &backend, const std::string &precision, whole which) {
         const int device = which.as_int("device");
-        const auto b = named("backend", backend, backend_names);
-        const auto p = named("precision", precision, precision_names);
+        const auto b = named<sadmm_backend>("backend", backend);
+        const auto p = named<sadmm_precision>("precision", precision);
         call(w, [&](sadmm_world *h) {
             const sadmm_status status = sadmm_world_set_backend(h, b, p, device);
             if (status == SADMM_OK) w.def.precision = p;
             return status;
         });
     }, "backend"_a, "precision"_a = "f64", "device"_a = 0, "Change the backend from the next step on.");
-    w.def("add_body", &add_body, nb::kw_only(), "type"_a = "dynamic", "mass"_a = 0.0, "inertia"_a = vec3{}, "position"_a = vec3{},
-          "orientation"_a = quat{1, 0, 0, 0}, "linear_velocity"_a = vec3{}, "angular_velocity"_a = vec3{},
-          "environment"_a = 0, "name"_a = "", "gravity_scale"_a = 1.0, "linear_damping"_a = 0.0, "angular_damping"_a = 0.0, "shapes"_a = nb::tuple(),
+    w.def("add_body", &add_body, nb::kw_only(), "name"_a = "" SADMM_BODY_FIELDS(ARGUMENT, ), "shapes"_a = nb::tuple(),
           "A body. SI units; `inertia`: principal moments; `shapes`: Shapes to put on it, none by default. If one of them is\n"
           "refused, no body is added. World.add_solid computes masses.");
     w.def_prop_ro("body_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_body_count(h); }); });
