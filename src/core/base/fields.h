@@ -30,8 +30,8 @@ extern "C" {
 
 enum sadmm_field_kind {
     SADMM_FIELD_REALS, /* `count` doubles */
-    SADMM_FIELD_TURN,
     SADMM_FIELD_BOUND,
+    SADMM_FIELD_TURN,
     SADMM_FIELD_MEASURED,
     SADMM_FIELD_WHOLE,
     SADMM_FIELD_BITS,
