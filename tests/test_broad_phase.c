@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "collision/base/radix_sort.h"
+#include "collision/find/find_candidates.h"
 #include "collision/find/pipeline.h"
 #include "config.h"
 #include "core/base/memory.h"

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "collision/collision.h"
-#include "collision/find/kernels.h"
+#include "collision/find/variants.h"
 #include "collision/find/pipeline.h"
 #include "config.h"
 #include "core/base/memory.h"

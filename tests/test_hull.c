@@ -2,6 +2,7 @@
  * and how it is reported; the block that contact finding reads. */
 #include <check.h>
 
+#include "collision/hull/hull_write.h"
 #include "core/base/memory.h"
 #include "hull_tools.h"
 #include "run_suite.h"

@@ -2,6 +2,7 @@
  * back bit for bit, and memory that runs out changes nothing. */
 #include <check.h>
 
+#include "collision/hull/hull_write.h"
 #include "core/base/memory.h"
 #include "hull_tools.h"
 #include "scene_tools.h"

@@ -1,12 +1,17 @@
 #!/usr/bin/env python3
 """Imports run one way (docs/internals/architecture.md, "Folders and layers").
 
-    test_layers.py PROJECT [ARCHIVE]...
+    test_layers.py PROJECT [ARCHIVE | FOLDER OF OBJECTS]...
 
 Of every source below PROJECT/src: folders include those they may, and no file includes itself, directly or through others.
-Of the objects in the archives (by nm): no two of them call each other, directly or through others, and folders call those
-they may include. What is in an archive several times over (precisions, instruction sets) counts as one object.
+Of the objects in the archives and folders (by nm): no two of them call each other, directly or through others, and folders
+call those they may include. What is there several times over (precisions, instruction sets) counts as one object.
+Of both together: a source and the header of its name are one part, and no part uses itself through others.
+Of the modules below PROJECT/python/subadmm: none imports itself through others, also where a function imports. What the
+package itself exports is the public API, which every module may use, as the C sources use include/subadmm.
 """
+import ast
+import glob
 import os
 import re
 import shutil
@@ -41,6 +46,8 @@ MAY_USE = {
     "fclib": ["core/base", "core/model"],
     "cli": ["core/base", "scene_file", "scenes", "fclib"],
 }
+# What is built on the public API: what they call of it is theirs to call.
+TOOLS = ["scene_file", "scenes", "fclib", "cli"]
 # The list of backends: the one place that names them (each through its find function).
 BACKEND_LIST = "core/solve/registry.c"
 
@@ -62,7 +69,15 @@ def includes(root, files):
     return graph
 
 
-def calls(archives, files):
+def public_names(folder):
+    names = set()
+    for header in glob.glob(os.path.join(folder, "*.h")):
+        with open(header, encoding="utf-8") as text:
+            names.update(re.findall(r"\bsadmm_\w+", text.read()))
+    return names
+
+
+def calls(archives, files, public):
     """Object -> objects that define what it uses; objects by their source below src, where one is known."""
     source = {re.sub(r"[/.]", "_", os.path.splitext(file)[0]): file for file in files if not file.endswith(".h")}
 
@@ -73,7 +88,8 @@ def calls(archives, files):
     defined, used = {}, {}
     for archive in archives:
         member = None
-        listing = subprocess.run(["nm", "--format=posix", archive], capture_output=True, text=True, check=True)
+        objects = glob.glob(os.path.join(archive, "*.o")) if os.path.isdir(archive) else [archive]
+        listing = subprocess.run(["nm", "--format=posix", *objects], capture_output=True, text=True, check=True)
         for line in listing.stdout.splitlines():
             if line.endswith("]:") or line.endswith(".o:"):
                 member = source_of(os.path.basename(re.sub(r"^.*\[|\]?:$", "", line)))
@@ -85,8 +101,37 @@ def calls(archives, files):
                 defined[fields[0]] = member
             elif fields[1] == "U":
                 used.setdefault(member, set()).add(fields[0])
-    return {file: {defined[symbol] for symbol in symbols if symbol in defined} - {file}
-            for file, symbols in used.items()}
+    return {file: {defined[symbol] for symbol in symbols - (public if os.path.dirname(file) in TOOLS else set())
+                   if symbol in defined} - {file} for file, symbols in used.items()}
+
+
+def parts(*graphs):
+    """A source and its header are one part."""
+    joined = {}
+    for graph in graphs:
+        for file, others in graph.items():
+            part = os.path.splitext(file)[0]
+            joined.setdefault(part, set()).update(os.path.splitext(other)[0] for other in others)
+    return {part: others - {part} for part, others in joined.items()}
+
+
+def python_imports(root):
+    """Module -> modules of the package that it imports; packages by their names."""
+    modules = {}
+    for path in glob.glob(os.path.join(root, "**", "*.py"), recursive=True):
+        name = os.path.splitext(os.path.relpath(path, root))[0].split(os.sep)
+        modules[tuple(name[:-1] if name[-1] == "__init__" else name)] = path
+    graph = {}
+    for module, path in modules.items():
+        package = module if path.endswith("__init__.py") else module[:-1]
+        used = set()
+        with open(path, encoding="utf-8") as text:
+            for node in ast.walk(ast.parse(text.read())):
+                if isinstance(node, ast.ImportFrom) and node.level > 0:
+                    start = package[:len(package) - node.level + 1] + tuple((node.module or "").split(".") * bool(node.module))
+                    used.update(start + (name.name,) if start + (name.name,) in modules else start for name in node.names)
+        graph["/".join(module) or "subadmm"] = {"/".join(name) for name in used if name and name != module}
+    return graph
 
 
 def circle(graph):
@@ -134,19 +179,22 @@ def main():
     files = set(files_below(root))
     graphs = [("includes", includes(root, files))]
     if archives and shutil.which("nm"):
-        graphs.append(("calls", calls(archives, files)))
+        graphs.append(("calls", calls(archives, files, public_names(os.path.join(sys.argv[1], "include", "subadmm")))))
         if len(graphs[-1][1]) < 20:
             sys.exit(f"only {len(graphs[-1][1])} objects of src found in {' '.join(archives)}")
+    graphs.append(("uses", parts(*(graph for _, graph in graphs))))
+    graphs.append(("imports", python_imports(os.path.join(sys.argv[1], "python", "subadmm"))))
     failed = False
     for verb, graph in graphs:
-        errors = list(wrong_edges(graph, verb))
+        errors = list(wrong_edges(graph, verb)) if verb in ("includes", "calls") else []
         found = circle(graph)
         if found:
             errors.append(f"a circle: {f' {verb} '.join(found)}")
         for error in errors:
             print(error)
         failed = failed or bool(errors)
-        print(f"{sum(map(len, graph.values()))} times a file {verb} another: "
+        what = {"uses": "part", "imports": "module"}.get(verb, "file")
+        print(f"{sum(map(len, graph.values()))} times a {what} {verb} another: "
               f"{'no circle, one way' if not errors else f'{len(errors)} wrong'}")
     sys.exit(failed)
 

@@ -12,7 +12,7 @@ import subadmm
 from browser import decoded
 from subadmm import show
 from subadmm.__main__ import main
-from subadmm.show import page, png, recording
+from subadmm.show import packing, page, png, recording
 from subadmm.show.raster import rasterise
 from subadmm.show.session import Session
 
@@ -218,7 +218,7 @@ def test_pages_have_all_of_a_recording_and_nothing_from_elsewhere():
     for name, values in (("positions", taken.positions), ("turns", taken.orientations)):
         kind, at, count = header[name]
         assert kind == "u8"
-        assert (recording.unpacked(data[at:at + count], *values.shape) == values).all()
+        assert (packing.unpacked(data[at:at + count], *values.shape) == values).all()
 
 
 def test_ten_seconds_of_2000_bodies_are_less_than_10_megabytes():
@@ -241,7 +241,7 @@ def test_ten_seconds_of_2000_bodies_are_less_than_10_megabytes():
     step = recording.position_step(description)
     assert step <= 1e-4
     taken = show.Recording(
-        description, "", step, np.arange(frames) / 30, np.rint(place / step), np.rint(turn / recording.TURN_STEP)
+        description, "", step, np.arange(frames) / 30, np.rint(place / step), np.rint(turn / packing.TURN_STEP)
     )
     assert len(page.page_of(taken)) < 10e6
 

@@ -9,6 +9,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "collision/find/find_candidates.h"
 #include "collision/find/kernels.h"
 #include "collision/find/pipeline.h"
 #include "config.h"

@@ -4,7 +4,8 @@
 
 #include <hdf5.h>
 
-#include "fclib.h"
+#include "core/base/error.h"
+#include "subadmm/problem.h"
 
 /* As sadmm_fclib_load; the file stays open. */
 sadmm_status sadmm_fclib_read(hid_t file, sadmm_problem **out, struct sadmm_error *error);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "ply_header.h"
 
 struct row {
     const struct ply_element *element;

@@ -1,5 +1,6 @@
+#include "ply_header.h"
+
 #include "core/base/memory.h"
-#include "ply.h"
 
 #define FAIL(p, status, ...) sadmm_mesh_file_fail((p)->parts, (p)->text.line, status, __VA_ARGS__)
 #define REFUSE(p, ...)       FAIL(p, SADMM_ERROR_INVALID_ARGUMENT, __VA_ARGS__)

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
-#include "fill.h"
+#include "read_forms.h"
 
 /* Rows of `width` numbers, member `member` of the object at hand, into *numbers, which the caller frees; *rows: how
  * many. Memory is asked for when all have that many. */

@@ -2,8 +2,8 @@
 #include <math.h>
 
 #include "core/base/memory.h"
-#include "fill.h"
 #include "orientation.h"
+#include "read_parts.h"
 
 static sadmm_body_id body_of(const struct sadmm_filler *f, int64_t number)
 {

@@ -1,6 +1,6 @@
 /* Hulls and meshes of a world as JSON. */
 #include "core/base/memory.h"
-#include "write.h"
+#include "write_forms.h"
 
 /* *known: it was there. OUT_OF_MEMORY. */
 static sadmm_status number_of(struct sadmm_writer *w, struct sadmm_key_tree *numbers, const void *form, bool *known,

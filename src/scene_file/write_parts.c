@@ -1,5 +1,5 @@
 /* What is between bodies, as JSON: joints, couplings, gears, what was set for pairs. */
-#include "write.h"
+#include "write_parts.h"
 
 /* The number of a body; null: the static world. */
 static json_t *body_number(const struct sadmm_writer *w, sadmm_body_id id)

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "write.h"
+#include "write_text.h"
 
 static bool is_flat(const json_t *array)
 {

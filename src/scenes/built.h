@@ -3,7 +3,7 @@
 #define SADMM_SCENES_BUILT_H
 
 #include "place.h"
-#include "scenes.h"
+#include "scene.h"
 
 /* Where block `i` of a structure was put: the frame of its shape. */
 typedef struct sadmm_frame (*sadmm_built_at)(const struct sadmm_scene *scene, int32_t i);

@@ -3,7 +3,7 @@
 #ifndef SADMM_SCENES_FAMILY_H
 #define SADMM_SCENES_FAMILY_H
 
-#include "scenes.h"
+#include "scene.h"
 
 struct sadmm_scene_family {
     struct sadmm_scene_info info;

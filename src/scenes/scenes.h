@@ -18,38 +18,15 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "core/base/error.h"
-#include "subadmm/world.h"
+#include "scene.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-struct sadmm_scene_info {
-    const char *name;
-    const char *arguments;   /* what may follow the name: "[:N]", "[:N[:M]]", or "" */
-    const char *description; /* one line */
-    double duration;         /* s, simulated time the scene is meant to be run for */
-    int iterations[SADMM_METHOD_COUNT]; /* a step, by method */
-    int substeps;            /* of a step of `fast`, which share its iterations; 0: one, as in `paper` */
-    bool chaotic; /* trajectories that differ by rounding part within the duration: only statistics can be compared */
-};
-
 /* The scenes, index in [0, count); NULL outside. Static storage. */
 size_t sadmm_scene_count(void);
 const struct sadmm_scene_info *sadmm_scene_at(size_t index);
-
-struct sadmm_scene_loaded; /* what a scene has that was read from a file */
-
-/* An opened spec, or file. */
-struct sadmm_scene {
-    sadmm_world_def def;                /* the scene's settings; the caller may change them before building */
-    double duration;                    /* s */
-    const struct sadmm_scene_info *info;
-    long n;                             /* the N of "name:N", or the scene's default */
-    long m;                             /* the M of "name:N:M", or the scene's default; 0: the scene takes none */
-    struct sadmm_scene_loaded *loaded;  /* NULL: a scene of the library */
-};
 
 /* Is this spec the path of a scene file? */
 bool sadmm_scene_is_file(const char *spec);
@@ -98,28 +75,6 @@ bool sadmm_scene_has_script(const struct sadmm_scene *scene);
  *
  * A scene may measure by itself whether it went as it should, task by task: what was to be grasped is held, what was
  * built stands. */
-
-enum { SADMM_SCENE_MOST_TASKS = 8, SADMM_SCENE_MOST_FIGURES = 4, SADMM_SCENE_MEMORY = 64 };
-
-struct sadmm_scene_figure {
-    const char *name, *unit; /* static storage */
-    double value;
-};
-
-struct sadmm_scene_task {
-    const char *name; /* static storage */
-    struct sadmm_scene_figure figures[SADMM_SCENE_MOST_FIGURES];
-    int figure_count;
-    bool finished; /* the run has come to where the task is judged */
-    bool passed;   /* finished, and as it should be */
-};
-
-/* Belongs to one run of one world; zeroed before its first step. */
-struct sadmm_scene_result {
-    struct sadmm_scene_task tasks[SADMM_SCENE_MOST_TASKS];
-    int task_count; /* 0: the scene has no measure of success */
-    double memory[SADMM_SCENE_MEMORY]; /* what the scene has to remember from one step to another; its own */
-};
 
 /* Inspect the world: call before the first step (`step` = 0) and after every one (`step`: steps done). It waits for
  * steps begun where the scene has a measure, and does nothing where it has none. Errors: INVALID_ARGUMENT, those of the

@@ -14,6 +14,7 @@
 
 #include "bytes.h"
 #include "core/base/memory.h"
+#include "fclib/fclib.h"
 #include "fclib/open_file.h"
 
 enum { MAX_BODIES = 3, MAX_CONTACTS = 3, MAX_ROWS = 7, MAX_ENTRIES = 36 * MAX_BODIES, MAX_SETS = 40 };

@@ -12,8 +12,8 @@ from .camera import looking_at
 from .description import extent_of
 from .forces import COLOURS, SCALE, UNMEASURED, legend
 from .measures import MEASURES
+from .packing import TURN_STEP, packed
 from .picture import SUN
-from .recording import TURN_STEP, packed
 
 
 def _usual_view(recording):

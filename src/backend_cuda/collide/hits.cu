@@ -1,9 +1,10 @@
-/* Hits (hits.h) on the host's side: memory, launches, what has happened. */
+/* Hits (hits_view.h) on the host's side: memory, launches, what has happened. */
 #include <string.h>
 
 #include <algorithm>
 
 #include "memory.h"
+#include "pipeline.h"
 
 /* ---- groups ------------------------------------------------------------------------------------------------------ */
 

@@ -1,6 +1,6 @@
-/* Contacts after hits (hits.h): shapes of what was hit, where they are now; their manifolds and points; and what hits
+/* Contacts after hits (hits_view.h): shapes of what was hit, where they are now; their manifolds and points; and what hits
  * gave bodies. */
-#include "hits.h"
+#include "hits_view.h"
 #include "narrow.h"
 
 #pragma GCC diagnostic push

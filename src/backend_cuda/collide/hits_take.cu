@@ -1,5 +1,5 @@
-/* Hits: from candidates to what is left when all have been taken (hits.h). */
-#include "hits.h"
+/* Hits: from candidates to what is left when all have been taken (hits_view.h). */
+#include "hits_view.h"
 
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push

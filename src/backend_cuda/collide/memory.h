@@ -6,7 +6,7 @@
 
 #include "collision/find/seams.h"
 #include "core/base/memory.h"
-#include "hits.h"
+#include "hits_view.h"
 #include "view.h"
 
 /* Memory of the device or pinned memory of the host. */
@@ -94,7 +94,7 @@ struct sadmm_cuda_collision {
     size_t input_bytes[INPUTS]; /* as uploaded; SIZE_MAX: not */
     uint32_t hull_revision;
     bool smooth;                /* a shape is a smooth body (collision/shapes/geometry.h) */
-    bool takes_hits;            /* the world is one of those of hits.h; */
+    bool takes_hits;            /* the world is one of those of hits_view.h; */
     bool hits_ready;            /* and the device has its lists */
     struct hit_lists *hit_lists;
     struct hits_kernels hits_kernels;
@@ -272,7 +272,7 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
                                    struct sadmm_cuda_contact_counts *counts, struct sadmm_error *error);
 sadmm_status COLLISION(reserve_set)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
                                       struct sadmm_error *error);
-/* Hits (hits.h): from candidates to where what was hit is, before they are searched for again; after the narrow phase;
+/* Hits (hits_view.h): from candidates to where what was hit is, before they are searched for again; after the narrow phase;
  * and after `emit`. */
 void COLLISION(free_hits)(struct sadmm_cuda_collision *c);
 sadmm_status COLLISION(take_hits)(struct sadmm_cuda_collision *c, const struct sadmm_cuda_hits *step,

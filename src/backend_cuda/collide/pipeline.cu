@@ -9,6 +9,7 @@
 
 #include "backend_cuda/device/parallel.h"
 #include "memory.h"
+#include "pipeline.h"
 
 /* Shapes from which the tree pays, and stores by the warp (fewer wait 1.4 us for them); capacity from which the radix
  * sort does. */

@@ -5,6 +5,7 @@
 
 #include "backend_cuda/device/parallel.h"
 #include "memory.h"
+#include "pipeline.h"
 
 /* ---- stages ---------------------------------------------------------------------------------------------------- */
 

@@ -1,5 +1,6 @@
 /* Which pairs of the current set touch (contact_set.h), for the host: a few bytes a pair instead of all points. */
 #include "memory.h"
+#include "pipeline.h"
 
 enum { TOUCHING_THREADS = 128 };
 

@@ -6,7 +6,7 @@
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
  *            (a pair with a mesh is listed; a warp of `expand` finds its triangles: meshes.cu)
  *   sort     candidates by (slot of a, slot of b, subshape), the host's order
- *   hits     where they are planned: swept bodies hit each other, and the candidates are searched for again: hits.h
+ *   hits     where they are planned: swept bodies hit each other, and the candidates are searched for again: hits_view.h
  *   narrow   the last step's pair (a hint or a search), manifold by candidate     a thread a candidate
  *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
  *   seams    where shapes have neighbours: manifolds that their union does not have  the same (plain: by narrow itself)
@@ -50,7 +50,7 @@
 #include "collision/convex/gjk.h"
 #include "collision/find/contact_emit.h"
 #include "collision/find/seam.h"
-#include "pipeline.h"
+#include "find.h"
 
 enum {
     COLLISION_THREADS = 256, /* a block */

@@ -29,7 +29,7 @@
  * what overlaps is made without its push, and behind `finish` the second problem is gathered and solved, in a context of
  * its own, and bodies are moved by it (step/push.cu).
  *
- * Hits of bodies in flight (collide/hits.h) come between the candidates and the narrow phase of steps that are planned to
+ * Hits of bodies in flight (collide/hits_view.h) come between the candidates and the narrow phase of steps that are planned to
  * have some: the narrow phase of others says whether any pair is fast.
  *
  * fast, small islands (c->prologue): `iterate` does penalties and limit too, and the last two check the plan.

@@ -114,7 +114,7 @@ static inline struct cuda_step_report *step_reports(const struct sadmm_context *
 /* The next step is planned anew: there are no graphs of it. */
 static inline void forget_graphs(struct cuda_step *s) { s->graphs[false].recorded = s->graphs[true].recorded = false; }
 
-/* May hits of bodies in flight be taken at their moment (collide/hits.h)? Is that planned? */
+/* May hits of bodies in flight be taken at their moment (collide/hits_view.h)? Is that planned? */
 static inline bool may_take_hits(const struct sadmm_context *c)
 {
     return c->settings.hits > 0 && COLLISION(takes_hits)(c->step->collision);

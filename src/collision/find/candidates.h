@@ -69,14 +69,6 @@ struct sadmm_candidates {
     bool seams_valid;
 };
 
-sadmm_status sadmm_candidates_init(struct sadmm_candidates *c, const struct sadmm_broad_phase_kind *kind,
-                                   struct sadmm_error *error);
-void sadmm_candidates_free(struct sadmm_candidates *c);
-
-/* Bring proxies, boxes and the list up to date. After a failure the next call starts from scratch. */
-sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sadmm_collision_input *input, int threads,
-                                     struct sadmm_error *error);
-
 /* Things that do not change while the shapes stay what they are. */
 static inline bool sadmm_pair_may_meet(const struct sadmm_collision_input *input, uint32_t a, uint32_t b)
 {

@@ -20,9 +20,6 @@ struct sadmm_collision_kernels {
     sadmm_narrow_phase *narrow_phase;
 };
 
-/* The variants that this machine can run, the best one first; NULL beyond the last one. */
-const struct sadmm_collision_kernels *sadmm_collision_kernels_at(int index);
-
 #define SADMM_COLLISION_JOIN2(a, b) a##b
 #define SADMM_COLLISION_JOIN(a, b) SADMM_COLLISION_JOIN2(a, b)
 /* A symbol of this variant. */

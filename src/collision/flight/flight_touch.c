@@ -1,4 +1,6 @@
 #define SADMM_SMOOTH_ELSEWHERE sadmm_smooth_manifold_baseline
+#include "flight_touch.h"
+
 #include "flight_touch_math.h"
 
 void sadmm_flight_at(const struct sadmm_flight *flight, double t, struct sadmm_flight_pose *pose)

@@ -9,7 +9,7 @@
 #include "collision/manifold/pair_manifold.h"
 #include "core/math/array3.h"
 #include "core/math/rigid.h"
-#include "flight_touch.h"
+#include "flight.h"
 
 /* Most moves towards a touch; a pair that takes more is the solve's. */
 enum { TOUCH_MOVES = 256 };

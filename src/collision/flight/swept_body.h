@@ -14,7 +14,7 @@
 #include "core/math/rigid.h"
 #include "core/model/forces.h"
 #include "core/model/spin.h"
-#include "flight_touch.h"
+#include "flight.h"
 
 /* A body that takes part. */
 struct swept_body {

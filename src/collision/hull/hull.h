@@ -50,7 +50,4 @@ void sadmm_hull_release(const sadmm_hull *hull);
 struct sadmm_archive;
 void sadmm_hull_archive(struct sadmm_archive *archive, sadmm_hull **hull);
 
-/* The blocks that all shape data begins with, HULL_FIRST_OWN doubles. */
-void sadmm_hull_prelude(double *data);
-
 #endif

@@ -4,7 +4,6 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "hull.h"
 #include "hull_data.h"
 
 size_t sadmm_hull_data_doubles(const struct hull_mesh *mesh)

@@ -10,4 +10,7 @@ size_t sadmm_hull_data_doubles(const struct hull_mesh *mesh);
 void sadmm_hull_data_write(const struct hull_mesh *mesh, const double *vertices, const double *planes,
                            double convex_radius, double *block);
 
+/* The blocks that all shape data begins with, HULL_FIRST_OWN doubles. */
+void sadmm_hull_prelude(double *data);
+
 #endif

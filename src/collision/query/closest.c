@@ -1,8 +1,9 @@
 #include "closest.h"
 
-#include "closest_pair.h"
 #include "collision/manifold/collision_table.h"
 #include "collision/mesh/mesh_data.h"
+#include "closest_mesh.h"
+#include "closest_pair.h"
 
 bool sadmm_closest_is_known(int type_a, int type_b)
 {

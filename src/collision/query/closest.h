@@ -9,31 +9,12 @@
 #include <stdbool.h>
 
 #include "collision/shapes/placed.h"
-#include "core/math/vec3.h"
-
-/* In the frame of the second shape, or of the world. */
-struct sadmm_separation {
-    double distance;  /* m; negative: the depth */
-    vec3 normal;      /* unit, from the first to the second */
-    vec3 a, b;        /* of either, b - a = distance normal */
-    int32_t triangle; /* of a mesh, as its block numbers them; else -1 */
-};
+#include "separation.h"
 
 /* Of the two types, in either order? Two planes and two meshes have no distance. */
 bool sadmm_closest_is_known(int type_a, int type_b);
 /* False: they are farther apart than `limit` (m, >= 0), which may be infinite. */
 bool sadmm_closest(const struct sadmm_placed *a, const struct sadmm_placed *b, double limit,
                    struct sadmm_separation *separation);
-
-/* ---- for closest.c ---------------------------------------------------------------------------------------------- */
-
-/* a in the frame of b: p_b = R p_a + t. */
-struct closest_pose {
-    mat3 R;
-    vec3 t;
-};
-/* a: not a plane; b: a mesh. In the frame of b. */
-bool sadmm_closest_on_mesh(const struct sadmm_placed *a, const struct sadmm_placed *b, const struct closest_pose *pose,
-                           double limit, struct sadmm_separation *separation);
 
 #endif

@@ -4,7 +4,7 @@
  * A mesh is a surface with one side: what is in a triangle is as deep as the shortest way off it to that side, in front
  * of the triangle or past its sides. Where the shortest way of all leads behind it, that is straight to the front.
  */
-#include "closest.h"
+#include "closest_mesh.h"
 
 #include "closest_pair.h"
 #include "collision/manifold/manifold_convex_mesh.h"

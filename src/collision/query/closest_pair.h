@@ -2,9 +2,9 @@
 #ifndef SADMM_COLLISION_QUERY_CLOSEST_PAIR_H
 #define SADMM_COLLISION_QUERY_CLOSEST_PAIR_H
 
-#include "closest.h"
 #include "collision/manifold/manifold_convex.h"
 #include "collision/manifold/manifold_hull.h"
+#include "separation.h"
 
 /* Points that are off the axis by no more than this share of the size are its nearest ones. */
 #define CLOSEST_ON_AXIS 1e-10

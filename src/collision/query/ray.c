@@ -2,6 +2,9 @@
 
 #include <string.h>
 
+#include "ray_mesh.h"
+#include "ray_solid.h"
+
 static void enters_at(double distance, const double normal[3], struct sadmm_ray_find *find)
 {
     find->distance = distance;

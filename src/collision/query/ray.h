@@ -29,24 +29,4 @@ struct sadmm_ray_find {
 bool sadmm_ray_cast(const struct sadmm_ray_line *ray, const struct sadmm_placed *shape, double limit,
                     struct sadmm_ray_find *find);
 
-/* ---- for ray.c, in the frame of a shape ------------------------------------------------------------------------- */
-
-/* The line x + t d, d unit, and the stretch of it that is in a solid. */
-struct ray_line {
-    vec3 x, d;
-};
-struct ray_span {
-    double in, out;
-    vec3 normal; /* outward where it enters */
-};
-
-/* False: the line does not meet it. `line`: x is near where the line is nearest to the shape's origin. Not of planes
- * and meshes. */
-bool sadmm_ray_span(const struct sadmm_geometry *geometry, const double *blocks, const struct ray_line *line,
-                    struct ray_span *span);
-
-/* The nearest triangle within the limit, -1: there is none. */
-int32_t sadmm_ray_mesh(const double *blocks, uint32_t at, const struct ray_line *line, double limit, bool from_behind,
-                       double *distance, vec3 *normal);
-
 #endif

@@ -3,8 +3,9 @@
  * of a triangle are on one or the other side of the axis by the sign of a difference of two products, which rounding
  * may make 0 but never turn around, and which is the same for both triangles at an edge.
  */
+#include "ray_mesh.h"
+
 #include "collision/mesh/mesh_triangle.h"
-#include "ray.h"
 #include "ray_box.h"
 
 struct shear {

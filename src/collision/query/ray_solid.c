@@ -1,4 +1,4 @@
-#include "ray.h"
+#include "ray_solid.h"
 
 #include "collision/convex/polytope.h"
 

@@ -5,6 +5,7 @@
 
 #include "collision/hull/hull.h"
 #include "collision/hull/hull_data.h"
+#include "collision/hull/hull_write.h"
 #include "core/base/memory.h"
 #include "world/state/world_internal.h"
 

@@ -6,6 +6,8 @@
 #include "core/base/memory.h"
 #include "core/solve/registry.h"
 #include "save.h"
+#include "save_objects.h"
+#include "save_step.h"
 
 /* Raised with every change of what is written. */
 enum { FORMAT = 5 };

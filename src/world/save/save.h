@@ -4,21 +4,15 @@
  *   save_objects.c   settings, bodies, shapes with their hulls and meshes, joints, gears, couplings
  *   save_step.c      the last step: contacts, rows, report
  *
- * Reading goes into a world that is empty, and holds every index against what is there, so that no bytes trapezoid
- * correction a step out of an array. Numbers are held to the ranges of the calls that set them, where a step cannot
+ * Reading goes into a world that is empty, and holds every index against what is there, so that no bytes lead
+ * a step out of an array. Numbers are held to the ranges of the calls that set them, where a step cannot
  * leave these.
  */
 #ifndef SADMM_WORLD_SAVE_SAVE_H
 #define SADMM_WORLD_SAVE_SAVE_H
 
-#include "core/base/archive.h"
-#include "world/state/world_internal.h"
+#include <stddef.h>
 
-void sadmm_archive_settings(struct sadmm_archive *archive, sadmm_settings *settings);
-/* Of the definition all but `tasks`, which is the caller's. */
-void sadmm_archive_objects(struct sadmm_archive *archive, sadmm_world *world);
-/* After the objects. */
-void sadmm_archive_step(struct sadmm_archive *archive, sadmm_world *world);
 /* For tests of what is behind the checksum: make size and checksum of a buffer's header what they are. */
 void sadmm_save_repair(void *buffer, size_t size);
 

@@ -7,7 +7,7 @@
 #include "core/base/memory.h"
 #include "core/base/utf8.h"
 #include "core/model/rolling.h"
-#include "save.h"
+#include "save_objects.h"
 
 /* A member that is added has to be listed below. */
 #define LISTED(type, size) _Static_assert(sizeof(type) == (size), #type " has other members than the list of a saved world")

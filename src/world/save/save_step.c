@@ -2,7 +2,8 @@
 #include <math.h>
 
 #include "core/base/memory.h"
-#include "save.h"
+#include "save_objects.h"
+#include "save_step.h"
 
 /* A body of the step, as contacts and rows name it. */
 static bool side_fits(const sadmm_world *world, int32_t body)

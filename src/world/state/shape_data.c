@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "collision/hull/hull.h"
+#include "collision/hull/hull_write.h"
 #include "collision/mesh/mesh_data.h"
 #include "core/base/memory.h"
 

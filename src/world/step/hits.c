@@ -19,6 +19,7 @@
 #include <string.h>
 
 #include "collision/broad/broad_phase.h"
+#include "collision/flight/flight_touch.h"
 #include "collision/flight/swept_bodies.h"
 #include "collision/flight/swept_body.h"
 #include "core/base/memory.h"

@@ -15,8 +15,8 @@
  * them; then all are one group. What a group may take is limited, by the world and the group alone: beyond that its
  * bodies are left to the solve, for the (sub-)step. Formulas are the host's: collision/flight/swept_body.h,
  * collision/flight/flight_touch_math.h, core/math/hit.h. */
-#ifndef SADMM_CUDA_COLLIDE_HITS_H
-#define SADMM_CUDA_COLLIDE_HITS_H
+#ifndef SADMM_CUDA_COLLIDE_HITS_VIEW_H
+#define SADMM_CUDA_COLLIDE_HITS_VIEW_H
 
 #include "view.h"
 

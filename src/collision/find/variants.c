@@ -1,4 +1,4 @@
-#include "kernels.h"
+#include "variants.h"
 
 #include "config.h"
 

@@ -1,17 +1,17 @@
-/* The writer's insides: write.c calls write_forms.c, write_parts.c and write_text.c. */
-#ifndef SADMM_SCENE_FILE_WRITE_H
-#define SADMM_SCENE_FILE_WRITE_H
+/* A world on its way into a scene file. */
+#ifndef SADMM_SCENE_FILE_WRITER_H
+#define SADMM_SCENE_FILE_WRITER_H
 
+#include "core/base/error.h"
 #include "core/base/key_tree.h"
 #include "fields.h"
-#include "scene_file.h"
+#include "subadmm/subadmm.h"
 
 /* Slots of ids in the order of creation, so that an id's number in a list is found. */
 struct sadmm_slot_list {
     uint32_t *slots;
     size_t count;
 };
-
 
 struct sadmm_writer {
     sadmm_world *world;
@@ -31,18 +31,9 @@ json_t *sadmm_put(struct sadmm_writer *w, json_t *object, const char *name, json
 json_t *sadmm_append(struct sadmm_writer *w, json_t *array, json_t *value);
 /* An element of an array with members of all fields; NULL as above. */
 json_t *sadmm_append_object(struct sadmm_writer *w, json_t *array, const struct sadmm_fields *fields, const void *from);
-/* Write it, so that what belongs together is on one line. False: an error of the stream, or no memory. */
-bool sadmm_write_text(const json_t *root, FILE *stream);
 /* The number of a slot in a list; it is there. */
 int32_t sadmm_slot_number(const struct sadmm_slot_list *list, uint32_t slot);
 /* The world's error, if there is one. */
 sadmm_status sadmm_pass_on(struct sadmm_writer *w, sadmm_status status);
-
-/* write_forms.c: the number of a hull or a mesh in its list, where it is written first if it is new. OUT_OF_MEMORY. */
-sadmm_status sadmm_write_hull(struct sadmm_writer *w, const sadmm_hull *hull, json_int_t *number);
-sadmm_status sadmm_write_mesh(struct sadmm_writer *w, const sadmm_mesh *mesh, json_int_t *number);
-
-/* write_parts.c: joints, couplings, gears, and what was set for pairs. */
-sadmm_status sadmm_write_parts(struct sadmm_writer *w);
 
 #endif

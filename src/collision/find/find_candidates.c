@@ -1,4 +1,4 @@
-#include "candidates.h"
+#include "find_candidates.h"
 
 #include <string.h>
 
@@ -7,7 +7,7 @@
 #include "collision/shapes/geometry.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
-#include "kernels.h"
+#include "variants.h"
 
 /* Ask the broad phase for single shapes up to one in so many: a query costs as much as some ten of a sweep over all. */
 enum { ONE_BY_ONE = 8 };

@@ -1,9 +1,9 @@
-/* The reader's insides: fill.c calls read_forms.c and read_parts.c. */
-#ifndef SADMM_SCENE_FILE_FILL_H
-#define SADMM_SCENE_FILE_FILL_H
+/* A scene file on its way into a world: what has been made of its lists so far. */
+#ifndef SADMM_SCENE_FILE_FILLER_H
+#define SADMM_SCENE_FILE_FILLER_H
 
 #include "document.h"
-#include "scene_file.h"
+#include "subadmm/subadmm.h"
 
 /* What has been made of a file's lists. */
 struct sadmm_filler {
@@ -33,12 +33,5 @@ sadmm_status sadmm_read_number_in(const struct sadmm_filler *f, const json_t *ob
                                   int64_t *number);
 /* A body, by its number or its name; null or not there: -1, the static world. */
 sadmm_status sadmm_read_body(struct sadmm_filler *f, const json_t *object, const char *member, int64_t *number);
-
-/* read_forms.c: the file's lists of hulls and meshes. */
-sadmm_status sadmm_read_hulls(struct sadmm_filler *f);
-sadmm_status sadmm_read_meshes(struct sadmm_filler *f);
-
-/* read_parts.c: joints, couplings, gears, and what is set for pairs. */
-sadmm_status sadmm_read_parts(struct sadmm_filler *f);
 
 #endif

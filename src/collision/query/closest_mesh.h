@@ -1,0 +1,19 @@
+/* The distance of a shape from a mesh. */
+#ifndef SADMM_COLLISION_QUERY_CLOSEST_MESH_H
+#define SADMM_COLLISION_QUERY_CLOSEST_MESH_H
+
+#include <stdbool.h>
+
+#include "collision/shapes/placed.h"
+#include "separation.h"
+
+/* a in the frame of b: p_b = R p_a + t. */
+struct closest_pose {
+    mat3 R;
+    vec3 t;
+};
+/* a: not a plane; b: a mesh. In the frame of b. */
+bool sadmm_closest_on_mesh(const struct sadmm_placed *a, const struct sadmm_placed *b, const struct closest_pose *pose,
+                           double limit, struct sadmm_separation *separation);
+
+#endif
