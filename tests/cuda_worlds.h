@@ -6,9 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/definition_fields.h"
 #include "cuda_suite.h"
 #include "scene_tools.h"
-#include "world/state/world_internal.h"
+#include "world/state/world_state.h"
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"

@@ -1,7 +1,7 @@
 /* What a world hands to collision and keeps from step to step, on the host's backends. The same scenes run on the
  * device in test_cuda_step.c. */
 #include "between_steps.h"
-#include "world/state/world_internal.h"
+#include "world/state/ids.h"
 
 static const struct {
     sadmm_backend backend;

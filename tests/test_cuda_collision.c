@@ -9,7 +9,8 @@
 #include "collision_soups.h"
 #include "scene_tools.h"
 
-#include "world/state/world_internal.h"
+#include "core/base/definition_fields.h"
+#include "world/state/world_state.h"
 
 /* ---- soups ----------------------------------------------------------------------------------------------------- */
 

@@ -3,10 +3,11 @@
 #include <check.h>
 
 #include "collision/hull/hull_write.h"
+#include "core/base/definition_fields.h"
 #include "core/base/memory.h"
 #include "hull_tools.h"
 #include "scene_tools.h"
-#include "world/state/world_internal.h"
+#include "world/step/gather.h"
 
 static sadmm_hull *make_hull(int corners)
 {

@@ -2,10 +2,12 @@
  * way that bodies came to where they are. */
 #include <stddef.h>
 
+#include "core/base/definition_fields.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "query_worlds.h"
-#include "world/state/world_internal.h"
+#include "subadmm/query.h"
+#include "world/state/world_state.h"
 
 static sadmm_ray ray_of(double x, double y, double z, double dx, double dy, double dz)
 {

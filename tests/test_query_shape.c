@@ -2,9 +2,11 @@
 #include <stddef.h>
 
 #include "collision/query/closest.h"
+#include "core/base/definition_fields.h"
 #include "core/base/memory.h"
 #include "query_worlds.h"
-#include "world/state/world_internal.h"
+#include "subadmm/query.h"
+#include "world/query/query_scene.h"
 
 static const double origin[3] = {0, 0, 0}, as_it_is[4] = {1, 0, 0, 0};
 

@@ -6,11 +6,12 @@
 #include <string.h>
 
 #include "collision/hull/hull_data.h"
+#include "core/base/definition_fields.h"
 #include "core/math/quat.h"
 #include "mesh_tools.h"
 #include "run_suite.h"
 #include "subadmm/subadmm.h"
-#include "world/state/world_internal.h"
+#include "world/step/gather.h"
 
 #define MUST(world, call)                                                                        \
     do {                                                                                         \

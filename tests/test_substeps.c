@@ -2,11 +2,12 @@
  * bit, what n steps of dt / n give, so that most is tested by comparison with these. The same on the device:
  * test_cuda_substeps.c.
  */
-#include "collision/find/pipeline.h"
-#include "core/base/parallel.h"
-#include "world/state/world_internal.h"
 #include "bouncing.h"
+#include "collision/find/pipeline.h"
+#include "core/base/definition_fields.h"
+#include "core/base/parallel.h"
 #include "scene_tools.h"
+#include "world/state/world_state.h"
 
 static const struct {
     sadmm_backend backend;

@@ -4,13 +4,26 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/base/check.h"
 #include "core/base/clock.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
-#include "core/solve/registry.h"
-#include "core/model/joint_momentum.h"
 #include "core/model/extrapolation.h"
+#include "core/model/joint_momentum.h"
 #include "core/model/push_law.h"
-#include "world/state/world_internal.h"
+#include "core/solve/registry.h"
+#include "step.h"
+#include "world/objects/events.h"
+#include "world/resident/resident.h"
+#include "world/state/report.h"
+#include "world/step/coupling_step.h"
+#include "world/step/gather.h"
+#include "world/step/hits.h"
+#include "world/step/joint_move.h"
+#include "world/step/joint_rows.h"
+#include "world/step/joint_stiffen.h"
+#include "world/step/kinematic.h"
+#include "world/step/rolling.h"
 
 /* Settled boxes have about ten contacts each; AUTO needs an order of magnitude before the first contact is known. */
 enum { EXPECTED_CONTACTS_PER_BODY = 8 };

@@ -3,9 +3,15 @@
 
 #include <string.h>
 
+#include "core/base/check.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "core/solve/registry.h"
-#include "world/state/world_internal.h"
+#include "world/objects/body.h"
+#include "world/objects/events.h"
+#include "world/objects/joint.h"
+#include "world/resident/resident.h"
+#include "world/step/hits.h"
 
 static const sadmm_world_def defaults = {
     .backend = SADMM_BACKEND_AUTO,
@@ -142,6 +148,7 @@ sadmm_status sadmm_world_set_backend(sadmm_world *world, sadmm_backend backend, 
 
 void sadmm_world_settings_sized(const sadmm_world *world, sadmm_settings *settings, size_t size)
 {
-    if (world) (void)sadmm_growing_give(&sadmm_growing_settings, settings, size, 0, &world->def.settings, "settings", NULL);
+    if (world)
+        (void)sadmm_growing_give(&sadmm_growing_settings, settings, size, 0, &world->def.settings, "settings", NULL);
     else sadmm_settings_init(settings, size);
 }

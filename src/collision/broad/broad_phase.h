@@ -1,8 +1,8 @@
 /* Broad phases behind one small table: which boxes of the same group overlap.
  *
- * An entry is a box by shape slot. Two entries meet when their boxes overlap (touching counts), at least one of them
- * is dynamic (`moves`), and they belong to the same group; group -1 (never of a dynamic one) meets every group. Every broad phase reports the
- * same set, each pair once, in any order; the caller sorts.
+ * An entry is a box by shape slot. Two entries meet when their boxes overlap (touching counts), at least one of them is
+ * dynamic (`moves`), and they belong to the same group; group -1 (never of a dynamic one) meets every group. Every
+ * broad phase reports the same set, each pair once, in any order; the caller sorts.
  */
 #ifndef SADMM_COLLISION_BROAD_BROAD_PHASE_H
 #define SADMM_COLLISION_BROAD_BROAD_PHASE_H

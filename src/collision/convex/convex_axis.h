@@ -7,8 +7,8 @@
  *    two there is no other; else it is the one to stay with while they are not apart, nor deep in each other.
  * 2. Else, apart: the same from the shortest vector; where Newton's method is not certain, also from what is beside.
  * 3. Else of all of them the best one. A polytope inside a - b grows where its faces are nearest to the origin (epa.h).
- *    No direction across a face is less deep than the face; the optimum that Newton's method, or a flat, has beside it is
- *    no less deep than the least. A face that is no nearer than the best optimum that has been found is done with, until
+ * No direction across a face is less deep than the face; the optimum that Newton's method, or a flat, has beside it is
+ * no less deep than the least. A face that is no nearer than the best optimum that has been found is done with, until
  *    there are no others.
  */
 #ifndef SADMM_COLLISION_CONVEX_CONVEX_AXIS_H
@@ -345,8 +345,8 @@ SADMM_INLINE bool convex_find(struct convex_pair *pair, vec3 side, bool known, r
     return true;
 }
 
-/* The nearest points, by those of the active pieces that are as far along n as the two reach, or nearly; where the direction
- * is not certain there may be none. */
+/* The nearest points, by those of the active pieces that are as far along n as the two reach, or nearly; where the
+ * direction is not certain there may be none. */
 SADMM_INLINE void convex_nearest(const struct convex_pair *pair, const struct convex_active *active,
                                  struct convex_axis *axis)
 {

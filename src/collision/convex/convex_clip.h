@@ -324,8 +324,8 @@ SADMM_INLINE void convex_disc_face(struct convex_meeting *m, const struct convex
 }
 
 /* Where the rim of b crosses that of a as seen along n: from the point where circles would, by Newton's method in the
- * angle about b's axis. Along n the rim of b is over p + c q + s r of a's plane, (c, s) on the unit circle, counted from
- * a's centre; there its length is to be a's radius. False: they do not cross there. */
+ * angle about b's axis. Along n the rim of b is over p + c q + s r of a's plane, (c, s) on the unit circle, counted
+ * from a's centre; there its length is to be a's radius. False: they do not cross there. */
 SADMM_CALLED bool convex_rim_crossing(const struct convex_meeting *m, const struct convex_feature *a,
                                       const struct convex_feature *b, vec3 start, vec3 *on_b)
 {
@@ -428,8 +428,8 @@ SADMM_INLINE void convex_line_flat(struct convex_meeting *m, const struct convex
                          line_is_a, flat, feature[k]);
 }
 
-/* x, moved along n to the surface of a cylinder or a cone that it is near. *beyond: how far that is beyond its ends, as a
- * share of the axis; 0: it is not. */
+/* x, moved along n to the surface of a cylinder or a cone that it is near. *beyond: how far that is beyond its ends, as
+ * a share of the axis; 0: it is not. */
 SADMM_INLINE vec3 convex_onto_side(const struct convex_feature *line, vec3 n, vec3 x, real *beyond)
 {
     const vec3 axis = v3_sub(line->axis[1], line->axis[0]), w = v3_sub(x, line->axis[0]);
@@ -437,7 +437,10 @@ SADMM_INLINE vec3 convex_onto_side(const struct convex_feature *line, vec3 n, ve
                along = v3_dot(w, axis) / length, up = v3_dot(n, axis) / length, wide = line->wide[0] + taper * along,
                a = 1 - up * up * (1 + taper * taper), b = v3_dot(w, n) - up * (along + taper * wide),
                c = v3_norm2(w) - along * along - wide * wide, det = b * b - a * c,
-               way = det > 0 && b > 0 ? -c / (b + real_sqrt(det)) : a > 0 ? -b / a : 0, at = (along + way * up) / length;
+               way = det > 0 && b > 0 ? -c / (b + real_sqrt(det))
+                     : a > 0          ? -b / a
+                                      : 0,
+               at = (along + way * up) / length;
     *beyond = at < 0 ? at : real_max(at - 1, 0);
     return v3_madd(x, way, n);
 }

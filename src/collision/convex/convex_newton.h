@@ -1,8 +1,8 @@
 /* The direction along which two convex bodies are farthest apart, or least deep in each other, by Newton's method from
  * one that is near.
  *
- * A direction n parts the two by s(n) = -h(n), h the support of a - b. h is the largest of a few smooth functions, h_k of
- * pairs of pieces (convex.h), of which at most three meet at a minimum over the sphere. It is where a mean of their
+ * A direction n parts the two by s(n) = -h(n), h the support of a - b. h is the largest of a few smooth functions, h_k
+ * of pairs of pieces (convex.h), of which at most three meet at a minimum over the sphere. It is where a mean of their
  * points w_k is along n, and all h_k are one; the Hessian along tangents of n is that of the mean, less h. What reaches
  * farther than these three is exchanged for one of them.
  *
@@ -151,7 +151,8 @@ SADMM_INLINE bool convex_newton(const struct convex_plane *p, real size, real sl
 }
 
 /* `next`, which reaches beyond the active pairs, becomes one of them: in place of the one whose weight is the first to
- * go where its own grows and the mean of their points stays (the pivot of the simplex method). False: none gives way. */
+ * go where its own grows and the mean of their points stays (the pivot of the simplex method). False: none gives
+ * way. */
 SADMM_INLINE bool convex_enter(const struct convex_plane *p, const real g[2], const struct difference_point *next,
                                struct convex_active *active)
 {
@@ -196,8 +197,8 @@ SADMM_INLINE vec3 convex_turned(vec3 n, real x1, vec3 t1, real x2, vec3 t2)
     return v3_scale(at, 1 / v3_norm(at));
 }
 
-/* What h may lose beside n by what the mean of points says: off, how far that is beside n; mean, how far along n. Of what
- * is apart by any other direction, while the two overlap by those as near as the last step was long. */
+/* What h may lose beside n by what the mean of points says: off, how far that is beside n; mean, how far along n. Of
+ * what is apart by any other direction, while the two overlap by those as near as the last step was long. */
 SADMM_INLINE real convex_gain(real off, real mean, real length)
 {
     return off * real_min(1, mean < 0 ? off / -mean : length);

@@ -1,7 +1,7 @@
 /* The growth of epa.h over the points of any pair: included by whoever defines
  *
  *   EPA_NAME(name)             the functions' names
- *   EPA_PAIR                   the pair, with `slack`, the rounding of a separation, and `size`, what that is measured by
+ * EPA_PAIR the pair, with `slack`, the rounding of a separation, and `size`, what that is measured by
  *   EPA_SUPPORT(pair, d, at)   its difference_point farthest along d
  *
  * all of which end here. */

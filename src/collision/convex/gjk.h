@@ -109,8 +109,8 @@ SADMM_INLINE vec3 closest_on_triangle(struct gjk_simplex *s)
     return v3_scale(n, v3_dot(n, v3_add(a, v3_add(b, c))) / (3 * n2));
 }
 
-/* A triangle's weights of `foot`, in its plane, whose unit normal is `normal`: by areas, which lose less than products of
- * lengths do. Beside the triangle they go on, unless it is a sliver. */
+/* A triangle's weights of `foot`, in its plane, whose unit normal is `normal`: by areas, which lose less than products
+ * of lengths do. Beside the triangle they go on, unless it is a sliver. */
 SADMM_INLINE void simplex_weigh(struct gjk_simplex *s, vec3 foot, vec3 normal)
 {
     vec3 x[3];

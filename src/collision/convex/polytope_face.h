@@ -69,8 +69,8 @@ SADMM_INLINE int clip_edge(const struct polytope *p, vec3 outward, int vertex[2]
     return count;
 }
 
-/* x1, x2, n: the plane's axes and the normal. of_a: in b's frame by the pair's pose. outward: the direction of the other
- * one, own frame; face: the one that points there, -1: none. */
+/* x1, x2, n: the plane's axes and the normal. of_a: in b's frame by the pair's pose. outward: the direction of the
+ * other one, own frame; face: the one that points there, -1: none. */
 SADMM_INLINE void clip_feature_of(const struct polytope_pair *pair, bool of_a, int face, vec3 outward, vec3 x1, vec3 x2,
                                   vec3 n, struct clip_feature *out)
 {
@@ -160,7 +160,8 @@ SADMM_INLINE real outermost_along(int k, real x, real y, real separation)
     return (k > 2 && k < 6 ? -cosine : cosine) * x + (k > 4 ? -sine : sine) * y - 8 * separation;
 }
 
-/* Of `count` points those to keep where there are too many: the deepest, and the outermost in eight directions. Bits. */
+/* Of `count` points those to keep where there are too many: the deepest, and the outermost in eight directions.
+ * Bits. */
 SADMM_INLINE uint64_t clip_choice(const struct clip_corner *p, const real *separation, int count)
 {
     uint64_t chosen = 0;

@@ -15,8 +15,8 @@
 
 /* ---- curvature --------------------------------------------------------------------------------------------------- */
 
-/* The larger radius of curvature where the surface has the outward normal n, at p (both in the shape's frame); HUGE_VAL:
- * flat, or made of what is flat. */
+/* The larger radius of curvature where the surface has the outward normal n, at p (both in the shape's frame);
+ * HUGE_VAL: flat, or made of what is flat. */
 SADMM_INLINE double geometry_curvature_radius(const struct sadmm_geometry *g, const double n[3], const double p[3])
 {
     const double *size = g->size, across = sqrt(n[0] * n[0] + n[1] * n[1]);
@@ -79,8 +79,8 @@ SADMM_INLINE bool contact_is_curved(const struct sadmm_proxy *a, const struct sa
     return count <= ROLLING_POINTS && (geometry_is_curved(&a->geometry) || geometry_is_curved(&b->geometry));
 }
 
-/* Of the two surfaces relative to each other; 0: neither is curved, they touch along more than a line, or no body has its
- * centre of mass so low that it rocks (rolling.h). normal: from a to b. */
+/* Of the two surfaces relative to each other; 0: neither is curved, they touch along more than a line, or no body has
+ * its centre of mass so low that it rocks (rolling.h). normal: from a to b. */
 #define CURVATURE_ROUNDING 1e-6
 SADMM_INLINE double contact_radius(const struct sadmm_proxy *a, const struct sadmm_proxy *b, int32_t count,
                                    const double normal[3], const struct sadmm_contact_point *point)
@@ -114,8 +114,8 @@ SADMM_INLINE bool contact_kind_rolls(const struct sadmm_proxy *a, const struct s
     return contact_by_means(a, b) & (before->count == count) & (count <= ROLLING_POINTS);
 }
 
-/* Did the pair press in the last step, by as many points? What hits in this step hits as it is found. points: of the set
- * that `before` is of. */
+/* Did the pair press in the last step, by as many points? What hits in this step hits as it is found. points: of the
+ * set that `before` is of. */
 SADMM_INLINE bool contact_lasts(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                 const struct sadmm_contact_pair *before, const struct sadmm_contact_point *points,
                                 int32_t count)
@@ -139,8 +139,8 @@ SADMM_INLINE bool contact_rolls(const struct sadmm_proxy *a, const struct sadmm_
     return contact_by_means(a, b) && contact_lasts(a, b, before, points, count);
 }
 
-/* The old pair that a round body goes on from where it rolls over a mesh: of the triangle itself, or of another one of the
- * same plane. [first, last): the old pairs of the two shapes. NULL: none. */
+/* The old pair that a round body goes on from where it rolls over a mesh: of the triangle itself, or of another one of
+ * the same plane. [first, last): the old pairs of the two shapes. NULL: none. */
 SADMM_INLINE const struct sadmm_contact_pair *contact_rolls_from(
     const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct sadmm_contact_pair *before,
     const struct sadmm_contact_pair *pairs, int64_t first, int64_t last, const struct sadmm_contact_point *points,
@@ -169,7 +169,8 @@ SADMM_INLINE double migration_share(double ratio) { return ratio / (1 + ratio); 
 /* Changes of more than this share of an arm (and of a normal, rad) are those of another place. */
 #define MIGRATION_MOST MIDPOINT_TURN
 
-/* By what the normal changes in the half step that is left; normal: halfway. old_points: the first of the old pair's. */
+/* By what the normal changes in the half step that is left; normal: halfway. old_points: the first of the old
+ * pair's. */
 SADMM_INLINE void migrate_normal(const double old_normal[3], const struct sadmm_contact_migration *old, double share,
                                  const double normal[3], double change[3])
 {
@@ -243,8 +244,8 @@ SADMM_INLINE void migrate_apart(const struct migration_pair *pair, struct migrat
     }
 }
 
-/* Two dynamic bodies that roll on each other move by means, so that it is halfway through the step that an impulse acts:
- * the arms are those to where they touch there, not those that were moved to one point in space of the start
+/* Two dynamic bodies that roll on each other move by means, so that it is halfway through the step that an impulse
+ * acts: the arms are those to where they touch there, not those that were moved to one point in space of the start
  * (contact_emit.h). They are referred to the start of the step, and the separation with them; their time offset is dt /
  * 2. */
 SADMM_INLINE void migrate_from_halfway(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt,

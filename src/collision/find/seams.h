@@ -18,8 +18,8 @@ struct sadmm_seams {
     uint64_t disabled; /* of which pairs of bodies the neighbours know that they do not meet */
 };
 
-/* Find the neighbours. changed: a shape has, or what is on a body that does not move has been set; else what is known is
- * kept where it can be. False: out of memory, and what is known is not kept. */
+/* Find the neighbours. changed: a shape has, or what is on a body that does not move has been set; else what is known
+ * is kept where it can be. False: out of memory, and what is known is not kept. */
 bool sadmm_seams_find(struct sadmm_seams *seams, const struct sadmm_collision_input *input, bool changed);
 void sadmm_seams_free(struct sadmm_seams *seams);
 

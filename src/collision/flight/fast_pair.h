@@ -14,8 +14,8 @@ SADMM_INLINE double pair_way(const struct sadmm_proxy *a, const struct sadmm_pro
 }
 
 /* The solve has such an impact by the plane in which they touch, with the way until then in the arms of a dynamic body
- * that is harder to turn (contact_emit.h), and iterations leave a share of it: what goes by its thickness in a step would
- * get through. way: pair_way. */
+ * that is harder to turn (contact_emit.h), and iterations leave a share of it: what goes by its thickness in a step
+ * would get through. way: pair_way. */
 SADMM_INLINE bool pair_passes(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double way)
 {
     const double thin_a = sadmm_body_moves(a->system_body) ? a->thin : HUGE_VAL,

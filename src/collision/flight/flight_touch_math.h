@@ -1,5 +1,5 @@
-/* flight_touch.h for whoever computes it: on the host (flight_touch.c) and on devices. Manifolds of smooth bodies as the
- * includer has them (pair_manifold.h). */
+/* flight_touch.h for whoever computes it: on the host (flight_touch.c) and on devices. Manifolds of smooth bodies as
+ * the includer has them (pair_manifold.h). */
 #ifndef SADMM_COLLISION_FLIGHT_FLIGHT_TOUCH_MATH_H
 #define SADMM_COLLISION_FLIGHT_FLIGHT_TOUCH_MATH_H
 
@@ -139,7 +139,8 @@ SADMM_INLINE double touch_closing(const struct sadmm_swept_pair *p, const struct
            touch_turning(&at->b, p->b.flight, n);
 }
 
-/* ---- how long nothing comes through the plane between them --------------------------------------------------------- */
+/* ---- how long nothing comes through the plane between them
+ * --------------------------------------------------------- */
 
 /* What of a shape's points is round about others that it has, which are tested in its place. */
 SADMM_INLINE double touch_round_of(const struct sadmm_geometry *g)
@@ -203,7 +204,8 @@ SADMM_CALLED double touch_free_for(const struct sadmm_swept_pair *p, const struc
     return then >= 0 ? trial : trial * now / (now - then);
 }
 
-/* ---- the touch ----------------------------------------------------------------------------------------------------- */
+/* ---- the touch
+ * ----------------------------------------------------------------------------------------------------- */
 
 SADMM_INLINE double touch_thinner(const struct sadmm_swept_pair *p)
 {
@@ -251,7 +253,8 @@ SADMM_INLINE double touch_passed_at_once(const struct sadmm_swept_pair *p, doubl
     return rate * TOUCH_PASSED * whole > TOUCH_PASSED_TURN ? TOUCH_PASSED_TURN / rate : TOUCH_PASSED * whole;
 }
 
-/* Do balls around the two, about their centres of mass, meet within the time? Accelerations bend ways by `sags` at most. */
+/* Do balls around the two, about their centres of mass, meet within the time? Accelerations bend ways by `sags` at
+ * most. */
 SADMM_INLINE bool touch_balls_meet(const struct sadmm_swept_pair *p, double from, double to)
 {
     const struct sadmm_flight *a = p->a.flight, *b = p->b.flight;

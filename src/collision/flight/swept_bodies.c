@@ -49,7 +49,8 @@ bool sadmm_collision_passes(const struct sadmm_collision *collision, const struc
     return pair_passes(a, b, pair_way(a, b, input->gravity, input->dt));
 }
 
-/* The longest way that any pair may go, and the least thickness of what moves: most worlds have no pair that is fast. */
+/* The longest way that any pair may go, and the least thickness of what moves: most worlds have no pair that is
+ * fast. */
 struct fastest {
     double way, thin;
 };

@@ -25,8 +25,8 @@ void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const
  * find_candidates. False: out of memory. */
 bool sadmm_collision_list_fast(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                                double threshold, bool bounces, struct sadmm_pair_list *list);
-/* Are they a dynamic body and another one that the solve might let through each other? Their way within the step is longer
- * than what moves of them is thick. */
+/* Are they a dynamic body and another one that the solve might let through each other? Their way within the step is
+ * longer than what moves of them is thick. */
 bool sadmm_collision_passes(const struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                             uint64_t key);
 

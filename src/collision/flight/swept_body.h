@@ -260,8 +260,8 @@ SADMM_INLINE void swept_bodies_hit_centre(const struct swept_body *const f[2], c
         hit->arm[side][0] = v3_sub(v3_load(pose[of_b].position), v3_load(pose[side].position));
 }
 
-/* What the hit leaves together and forces press on each other: how fast the points part that part least, m/s, and how much
- * faster each second they come together again, within the step. */
+/* What the hit leaves together and forces press on each other: how fast the points part that part least, m/s, and how
+ * much faster each second they come together again, within the step. */
 #define SWEPT_HELD_TURNS 0.25 /* rad: what turns on by more touches elsewhere */
 struct swept_bodies_held {
     double parts, falls; /* falls: 0: they are not held */

@@ -109,7 +109,8 @@ static void archive_lists(struct sadmm_archive *archive, struct sadmm_hull *hull
                  corners = 2 * (size_t)hull->edge_count;
     size_t none[4] = {0};
     if (archive->reading &&
-        !(sadmm_archive_expect(archive, counts_fit(hull) && hull->doubles <= archive->size / sizeof(double), "a hull") &&
+        !(sadmm_archive_expect(archive, counts_fit(hull) && hull->doubles <= archive->size / sizeof(double),
+                               "a hull") &&
           sadmm_archive_room(archive, &hull->block, &none[0], hull->doubles, sizeof *hull->block) &&
           sadmm_archive_room(archive, &hull->vertices, &none[1], 3 * vertices, sizeof *hull->vertices) &&
           sadmm_archive_room(archive, &hull->face_first, &none[2], faces + 1, sizeof *hull->face_first) &&
@@ -122,7 +123,8 @@ static void archive_lists(struct sadmm_archive *archive, struct sadmm_hull *hull
     if (archive->reading && archive->status == SADMM_OK)
         sadmm_archive_expect(archive,
                              block_fits(hull) && faces_fit(hull) && sadmm_all_finite(hull->vertices, 3 * vertices) &&
-                                 hull->merge >= 0 && hull->merge <= 1e-2 && sadmm_all_finite(hull->half, 3) && sadmm_all_finite(hull->position, 3) && sadmm_all_finite(hull->orientation, 4),
+                                 hull->merge >= 0 && hull->merge <= 1e-2 && sadmm_all_finite(hull->half, 3) &&
+                                 sadmm_all_finite(hull->position, 3) && sadmm_all_finite(hull->orientation, 4),
                              "a hull");
 }
 

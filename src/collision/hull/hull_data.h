@@ -34,7 +34,8 @@ enum {
 
 struct sadmm_hull_header {
     int32_t vertices, faces, edges; /* all faces have 2 x edges corners */
-    int32_t climbs; /* not 0: along edges every way up ends at the top, but for rounding. Not so where faces are merged */
+    int32_t climbs; /* not 0: along edges every way up ends at the top, but for rounding. Not so where faces are
+                       merged */
     int32_t vertex_stride, face_stride;
     int32_t doubles; /* the whole block */
     int32_t reserved;
@@ -59,7 +60,8 @@ SADMM_INLINE int32_t hull_doubles(int32_t vertices, int32_t faces, int32_t edges
 /* Offsets of the blocks that all shape data begins with, and of the first of its own. */
 enum {
     HULL_CUBE = 0,      /* half extents 1. Vertex v: bit k set where coordinate k is +1 */
-    HULL_CUBE_DOUBLES = HULL_HEADER_DOUBLES + 24 + 32 + 34, /* 8 vertices, 6 faces, 12 edges: 7 + 48 + 48 + 9 + 24 = 136 links */
+    HULL_CUBE_DOUBLES = HULL_HEADER_DOUBLES + 24 + 32 + 34, /* 8 vertices, 6 faces, 12 edges: 7 + 48 + 48 + 9 + 24 = 136
+                                                               links */
     HULL_SEGMENT = HULL_CUBE + HULL_CUBE_DOUBLES, /* (0, 0, -1) to (0, 0, 1); no face */
     HULL_SEGMENT_DOUBLES = HULL_HEADER_DOUBLES + 12 + 0 + 4, /* 2 vertices, 1 edge: 1 + 4 + 4 + 3 + 2 = 14 links */
     HULL_POINT = HULL_SEGMENT + HULL_SEGMENT_DOUBLES,

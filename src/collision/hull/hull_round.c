@@ -2,19 +2,20 @@
  *
  *   over every face     a prism of height r
  *   along every edge    a wedge of a cylinder, between the normals of its two faces, which include the angle t
- *   at every vertex     the cone of a ball's sector: directions u in the spherical polygon S whose corners are the normals
+ * at every vertex the cone of a ball's sector: directions u in the spherical polygon S whose corners are the normals
  *                       of the faces there
  *
- * (the decomposition behind Steiner's formula; Schneider, "Convex Bodies: The Brunn-Minkowski Theory", 4.2). Integrals of
- * 1, x and x x^T over each are elementary, but for those over S, whose sides are arcs of the angles t about unit axes e,
- * the directions of the edges towards the vertex, counter-clockwise seen from outside:
+ * (the decomposition behind Steiner's formula; Schneider, "Convex Bodies: The Brunn-Minkowski Theory", 4.2). Integrals
+ * of 1, x and x x^T over each are elementary, but for those over S, whose sides are arcs of the angles t about unit
+ * axes e, the directions of the edges towards the vertex, counter-clockwise seen from outside:
  *
  *   area of S        2 pi - sum of the angles of the faces at the vertex      (Gauss and Bonnet)
  *   S u              1/2 sum t e                                              (Stokes)
  *   S u u^T          area / 3 + 1/6 sum (e m^T + m e^T),  m: integral of u along the arc
  *
  * The last is Green's formula for u u^T - 1/3, whose Laplacian on the sphere is -6 times itself: what is left is the
- * derivative across the sides, along -e. All sums are linear, so that vertices, edges and faces are gone through once. */
+ * derivative across the sides, along -e. All sums are linear, so that vertices, edges and faces are gone through
+ * once. */
 #include "hull_round.h"
 
 static const double pi = 3.14159265358979323846;
@@ -78,8 +79,8 @@ static void add_sector(const struct hull_round *round, vec3 x, double area, stru
     for (int k = 0; k < 3; ++k) sum->second[k][k] += r * r / 5 * ball;
 }
 
-/* Between faces f and g. The edge runs along d, with f to its left, from `from` to `to`: the wedge, and the arc's part of
- * the vertex at either end. */
+/* Between faces f and g. The edge runs along d, with f to its left, from `from` to `to`: the wedge, and the arc's part
+ * of the vertex at either end. */
 static void add_edge(const struct hull_round *round, vec3 from, vec3 to, vec3 nf, vec3 ng, struct hull_integrals *sum)
 {
     const double r = round->r, length = v3_norm(v3_sub(to, from));

@@ -2,11 +2,11 @@
  *
  * Halfway through the step it may be past the contact already, and at its start the nearest features are those that the
  * one leaves behind or flies by: a plane laid between them stops a body that passes, a small one at 500 m/s by metres.
- * So such a pair is moved and turned on from the start of the step, as far as it cannot have touched yet, and again from
- * there, until it touches, or the step ends. What it can have closed is bounded from above, along the direction by which
- * the two are parted: by the velocities of the centres of mass, by what turns, a point's distance from its body's centre
- * of mass being a bound of its lever, and by what accelerations add, for which the whole step has one velocity more. How
- * far apart they are is bounded from below by what lies farthest along that direction, of either.
+ * So such a pair is moved and turned on from the start of the step, as far as it cannot have touched yet, and again
+ * from there, until it touches, or the step ends. What it can have closed is bounded from above, along the direction by
+ * which the two are parted: by the velocities of the centres of mass, by what turns, a point's distance from its body's
+ * centre of mass being a bound of its lever, and by what accelerations add, for which the whole step has one velocity
+ * more. How far apart they are is bounded from below by what lies farthest along that direction, of either.
  */
 #ifndef SADMM_COLLISION_MANIFOLD_ADVANCE_H
 #define SADMM_COLLISION_MANIFOLD_ADVANCE_H
@@ -44,7 +44,8 @@ SADMM_INLINE bool advance_needed(const struct sadmm_proxy *a, const struct sadmm
            surface_spin(a) + surface_spin(b) > ADVANCE_SPIN * (a->thin < b->thin ? a->thin : b->thin);
 }
 
-/* ---- how far two shapes are apart at least ------------------------------------------------------------------------ */
+/* ---- how far two shapes are apart at least
+ * ------------------------------------------------------------------------ */
 
 /* The largest distance that an axis parts two boxes by; normal: from 2 to 1, frame of 1. */
 SADMM_INLINE real boxes_apart(const struct box_pair *boxes, vec3 *normal)

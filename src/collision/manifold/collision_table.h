@@ -1,9 +1,9 @@
 /* Which pairs of types collide, and how: the one list, for host and device.
  *
- * An entry is PAIR(type of a, type of b, call): a is of the lower type (geometry_rank) or, of two of one type, the shape
- * in the lower slot. In the call a and b are the sizes of the two (vec3, m) and subshape is the subshape of the pair
- * (geometry.h); pose, limit, cache and m are as in manifold.h. The list becomes a switch (pair_manifold.h), not a table
- * of pointers: all of it is inlined into the narrow phase, and a pair that is listed twice does not compile.
+ * An entry is PAIR(type of a, type of b, call): a is of the lower type (geometry_rank) or, of two of one type, the
+ * shape in the lower slot. In the call a and b are the sizes of the two (vec3, m) and subshape is the subshape of the
+ * pair (geometry.h); pose, limit, cache and m are as in manifold.h. The list becomes a switch (pair_manifold.h), not a
+ * table of pointers: all of it is inlined into the narrow phase, and a pair that is listed twice does not compile.
  *
  * Types without an entry have no contacts and must never meet. Static bodies do not meet each other, so a type that
  * lacks an entry with any other is for static bodies only: sadmm_geometry_check refuses it elsewhere, where a shape is

@@ -17,13 +17,13 @@
 /* Cosine with the manifold's normal from which the ball's contact is one more point of it. */
 #define INNER_BALL_ALONG      ((real)0.7)
 /* What goes by more than this many radii of its ball in a step has the ball's contact alone: how a hit would make it
- * turn within the step has nothing to do with one contact that is linear, and a share of its speed that iterations leave
- * would take it through. The ball's contact by itself is solved at once. */
+ * turn within the step has nothing to do with one contact that is linear, and a share of its speed that iterations
+ * leave would take it through. The ball's contact by itself is solved at once. */
 #define INNER_BALL_ALONE      4.0
 /* Bodies whose surface turns by less than this share of their thickness in a step do not sink by turning. */
 #define INNER_TURNS           0.02
-/* Shares of the thinner shape. Deeper than that which way out a manifold says is a question. A body that rocks by so much
- * in a step may sink on by points that take turns, each of them deeper than the last. */
+/* Shares of the thinner shape. Deeper than that which way out a manifold says is a question. A body that rocks by so
+ * much in a step may sink on by points that take turns, each of them deeper than the last. */
 #define INNER_ASKS_SIDE       0.5
 #define INNER_SINKS           0.05
 #define INNER_ROCKS           0.2
@@ -131,8 +131,8 @@ SADMM_INLINE void inner_add(struct manifold *m, vec3 position, real separation, 
     m->points[most].feature = feature;
 }
 
-/* The ball's point along n against a plane of the other shape, n . x = offset, with the ball's centre at x. On the ball,
- * not halfway: with accelerations it may be found at a distance that would make a long arm. */
+/* The ball's point along n against a plane of the other shape, n . x = offset, with the ball's centre at x. On the
+ * ball, not halfway: with accelerations it may be found at a distance that would make a long arm. */
 SADMM_INLINE void inner_add_ball(const struct inner_ball *ball, vec3 centre, real offset, struct manifold *m)
 {
     const real side = ball->of_b ? -1 : 1, along = v3_dot(m->normal, centre),
@@ -169,8 +169,8 @@ SADMM_INLINE void inner_instead(const struct sadmm_proxy *a, const struct sadmm_
     inner_add_ball(ball, ball->centre, offset, m);
 }
 
-/* Points that hold the centre up by themselves: it is over a triangle, or a line, of some that are no farther apart than
- * the ball. x: their places across the normal, from the ball's centre. */
+/* Points that hold the centre up by themselves: it is over a triangle, or a line, of some that are no farther apart
+ * than the ball. x: their places across the normal, from the ball's centre. */
 SADMM_INLINE bool inner_over_line(const real p[2], const real q[2], real beside)
 {
     const real d[2] = {q[0] - p[0], q[1] - p[1]}, length2 = d[0] * d[0] + d[1] * d[1],
@@ -313,8 +313,8 @@ SADMM_RARE void inner_balls_plain(const struct sadmm_proxy *a, const struct sadm
     inner_balls_of(a, b, NULL, 0, remembers, touch, gravity, dt, m);
 }
 
-/* To the manifold of a pair. remembers: its cache is of the last step; touch: of the pair, and so none of the balls in it
- * is earlier; hulls: NULL as of pair_first_touch. */
+/* To the manifold of a pair. remembers: its cache is of the last step; touch: of the pair, and so none of the balls in
+ * it is earlier; hulls: NULL as of pair_first_touch. */
 SADMM_INLINE void inner_balls_add(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
                                   uint32_t subshape, bool remembers, struct first_touch touch, double gravity,
                                   double dt, struct manifold *m)

@@ -122,7 +122,8 @@ SADMM_INLINE bool convex_lies_on(const struct convex_triangle *p, bool known, re
     const struct convex_pair *pair = &p->pair;
     const real separation = p->front.separation;
     if (!known && separation < -MANIFOLD_KEEP_EXTENT * pair->thin) return false;
-    return convex_on_front(p, limit, m) - separation <= (separation >= 0 ? 2 * pair->slack : MANIFOLD_FLAT * pair->thin);
+    return convex_on_front(p, limit, m) - separation <=
+           (separation >= 0 ? 2 * pair->slack : MANIFOLD_FLAT * pair->thin);
 }
 
 /* The axis n, if what of the body is deepest along it is where the edge is. */
@@ -188,8 +189,8 @@ SADMM_INLINE uint32_t convex_best_axis(const struct convex_triangle *p, struct c
     return cache;
 }
 
-/* Has the body come through the triangle by its front? Its middle says so; of a cone that or its centre of mass: with its
- * tip, or its base, one of them is through before most of it is. */
+/* Has the body come through the triangle by its front? Its middle says so; of a cone that or its centre of mass: with
+ * its tip, or its base, one of them is through before most of it is. */
 SADMM_INLINE bool convex_came_through(const struct convex_triangle *p, const struct manifold *m)
 {
     const struct convex_pair *pair = &p->pair;

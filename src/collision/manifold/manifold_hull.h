@@ -279,8 +279,8 @@ SADMM_INLINE bool hull_recall(const struct polytope_pair *pair, uint32_t cache, 
 
 /* What the last step's axis says by itself: true, and the manifold is there, or there is none. Else *start is a
  * direction to search for the nearest points along; `known`: *kept is an axis. */
-SADMM_INLINE bool hull_by_memory(const struct polytope_pair *pair, real limit, uint32_t cache, struct polytope_axis *kept,
-                                 bool *known, vec3 *start, struct manifold *m)
+SADMM_INLINE bool hull_by_memory(const struct polytope_pair *pair, real limit, uint32_t cache,
+                                 struct polytope_axis *kept, bool *known, vec3 *start, struct manifold *m)
 {
     *known = hull_recall(pair, cache, kept);
     *start = v3_neg(pair->t);
@@ -340,14 +340,15 @@ SADMM_INLINE void hull_by_nearest(const struct polytope_pair *pair, const struct
     hull_keep_edges(pair, nearest, &axis, &pa, &pb, &feature);
     if (pair->a.faces > 0 || hull_has_face_along(pair, axis.n))
         clip_manifold(pair, axis.n, axis.separation, limit, m);
-    if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) axis = *nearest; /* not over each other */
+    /* not over each other */
+    if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) axis = *nearest;
     m->normal = axis.n;
     m->cache = axis_memory(&axis);
     hull_add_nearest(pair->thin, pa, pb, feature, m); /* the face along the normal need not have the deepest corner */
 }
 
-/* In two parts, for devices, where the threads of a warp wait for each other. What is little work comes first: what goes
- * on as it was, and what is too far apart. False: the rest has to be done, from where `walk` has ended. */
+/* In two parts, for devices, where the threads of a warp wait for each other. What is little work comes first: what
+ * goes on as it was, and what is too far apart. False: the rest has to be done, from where `walk` has ended. */
 SADMM_RARE bool hull_manifold_at_once(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
                                       const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
                                       struct gjk_walk *walk, struct manifold *m)
@@ -414,8 +415,8 @@ SADMM_INLINE void hull_plane_point(struct manifold *m, const struct polytope *p,
     manifold_add(m, v3_madd(x, -(s / 2 + p->radius), m->normal), s, (uint32_t)v + 1);
 }
 
-/* a: the plane (manifold_plane.h). Of more vertices within the limit than a manifold has points, the lowest one and those
- * that are outermost, and low, in eight directions. */
+/* a: the plane (manifold_plane.h). Of more vertices within the limit than a manifold has points, the lowest one and
+ * those that are outermost, and low, in eight directions. */
 SADMM_RARE void hull_plane_manifold(const struct sadmm_geometry *b, const double *hulls, const struct pair_pose *pose,
                                     real limit, struct manifold *m)
 {

@@ -1,7 +1,7 @@
 /* A triangle of a mesh (b) against sphere, capsule, box and hull (a), in the frame of the mesh. As for two hulls
  * (manifold_hull.h), but that the surface has one side, and that it goes on beyond the triangle (mesh_triangle.h):
  *
- *   1. What is above the triangle's plane by more than the limit is no contact. Nor is, where all around the triangle is
+ * 1. What is above the triangle's plane by more than the limit is no contact. Nor is, where all around the triangle is
  *      in its plane, what has no vertex over it: of the points there only those are kept.
  *   2. What lies on it: the points of the clipped faces, if the deepest of the body is among them. That is all that
  *      most pairs ask for.
@@ -297,7 +297,8 @@ SADMM_INLINE bool mesh_recall(const struct mesh_pair *p, uint32_t cache, struct 
     return axis_recall(&p->pair, cache, kept) && !(kept->kind == AXIS_FACE_B && kept->b == MESH_BACK);
 }
 
-/* Where all around is in the triangle's plane the face says all that there is to say. known: it did in the last step. */
+/* Where all around is in the triangle's plane the face says all that there is to say. known: it did in the last
+ * step. */
 SADMM_CALLED void mesh_by_face(const struct mesh_pair *p, bool known, real limit, struct manifold *m)
 {
     const bool shallow = p->front.separation >= -MESH_SHALLOW * p->pair.thin;

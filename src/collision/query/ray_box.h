@@ -22,7 +22,8 @@ static inline struct ray_slabs ray_slabs_of(const double x[3], const double d[3]
 
 /* Does it meet the box within the limit? *enter: where. Rounding favours meeting: of both ends of a slab each is off by
  * up to 3 units of itself. A box around another one is not entered later, rounding included: where what is in a box is
- * hit at `enter` or later (a distance that is less by rounding is put there), nothing that counts is left out for a limit. */
+ * hit at `enter` or later (a distance that is less by rounding is put there), nothing that counts is left out for a
+ * limit. */
 static inline bool ray_meets_box(const struct ray_slabs *s, const float lo[3], const float hi[3], double limit,
                                  double *enter)
 {

@@ -7,8 +7,8 @@
 
 /* Every switch over the types names them all and has no default: the compiler says where a new one is missing. */
 
-/* The order of the two shapes of a pair: by this, of equal ones by slot. As types are numbered, but for meshes, which are
- * what their triangles' other shapes are seen from: they come last. */
+/* The order of the two shapes of a pair: by this, of equal ones by slot. As types are numbered, but for meshes, which
+ * are what their triangles' other shapes are seen from: they come last. */
 SADMM_INLINE int geometry_rank(int type) { return type == SADMM_SHAPE_MESH ? (int)SADMM_SHAPE_TYPE_COUNT : type; }
 
 /* Is it one of those that hulls and the like meet by convex.h, and for which a world has shape data (hull_data.h)? */

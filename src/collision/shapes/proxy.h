@@ -194,8 +194,8 @@ SADMM_INLINE double offset_displacement(const struct sadmm_proxy *a, const struc
     return time_offset > 0 ? time_offset * (b->velocity[axis] - a->velocity[axis]) : 0;
 }
 
-/* Of two dynamic bodies, what share of the way to one point in space the arms of p's take: most of it those of the one that
- * is harder to turn. */
+/* Of two dynamic bodies, what share of the way to one point in space the arms of p's take: most of it those of the one
+ * that is harder to turn. */
 SADMM_INLINE double proxy_share(const struct sadmm_proxy *p, const struct sadmm_proxy *other)
 {
     const double inertia = p->inertia + other->inertia;

@@ -4,8 +4,13 @@
 
 #include <string.h>
 
+#include "body.h"
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
 #include "core/solve/resident.h"
-#include "world/state/world_internal.h"
+#include "coupling.h"
+#include "joint.h"
+#include "world/resident/resident.h"
 
 enum owner { OF_BODY, OF_JOINT, OF_COUPLING };
 enum { MOST_COLUMNS = 13 };
@@ -101,7 +106,8 @@ static sadmm_status get_contact_wrench(sadmm_world *world, size_t slot, double *
 {
     const struct sadmm_world_body *body = &world->bodies[slot];
     if (world->stepped && !world->step_settings.recover_wrenches)
-        return sadmm_fail(&world->error, SADMM_ERROR_UNAVAILABLE, "contact wrenches: settings.recover_wrenches was false");
+        return sadmm_fail(&world->error, SADMM_ERROR_UNAVAILABLE,
+                          "contact wrenches: settings.recover_wrenches was false");
     if (world->stepped && body->type != SADMM_BODY_STATIC) memcpy(row, body->contact_wrench, 6 * sizeof *row);
     else memset(row, 0, 6 * sizeof *row);
     return SADMM_OK;
@@ -243,8 +249,9 @@ int32_t sadmm_world_array_rows(const sadmm_world *world, sadmm_array array)
 
 static bool alive(const sadmm_world *world, enum owner owner, size_t slot)
 {
-    return owner == OF_BODY ? world->bodies[slot].alive
-         : owner == OF_JOINT ? world->joints[slot].alive && !world->joints[slot].coupling : world->couplings[slot].alive;
+    return owner == OF_BODY    ? world->bodies[slot].alive
+           : owner == OF_JOINT ? world->joints[slot].alive && !world->joints[slot].coupling
+                               : world->couplings[slot].alive;
 }
 
 /* Slot of the first row. */

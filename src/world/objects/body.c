@@ -4,11 +4,20 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "body.h"
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "core/base/utf8.h"
 #include "core/math/rigid.h"
 #include "core/model/extrapolation.h"
-#include "world/state/world_internal.h"
+#include "joint.h"
+#include "shape.h"
+#include "subadmm/arrays.h"
+#include "world/resident/resident.h"
+#include "world/state/ids.h"
+#include "world/step/kinematic.h"
 
 static const double WRENCH_LIMIT = 1e15;
 /* Of a state that is set: whatever a step can make. */

@@ -2,10 +2,14 @@
 #include <string.h>
 
 #include "collision/mesh/mesh.h"
+#include "contacts.h"
+#include "core/base/check.h"
 #include "core/base/memory.h"
 #include "core/model/articulation.h"
 #include "core/model/system_math.h"
-#include "world/state/world_internal.h"
+#include "world/resident/resident.h"
+#include "world/state/ids.h"
+#include "world/step/kinematic.h"
 
 static int32_t readable_contacts(const sadmm_world *world)
 {
@@ -103,7 +107,8 @@ static sadmm_status check_range(sadmm_world *world, int32_t first, int32_t count
     const int32_t total = readable_contacts(world);
     if (first < 0 || count < 0 || first > total - count)
         return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "first = %d, count = %d: must be contacts of the last step, which has %d", first, count, total);
+                          "first = %d, count = %d: must be contacts of the last step, which has %d", first, count,
+                          total);
     return SADMM_OK;
 }
 

@@ -5,9 +5,16 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "core/math/rigid.h"
-#include "world/state/world_internal.h"
+#include "coupling.h"
+#include "joint.h"
+#include "subadmm/arrays.h"
+#include "world/resident/resident.h"
+#include "world/state/ids.h"
 
 static const sadmm_coupling_def defaults = {SADMM_COUPLING_FIELDS(SADMM_FIELD_DEFAULT, )};
 static const struct sadmm_growing growing = SADMM_GROWING(sadmm_coupling_def, &defaults, enabled);

@@ -3,8 +3,13 @@
 
 #include <string.h>
 
+#include "contacts.h"
+#include "core/base/check.h"
 #include "core/base/memory.h"
-#include "world/state/world_internal.h"
+#include "events.h"
+#include "sensor.h"
+#include "world/resident/resident.h"
+#include "world/state/ids.h"
 
 enum { MOST_EVENTS = 1 << 24 };
 

@@ -2,7 +2,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#include "world/state/world_internal.h"
+#include "world/resident/resident.h"
 
 struct text {
     char *out;

@@ -4,8 +4,16 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
-#include "world/state/world_internal.h"
+#include "gear.h"
+#include "joint.h"
+#include "world/resident/resident.h"
+#include "world/resident/resident_joints.h"
+#include "world/state/ids.h"
+#include "world/step/gear_rows.h"
 
 static const double OFFSET_LIMIT = 1e9, RATIO_LEAST = 1e-9, RATIO_MOST = 1e9;
 enum { MOST_GEARS = 1 << 24 };
@@ -63,9 +71,11 @@ sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_d
     int shared;
     const int bodies = count_bodies(world, joints, &shared);
     if (bodies > 3 || (bodies == 3 && shared == 0))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->joint_1, def->joint_2: between %d dynamic bodies, must be 2 at most, or 3 of which one is "
-                          "of both joints", bodies);
+        return sadmm_fail(
+            error, SADMM_ERROR_INVALID_ARGUMENT,
+            "def->joint_1, def->joint_2: between %d dynamic bodies, must be 2 at most, or 3 of which one is "
+            "of both joints",
+            bodies);
     return SADMM_OK;
 }
 
@@ -94,9 +104,10 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *give
     made.joint[0] = def->joint_1.slot - 1;
     made.joint[1] = def->joint_2.slot - 1;
     if (!sadmm_world_gear_reaches(world, &made))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->joint_1, def->joint_2: on a dynamic body, with the same axis or the same direction: no force "
-                          "between the other two bodies moves both (a wheel in between, with two gears, does)");
+        return sadmm_fail(
+            error, SADMM_ERROR_INVALID_ARGUMENT,
+            "def->joint_1, def->joint_2: on a dynamic body, with the same axis or the same direction: no force "
+            "between the other two bodies moves both (a wheel in between, with two gears, does)");
     if (isnan(def->offset)) {
         TRY(measure(world, def, &made.def.offset));
         TRY(sadmm_check_range("def->offset (NaN: as it is)", made.def.offset, -OFFSET_LIMIT, OFFSET_LIMIT, error));

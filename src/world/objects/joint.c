@@ -4,9 +4,16 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "core/math/rigid.h"
-#include "world/state/world_internal.h"
+#include "joint.h"
+#include "subadmm/arrays.h"
+#include "world/resident/resident.h"
+#include "world/resident/resident_joints.h"
+#include "world/state/ids.h"
 
 static const double FRAME_LIMIT = 1e9, FORCE_LIMIT = 1e15;
 enum { MOST_JOINTS = 1 << 24 };
@@ -134,8 +141,8 @@ sadmm_status sadmm_world_check_joint_def(const sadmm_joint_def *def, struct sadm
     uint32_t locks = 0;
     TRY(check_def(def, &locks, error));
     return locks == def->locks ? SADMM_OK
-                               : sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->locks = %u: must be %u, by its kind",
-                                            def->locks, locks);
+                               : sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                                            "def->locks = %u: must be %u, by its kind", def->locks, locks);
 }
 
 /* ---- life -------------------------------------------------------------------------------------------------------- */

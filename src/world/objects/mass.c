@@ -66,7 +66,8 @@ static sadmm_status own_mass(const sadmm_shape_def *def, double density, sadmm_m
     case SADMM_SHAPE_MESH:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
-    return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: a plane or a mesh has no mass", (int)def->type);
+    return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: a plane or a mesh has no mass",
+                      (int)def->type);
 }
 
 sadmm_status sadmm_shape_mass(const sadmm_shape_def *given, double density, sadmm_mass *mass)

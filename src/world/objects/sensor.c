@@ -1,6 +1,11 @@
 /* Sensors: shapes that touch nothing and see what overlaps them. */
 #include "collision/shapes/placed.h"
-#include "world/state/world_internal.h"
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
+#include "sensor.h"
+#include "world/query/query_scene.h"
+#include "world/query/query_shape.h"
+#include "world/state/ids.h"
 
 enum { MOVING_TYPES = 1 << SADMM_BODY_DYNAMIC | 1 << SADMM_BODY_KINEMATIC };
 

@@ -4,9 +4,15 @@
 #include "collision/hull/hull.h"
 #include "collision/mesh/mesh.h"
 #include "collision/shapes/geometry.h"
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
+#include "shape.h"
+#include "subadmm/arrays.h"
+#include "world/resident/resident.h"
+#include "world/state/ids.h"
 #include "world/state/shape_form.h"
-#include "world/state/world_internal.h"
 
 static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_shape_def *def, double orientation[4],
                               struct sadmm_error *error)

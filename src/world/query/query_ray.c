@@ -4,8 +4,10 @@
 #include <string.h>
 
 #include "collision/mesh/mesh.h"
+#include "core/base/check.h"
 #include "core/base/memory.h"
-#include "world/state/world_internal.h"
+#include "query_scene.h"
+#include "subadmm/query.h"
 
 static const double ORIGIN_LIMIT = 1e9;
 

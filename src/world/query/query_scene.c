@@ -6,8 +6,12 @@
 #include "collision/hull/hull.h"
 #include "collision/hull/hull_data.h"
 #include "collision/hull/hull_write.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
-#include "world/state/world_internal.h"
+#include "query_scene.h"
+#include "subadmm/query.h"
+#include "world/resident/resident.h"
+#include "world/state/ids.h"
 
 /* Shapes for which another thread is worth its while. */
 enum { SHAPES_PER_THREAD = 16384 };

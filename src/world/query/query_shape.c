@@ -6,9 +6,15 @@
 #include "collision/hull/hull.h"
 #include "collision/mesh/mesh.h"
 #include "collision/query/closest.h"
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
+#include "core/base/growing.h"
 #include "core/base/memory.h"
+#include "query_scene.h"
+#include "query_shape.h"
+#include "subadmm/query.h"
+#include "world/state/ids.h"
 #include "world/state/shape_form.h"
-#include "world/state/world_internal.h"
 
 static const double POSITION_LIMIT = 1e9;
 

@@ -16,7 +16,13 @@
 #include "core/model/extrapolation.h"
 #include "core/model/forces.h"
 #include "core/solve/certificate.h"
-#include "world/state/world_internal.h"
+#include "resident.h"
+#include "resident_joints.h"
+#include "resident_kinematic.h"
+#include "world/state/report.h"
+#include "world/step/gather.h"
+#include "world/step/hits.h"
+#include "world/step/kinematic.h"
 
 /* A step on the device is enqueued with all of its convergence checks, and those that nobody needs any more take time
  * as well. */

@@ -3,7 +3,8 @@
 
 #include "core/base/memory.h"
 #include "core/model/gear_law.h"
-#include "world/state/world_internal.h"
+#include "resident_joints.h"
+#include "world/step/joint_rows.h"
 
 /* ---- to the backend ---------------------------------------------------------------------------------------------- */
 

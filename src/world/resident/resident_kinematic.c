@@ -4,7 +4,7 @@
 #include "core/base/memory.h"
 #include "core/model/extrapolation.h"
 #include "core/model/kinematic.h"
-#include "world/state/world_internal.h"
+#include "resident_kinematic.h"
 
 sadmm_status sadmm_world_list_kinematic(sadmm_world *world)
 {

@@ -3,11 +3,14 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/base/check.h"
 #include "core/base/memory.h"
 #include "core/solve/registry.h"
 #include "save.h"
 #include "save_objects.h"
 #include "save_step.h"
+#include "world/objects/events.h"
+#include "world/resident/resident.h"
 
 /* Raised with every change of what is written. */
 enum { FORMAT = 5 };
@@ -123,7 +126,8 @@ static sadmm_status check_header(const void *buffer, size_t size, struct sadmm_e
     describe_build(build);
     if (memcmp(header.magic, MAGIC, sizeof MAGIC) != 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "buffer: must be what sadmm_world_save wrote");
-    if (header.byte_order != BYTE_ORDER_MARK || header.format != FORMAT || memcmp(header.build, build, sizeof build) != 0)
+    if (header.byte_order != BYTE_ORDER_MARK || header.format != FORMAT ||
+        memcmp(header.build, build, sizeof build) != 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "buffer: must be of this build (%s), and is of another one (%.*s)", build,
                           (int)sizeof header.build - 1, header.build);

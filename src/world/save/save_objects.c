@@ -4,13 +4,22 @@
 
 #include "collision/hull/hull.h"
 #include "collision/mesh/mesh.h"
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
 #include "core/base/memory.h"
 #include "core/base/utf8.h"
 #include "core/model/rolling.h"
 #include "save_objects.h"
+#include "world/objects/body.h"
+#include "world/objects/coupling.h"
+#include "world/objects/gear.h"
+#include "world/objects/joint.h"
+#include "world/objects/shape.h"
+#include "world/step/kinematic.h"
 
 /* A member that is added has to be listed below. */
-#define LISTED(type, size) _Static_assert(sizeof(type) == (size), #type " has other members than the list of a saved world")
+#define LISTED(type, size) \
+    _Static_assert(sizeof(type) == (size), #type " has other members than the list of a saved world")
 LISTED(struct sadmm_rigid, 320);
 LISTED(struct sadmm_extrapolation, 72);
 LISTED(struct sadmm_joint_memory, 560);
@@ -47,7 +56,8 @@ static void archive_pair_table(struct sadmm_archive *archive, struct sadmm_pair_
         !sadmm_archive_expect(archive, values == count && pairs_fit(table, count, slots), "pairs of bodies or shapes"))
         return;
     for (size_t k = 0; k < count && archive->status == SADMM_OK; ++k)
-        if (sadmm_pair_table_set(table, table->keys[k], table->values[k], archive->error) != SADMM_OK) fail_memory(archive);
+        if (sadmm_pair_table_set(table, table->keys[k], table->values[k], archive->error) != SADMM_OK)
+            fail_memory(archive);
 }
 
 /* ---- settings and definitions ------------------------------------------------------------------------------------ */
@@ -154,7 +164,8 @@ static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size
     archive_name(archive, &body->name);
     if (!archive->reading) return;
     body->system_body = -1;
-    if (archive->status != SADMM_OK || !sadmm_archive_expect(archive, body_fits(world, body, archive->error), "a body")) {
+    if (archive->status != SADMM_OK ||
+        !sadmm_archive_expect(archive, body_fits(world, body, archive->error), "a body")) {
         body->alive = false;
         return;
     }
@@ -294,7 +305,8 @@ static sadmm_status put_shape(struct sadmm_archive *archive, sadmm_world *world,
                               const struct owners *owners)
 {
     const bool hull = kept->def.type == SADMM_SHAPE_HULL, mesh = kept->def.type == SADMM_SHAPE_MESH;
-    if (!sadmm_archive_expect(archive, shape_fits(world, kept, owners, archive->error), "a shape")) return archive->status;
+    if (!sadmm_archive_expect(archive, shape_fits(world, kept, owners, archive->error), "a shape"))
+        return archive->status;
     if (hull) kept->def.hull = (const sadmm_hull *)owners->of[kept->owner];
     if (mesh) kept->def.mesh = (const sadmm_mesh *)owners->of[kept->owner];
     TRY(sadmm_world_put_shape(world, slot, kept->body, &kept->def, archive->error));
@@ -370,7 +382,8 @@ static void archive_table(struct sadmm_archive *archive, sadmm_world *world, str
     size_t none = 0;
     sadmm_archive_count32(archive, count, 2 * sizeof(double), SADMM_MOST_SPRING_POINTS);
     const size_t numbers = 2 * (size_t)*count;
-    if (archive->reading && (numbers == 0 || !sadmm_archive_room(archive, &joint->table[k], &none, numbers, sizeof(double)))) {
+    if (archive->reading &&
+        (numbers == 0 || !sadmm_archive_room(archive, &joint->table[k], &none, numbers, sizeof(double)))) {
         *count = 0;
         return;
     }
@@ -427,7 +440,8 @@ static void archive_joint(struct sadmm_archive *archive, sadmm_world *world, siz
     archive_joint_memory(archive, &joint->last);
     if (!archive->reading) return;
     ++world->joint_count;
-    if (archive->status == SADMM_OK && sadmm_archive_expect(archive, joint_fits(world, joint, archive->error), "a joint"))
+    if (archive->status == SADMM_OK &&
+        sadmm_archive_expect(archive, joint_fits(world, joint, archive->error), "a joint"))
         sadmm_world_link_joint(world, slot);
 }
 
@@ -450,7 +464,8 @@ static bool gear_fits(const sadmm_world *world, const struct sadmm_world_gear *g
 {
     const sadmm_gear_def *def = &gear->def;
     return sadmm_world_check_gear(world, def, error) == SADMM_OK && gear->joint[0] == def->joint_1.slot - 1 &&
-           gear->joint[1] == def->joint_2.slot - 1 && sadmm_all_finite(&def->offset, 1) && sadmm_all_finite(&gear->last.force, 1);
+           gear->joint[1] == def->joint_2.slot - 1 && sadmm_all_finite(&def->offset, 1) &&
+           sadmm_all_finite(&gear->last.force, 1);
 }
 
 static void archive_gear(struct sadmm_archive *archive, sadmm_world *world, size_t slot)

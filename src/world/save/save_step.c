@@ -1,6 +1,7 @@
 /* The last step of a world, in a saved one: what the next one starts from, and what can be read of it. */
 #include <math.h>
 
+#include "core/base/check.h"
 #include "core/base/memory.h"
 #include "save_objects.h"
 #include "save_step.h"
@@ -55,9 +56,9 @@ static bool contacts_fit(const sadmm_world *world)
     if (points != set->point_count) return false;
     for (size_t k = 0; k < points; ++k) {
         const struct sadmm_contact_point *point = &set->points[k];
-        if (!sadmm_all_finite(point->impulse, 3) || !sadmm_all_finite(point->arm_a, 3) || !sadmm_all_finite(point->arm_b, 3) ||
-            !isfinite(point->separation) || !isfinite(point->error) || point->migrates > MIGRATES_ON ||
-            (point->migrates && !migration_fits(&set->migrations[k])))
+        if (!sadmm_all_finite(point->impulse, 3) || !sadmm_all_finite(point->arm_a, 3) ||
+            !sadmm_all_finite(point->arm_b, 3) || !isfinite(point->separation) || !isfinite(point->error) ||
+            point->migrates > MIGRATES_ON || (point->migrates && !migration_fits(&set->migrations[k])))
             return false;
     }
     return set->dt >= 0 && isfinite(set->dt);
@@ -163,7 +164,8 @@ static void archive_rows(struct sadmm_archive *archive, sadmm_world *world)
         for (size_t k = 0; k < sizeof columns / sizeof *columns; ++k)
             sadmm_archive_bytes(archive, columns[k], count * sizeof(double));
     }
-    if (archive->reading && archive->status == SADMM_OK) sadmm_archive_expect(archive, rows_fit(world), "rows of joints");
+    if (archive->reading && archive->status == SADMM_OK)
+        sadmm_archive_expect(archive, rows_fit(world), "rows of joints");
 }
 
 /* ---- plan, start, report ----------------------------------------------------------------------------------------- */

@@ -1,7 +1,8 @@
 /* One number of all states: two worlds that have it alike are alike, bit for bit. */
 #include <string.h>
 
-#include "world/state/world_internal.h"
+#include "core/base/check.h"
+#include "world/resident/resident.h"
 
 /* FNV-1a over the bit patterns. */
 static uint64_t hash_doubles(uint64_t hash, const double *x, int count)

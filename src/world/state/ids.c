@@ -1,5 +1,5 @@
 /* From an id to the live object it names, and what to call it. */
-#include "world_internal.h"
+#include "ids.h"
 
 sadmm_shape_id sadmm_world_shape_id(const sadmm_world *world, int32_t slot)
 {

@@ -1,5 +1,5 @@
-/* Lists of slots that belong to a body or a joint, through links that lie with the slots: in and out of them is O(1). A link
- * has a name, 1 and up; 0 is none. */
+/* Lists of slots that belong to a body or a joint, through links that lie with the slots: in and out of them is O(1). A
+ * link has a name, 1 and up; 0 is none. */
 #ifndef SADMM_WORLD_STATE_LINKS_H
 #define SADMM_WORLD_STATE_LINKS_H
 

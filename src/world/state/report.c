@@ -1,5 +1,5 @@
 /* What is reported of steps, whoever made them. */
-#include "world_internal.h"
+#include "report.h"
 
 void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sadmm_resident_report *done)
 {

@@ -18,11 +18,11 @@ void sadmm_shape_def_init(sadmm_shape_def *def, size_t size) { sadmm_growing_ini
 static sadmm_status check_part(const char *name, const void *part, int of_type, int type, struct sadmm_error *error)
 {
     if (type == of_type && !part)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->%s = NULL: must be given where def->type is %d", name,
-                          of_type);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->%s = NULL: must be given where def->type is %d",
+                          name, of_type);
     if (type != of_type && part)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->%s: must be NULL where def->type is %d, not %d", name,
-                          type, of_type);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->%s: must be NULL where def->type is %d, not %d",
+                          name, type, of_type);
     return SADMM_OK;
 }
 

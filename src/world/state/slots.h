@@ -1,6 +1,6 @@
-/* Which slots of an array are taken: ids stay valid while slots are reused. A bit a slot, and a tree of sums over words of
- * them (Fenwick's), so that the lowest free slot, the slot of an index and the index of a slot are O(log n), wherever
- * slots come and go. */
+/* Which slots of an array are taken: ids stay valid while slots are reused. A bit a slot, and a tree of sums over words
+ * of them (Fenwick's), so that the lowest free slot, the slot of an index and the index of a slot are O(log n),
+ * wherever slots come and go. */
 #ifndef SADMM_WORLD_STATE_SLOTS_H
 #define SADMM_WORLD_STATE_SLOTS_H
 

@@ -1,5 +1,5 @@
 /* Couplings of a world in a step by the host (core/model/coupling_law.h). */
-#include "world/state/world_internal.h"
+#include "coupling_step.h"
 
 void sadmm_world_begin_couplings(sadmm_world *world)
 {

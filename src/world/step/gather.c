@@ -3,10 +3,14 @@
 
 #include "collision/base/bounds.h"
 #include "core/base/barrier.h"
+#include "core/base/definition_fields.h"
 #include "core/base/memory.h"
 #include "core/model/extrapolation.h"
 #include "core/model/forces.h"
-#include "world/state/world_internal.h"
+#include "coupling_step.h"
+#include "gather.h"
+#include "joint_rows.h"
+#include "kinematic.h"
 
 static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type == SADMM_BODY_DYNAMIC; }
 

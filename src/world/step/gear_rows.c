@@ -1,9 +1,11 @@
 /* Gears as constraint rows (core/model/gear_law.h), after those of joints. */
 #include <string.h>
 
+#include "core/base/definition_fields.h"
 #include "core/base/memory.h"
 #include "core/model/gear_law.h"
-#include "world/state/world_internal.h"
+#include "gear_rows.h"
+#include "joint_act.h"
 
 static bool acts(const sadmm_world *world, const struct sadmm_world_gear *gear)
 {

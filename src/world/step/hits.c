@@ -9,8 +9,8 @@
  *
  *     x~ = x(t) - t v~ - (t^2 + dt^2)/2 a,      v~ = v(t)+ - t a
  *
- * and what follows, contact finding, solve and motion, sees an ordinary state: it moves by dt times the velocity that it
- * ends with, as contacts' separations have it, and has no trapezoid correction (`was_hit`, core/model/system.h); a
+ * and what follows, contact finding, solve and motion, sees an ordinary state: it moves by dt times the velocity that
+ * it ends with, as contacts' separations have it, and has no trapezoid correction (`was_hit`, core/model/system.h); a
  * pair's motion begins at the last hit of either (`since`, collision.h). What rests on something, or has joints, is
  * left to the solve, and so is, from the sub-step's start, what would be hit more often than settings.hits times in it;
  * what passes, which would go through then, is hit through its centre of mass once more, and is the solve's from there.
@@ -22,8 +22,10 @@
 #include "collision/flight/flight_touch.h"
 #include "collision/flight/swept_bodies.h"
 #include "collision/flight/swept_body.h"
+#include "core/base/definition_fields.h"
 #include "core/base/memory.h"
-#include "world/state/world_internal.h"
+#include "gather.h"
+#include "hits.h"
 
 /* A hit that is foreseen. */
 struct foreseen {
@@ -135,8 +137,8 @@ static bool foresee(struct taking *t, uint64_t key, double from)
     struct sadmm_swept_pair pair = {
         shape_of(t, slot[0], a), shape_of(t, slot[1], b), t->input.hulls, 0, t->settings.restitution_threshold, false};
     struct sadmm_flight_touch touch;
-    /* What the triangles of a mesh push along depends on those around them, which one touch by itself does not see: that
-     * is left to the solve. */
+    /* What the triangles of a mesh push along depends on those around them, which one touch by itself does not see:
+     * that is left to the solve. */
     if (pair.b.geometry->type == SADMM_SHAPE_MESH) return true;
     const bool found = sadmm_flight_touch(&pair, from, t->settings.dt, &touch);
     for (int side = 0; pair.lost && side < 2; ++side) give_up(&h->list[number[side]]);

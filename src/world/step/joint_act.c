@@ -1,6 +1,6 @@
 /* A joint in a (sub-)step: its bodies, and what they make of its geometry (core/model/joint_law.h). Joints and gears
  * make their rows of it. */
-#include "world/state/world_internal.h"
+#include "joint_act.h"
 
 struct joint_body sadmm_world_joint_body(const sadmm_world *world, int32_t slot)
 {

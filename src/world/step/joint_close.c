@@ -1,13 +1,16 @@
-/* What is locked, closed at the end of a (sub-)step (core/model/joint_close.h): rows of the poses that it has moved bodies
- * to, solved for displacements by the order of the step's own. */
+/* What is locked, closed at the end of a (sub-)step (core/model/joint_close.h): rows of the poses that it has moved
+ * bodies to, solved for displacements by the order of the step's own. */
 #include <string.h>
 
 #include "core/base/memory.h"
-#include "core/model/joint_close.h"
 #include "core/model/forces.h"
+#include "core/model/joint_close.h"
 #include "core/model/joint_trapezoid.h"
 #include "core/solve/articulation.h"
-#include "world/state/world_internal.h"
+#include "gather.h"
+#include "joint_act.h"
+#include "joint_close.h"
+#include "joint_rows.h"
 
 /* A joint's ends as the step began, and where it has left its bodies; what moves there is of account for its scale. */
 struct ends {
@@ -228,8 +231,8 @@ static void pay_costs(sadmm_world *world)
     }
 }
 
-/* Velocities of what folds, along what its joints leave it at the end. What they are off by in a direction that is about to
- * vanish would be taken for errors as large as that is short, once the next step is past the pose. */
+/* Velocities of what folds, along what its joints leave it at the end. What they are off by in a direction that is
+ * about to vanish would be taken for errors as large as that is short, once the next step is past the pose. */
 static sadmm_status turn_speeds(sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings)
 {
     if (!make_rows(world, settings)) return sadmm_fail_memory(&world->error, "joints that close");

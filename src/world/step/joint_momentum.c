@@ -4,7 +4,7 @@
 
 #include "core/base/memory.h"
 #include "core/model/joint_momentum.h"
-#include "world/state/world_internal.h"
+#include "joint_momentum.h"
 
 static bool is_floating(const sadmm_world *world, int32_t body)
 {

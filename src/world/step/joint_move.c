@@ -6,7 +6,10 @@
 #include "core/math/momentum.h"
 #include "core/model/islands.h"
 #include "core/model/joint_trapezoid.h"
-#include "world/state/world_internal.h"
+#include "gather.h"
+#include "joint_close.h"
+#include "joint_momentum.h"
+#include "joint_move.h"
 
 static struct joint_trapezoid trapezoid_of(const sadmm_world *world, int32_t body, double dt)
 {

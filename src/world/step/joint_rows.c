@@ -3,7 +3,10 @@
 #include <string.h>
 
 #include "core/base/memory.h"
-#include "world/state/world_internal.h"
+#include "gear_rows.h"
+#include "joint_act.h"
+#include "joint_rows.h"
+#include "joint_stiffen.h"
 
 /* Six locks, or what acts along six free coordinates. */
 struct all_laws {

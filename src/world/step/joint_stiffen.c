@@ -3,7 +3,8 @@
 
 #include "core/base/memory.h"
 #include "core/model/stiffening.h"
-#include "world/state/world_internal.h"
+#include "joint_act.h"
+#include "joint_stiffen.h"
 
 /* What is done with the force of a joint on a dynamic body of it. */
 typedef void on_force(sadmm_world *world, int32_t body, vec3 place, vec3 force);

@@ -12,7 +12,8 @@
 #include "core/base/memory.h"
 #include "core/model/islands.h"
 #include "core/model/kinematic.h"
-#include "world/state/world_internal.h"
+#include "kinematic.h"
+#include "world/state/ids.h"
 
 static sadmm_status list_kinematic(sadmm_world *world)
 {

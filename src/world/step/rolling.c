@@ -1,7 +1,7 @@
 /* Contacts that roll (core/model/rolling.h), to what bodies take along into the next (sub-)step. */
 #include "core/model/joint_momentum.h"
 #include "core/model/rolling.h"
-#include "world/state/world_internal.h"
+#include "rolling.h"
 
 /* A contact that rolls, to what a body takes along into the next step. */
 static void keep_rolling(sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t k, double dt)

@@ -1,0 +1,15 @@
+/* Contacts, as they are read. */
+#ifndef SADMM_WORLD_OBJECTS_CONTACTS_H
+#define SADMM_WORLD_OBJECTS_CONTACTS_H
+
+#include "world/state/world_state.h"
+
+/* A point of the last step: where sadmm_contact says it is. */
+void sadmm_world_contact_position(const sadmm_world *world, const struct sadmm_contact_pair *pair,
+                                  const struct sadmm_contact_point *point, double position[3]);
+
+/* How fast the surfaces come closer there before the step, m/s. */
+double sadmm_world_contact_speed(const sadmm_world *world, const struct sadmm_contact_pair *pair,
+                                 const struct sadmm_contact_point *point);
+
+#endif

@@ -1,0 +1,48 @@
+/* Bodies of a world, in slots. */
+#ifndef SADMM_WORLD_STATE_WORLD_BODY_H
+#define SADMM_WORLD_STATE_WORLD_BODY_H
+
+#include "core/model/system.h"
+#include "core/solve/resident.h"
+#include "subadmm/hull.h"
+#include "subadmm/mesh.h"
+#include "subadmm/world.h"
+
+enum { SADMM_NAME_SIZE = 64 }; /* a name is cut to what fits, with its final 0 */
+
+/* A body slot. Dynamic bodies are numbered in slot order for the solver at every step. */
+struct sadmm_world_body {
+    bool alive;
+    uint32_t generation; /* of the next id when dead, of the current one when alive */
+    sadmm_body_type type;
+    int32_t environment;
+    int32_t system_body; /* in the last step, -1: static or not there, below: kinematic (core/base/contact_set.h) */
+    struct sadmm_rigid rigid;
+    uint32_t first_shape, first_joint; /* links: names of a shape are its slot + 1, of a joint below */
+    double contact_wrench[6];
+    struct sadmm_extrapolation extrapolation;
+    struct {
+        bool set; /* a kinematic body is to be there after the next step */
+        double position[3], orientation[4];
+    } target;
+    void *user_data;     /* the caller's */
+    char *name;          /* a block of its own, so that it stays where it is when slots are added; NULL: none */
+    uint32_t dirty;                     /* bit of enum sadmm_update_kind: no step has taken that along yet */
+    int64_t set_at[SADMM_BODY_UPDATES]; /* steps enqueued since the world was loaded, when that was set; -1: before */
+};
+
+/* What the definition of a hull's shape had, or a mesh's; contact finding has the shape in another frame. */
+struct sadmm_world_block_shape {
+    const sadmm_hull *hull; /* NULL: of a mesh */
+    const sadmm_mesh *mesh;
+    double position[3], orientation[4];
+};
+
+/* A kinematic body in a step. */
+struct sadmm_world_kinematic {
+    int32_t slot;
+    struct sadmm_rigid rigid, next; /* as the (sub-)step begins and ends */
+    double wrench[6];               /* of contacts, of the sub-steps made so far */
+};
+
+#endif
