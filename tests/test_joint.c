@@ -5,6 +5,7 @@
 
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
+#include "core/model/joint_law.h"
 #include "failed_step.h"
 #include "scene_tools.h"
 
@@ -294,7 +295,7 @@ START_TEST(kinds_hold)
         def.locks = 1 + 2 + 16; /* of CUSTOM */
         def.coordinates[0].spring_stiffness = kind == SADMM_JOINT_SPRING ? 500 : 0;
         def.coordinates[0].spring_damping = kind == SADMM_JOINT_SPRING ? 5 : 0;
-        const bool radial = kind >= SADMM_JOINT_DISTANCE;
+        const bool radial = joint_is_radial(kind);
         const double place[3] = {k ? 0.2 : 0, 0, 0};
         MUST(world, sadmm_world_place_joint(world, &def, place, UNIT));
         if (radial) def.position_b[0] = def.position_b[1] = 0.02; /* a length of its own */

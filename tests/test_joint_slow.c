@@ -1,4 +1,5 @@
 /* Joints for long: every kind under loads that turn, 1e5 steps. */
+#include "core/model/joint_law.h"
 #include "scene_tools.h"
 
 static const double UNIT[4] = {1, 0, 0, 0};
@@ -38,7 +39,7 @@ START_TEST(kinds_hold_for_long)
         def.locks = 1 + 2 + 16; /* of CUSTOM */
         def.coordinates[0].spring_stiffness = kind == SADMM_JOINT_SPRING ? 500 : 0;
         MUST(world, sadmm_world_place_joint(world, &def, place, UNIT));
-        if (kind >= SADMM_JOINT_DISTANCE) def.position_b[0] = def.position_b[1] = 0.02; /* a length of its own */
+        if (joint_is_radial(kind)) def.position_b[0] = def.position_b[1] = 0.02; /* a length of its own */
         MUST(world, sadmm_world_add_joint(world, &def, &joints[k]));
     }
     for (int step = 0; step < STEPS; ++step) {

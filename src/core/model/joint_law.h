@@ -7,6 +7,7 @@
 
 #include <math.h>
 
+#include "core/base/definition_fields.h"
 #include "core/math/joint.h"
 #include "core/math/joint_table.h"
 #include "core/math/max.h"
@@ -68,25 +69,27 @@ SADMM_INLINE bool joint_is_radial(sadmm_joint_kind kind)
     return kind == SADMM_JOINT_DISTANCE || kind == SADMM_JOINT_SPRING || kind == SADMM_JOINT_LINK;
 }
 
-/* A coordinate's fields as numbers, and back: what passes from the host to a device. */
-enum { JOINT_COORDINATE_NUMBERS = 14 };
+/* A coordinate's members as numbers, and back: what passes from the host to a device. */
+enum { JOINT_COORDINATE_NUMBERS = SADMM_COORDINATE_FIELDS_COUNT };
 SADMM_INLINE void joint_coordinate_numbers(const sadmm_joint_coordinate *c, double x[JOINT_COORDINATE_NUMBERS])
 {
-    x[0] = c->limited ? 1 : 0, x[1] = c->lower, x[2] = c->upper;
-    x[3] = (double)(int)c->drive, x[4] = c->target_position, x[5] = c->target_speed;
-    x[6] = c->drive_stiffness, x[7] = c->drive_damping, x[8] = c->drive_force;
-    x[9] = c->friction;
-    x[10] = c->spring_stiffness, x[11] = c->spring_damping, x[12] = c->spring_rest;
-    x[13] = c->armature;
+    int k = 0;
+#define JOINT_PUT(X, kind, role, name, ...) x[k++] = JOINT_PUT_##kind(c->name);
+#define JOINT_PUT_REAL(value) value
+#define JOINT_PUT_BOUND(value) value
+#define JOINT_PUT_FLAG(value) value ? 1 : 0
+#define JOINT_PUT_DRIVE(value) (double)(int)value
+    SADMM_COORDINATE_FIELDS(JOINT_PUT, )
 }
 SADMM_INLINE void joint_coordinate_take(const double x[JOINT_COORDINATE_NUMBERS], sadmm_joint_coordinate *c)
 {
-    c->limited = x[0] != 0, c->lower = x[1], c->upper = x[2];
-    c->drive = (sadmm_drive)(int)x[3], c->target_position = x[4], c->target_speed = x[5];
-    c->drive_stiffness = x[6], c->drive_damping = x[7], c->drive_force = x[8];
-    c->friction = x[9];
-    c->spring_stiffness = x[10], c->spring_damping = x[11], c->spring_rest = x[12];
-    c->armature = x[13];
+    int k = 0;
+#define JOINT_TAKE(X, kind, role, name, ...) c->name = JOINT_TAKE_##kind(x[k++]);
+#define JOINT_TAKE_REAL(x) x
+#define JOINT_TAKE_BOUND(x) x
+#define JOINT_TAKE_FLAG(x) (x) != 0
+#define JOINT_TAKE_DRIVE(x) (sadmm_drive)(int)(x)
+    SADMM_COORDINATE_FIELDS(JOINT_TAKE, )
 }
 
 /* ---- bodies and geometry ----------------------------------------------------------------------------------------- */
