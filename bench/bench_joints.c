@@ -15,6 +15,7 @@
 #include "core/base/error.h"
 #include "core/base/memory.h"
 #include "joint_cases.h"
+#include "subadmm/world.h"
 
 static const char command[] = "joints";
 

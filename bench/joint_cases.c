@@ -1,4 +1,5 @@
 #include "joint_cases.h"
+#include "subadmm/world.h"
 
 #include <math.h>
 #include <string.h>

@@ -6,6 +6,7 @@
 Of every source below PROJECT/src: folders include those they may, and no file includes itself, directly or through others.
 Of the objects in the archives and folders (by nm): no two of them call each other, directly or through others, and folders
 call those they may include. What is there several times over (precisions, instruction sets) counts as one object.
+What stands below the world does not see its header.
 Of both together: a source and the header of its name are one part, and no part uses itself through others.
 Of the modules below PROJECT/python/subadmm: none imports itself through others, also where a function imports. What the
 package itself exports is the public API, which every module may use, as the C sources use include/subadmm.
@@ -75,6 +76,26 @@ def public_names(folder):
         with open(header, encoding="utf-8") as text:
             names.update(re.findall(r"\bsadmm_\w+", text.read()))
     return names
+
+
+def above_the_world(root, files):
+    """Files that stand below the world and include its header, subadmm/world.h, directly or through public headers."""
+    graph = {}
+    for name in os.listdir(root):
+        if name.endswith(".h"):
+            with open(os.path.join(root, name), encoding="utf-8") as text:
+                graph[name] = set(re.findall(r'^#include "(?:subadmm/)?([^"/]+)"', text.read(), re.M))
+
+    def reaches(name):
+        return name == "world.h" or any(reaches(other) for other in graph.get(name, ()))
+
+    for file in sorted(files):
+        if os.path.dirname(file) in WORLD + TOOLS:
+            continue
+        with open(os.path.join(root, "..", "..", "src", file), encoding="utf-8") as text:
+            for name in re.findall(r'^\s*#\s*include\s+"subadmm/([^"]+)"', text.read(), re.M):
+                if reaches(name):
+                    yield f"{file} includes subadmm/{name}, and with it world.h: it stands below the world"
 
 
 def calls(archives, files, public):
@@ -187,6 +208,8 @@ def main():
     failed = False
     for verb, graph in graphs:
         errors = list(wrong_edges(graph, verb)) if verb in ("includes", "calls") else []
+        if verb == "includes":
+            errors += above_the_world(os.path.join(sys.argv[1], "include", "subadmm"), files)
         found = circle(graph)
         if found:
             errors.append(f"a circle: {f' {verb} '.join(found)}")

@@ -20,13 +20,11 @@
 #ifndef SUBADMM_COUPLING_H
 #define SUBADMM_COUPLING_H
 
-#include "world.h"
+#include "types.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-typedef struct sadmm_coupling_id { uint32_t slot, generation; } sadmm_coupling_id;
 
 typedef struct sadmm_coupling_def {
     size_t struct_size;          /* set by sadmm_coupling_def_default() */

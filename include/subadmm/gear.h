@@ -19,13 +19,11 @@
 #ifndef SUBADMM_GEAR_H
 #define SUBADMM_GEAR_H
 
-#include "joint.h"
+#include "types.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-typedef struct sadmm_gear_id { uint32_t slot, generation; } sadmm_gear_id;
 
 typedef struct sadmm_gear_def {
     size_t struct_size;          /* set by sadmm_gear_def_default() */

@@ -19,13 +19,11 @@
 #ifndef SUBADMM_JOINT_H
 #define SUBADMM_JOINT_H
 
-#include "world.h"
+#include "types.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-typedef struct sadmm_joint_id { uint32_t slot, generation; } sadmm_joint_id;
 
 /* Names of lock masks: bit k locks coordinate k. */
 typedef enum sadmm_joint_kind {

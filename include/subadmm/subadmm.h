@@ -7,6 +7,7 @@
 #include "events.h"
 #include "gear.h"
 #include "hull.h"
+#include "id.h"
 #include "joint.h"
 #include "mass.h"
 #include "mesh.h"
@@ -17,6 +18,7 @@
 #include "settings.h"
 #include "status.h"
 #include "tasks.h"
+#include "types.h"
 #include "world.h"
 
 #endif

@@ -12,6 +12,9 @@
 #include "core/base/memory.h"
 #include "subadmm/coupling.h"
 #include "subadmm/gear.h"
+#include "subadmm/joint.h"
+#include "subadmm/problem.h"
+#include "subadmm/world.h"
 
 enum { BODIES = 5, MAX_JOINTS = 8, MAX_CALLS = 48, MAX_STEPS = 12, IDS = 16, COORDINATES = 6 };
 

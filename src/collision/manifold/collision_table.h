@@ -15,7 +15,7 @@
 #include <stdbool.h>
 
 #include "collision/shapes/geometry.h"
-#include "subadmm/world.h"
+#include "subadmm/types.h"
 
 /* clang-format off */
 #define SADMM_COLLISION_TABLE(PAIR)                                                             \

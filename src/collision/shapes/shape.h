@@ -10,7 +10,7 @@
 #include "core/base/contact_set.h"
 #include "core/base/error.h"
 #include "core/base/inline.h"
-#include "subadmm/world.h"
+#include "subadmm/types.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -9,7 +9,7 @@
 #include "subadmm/gear.h"
 #include "subadmm/hull.h"
 #include "subadmm/joint.h"
-#include "subadmm/world.h"
+#include "subadmm/types.h"
 
 #ifdef __cplusplus
 extern "C" {

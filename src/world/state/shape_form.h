@@ -5,7 +5,7 @@
 #include "collision/shapes/shape.h"
 #include "core/base/error.h"
 #include "core/base/growing.h"
-#include "subadmm/world.h"
+#include "subadmm/types.h"
 
 extern const struct sadmm_growing sadmm_growing_shape;
 

@@ -2,7 +2,7 @@
 #ifndef SADMM_WORLD_STATE_TOUCHES_H
 #define SADMM_WORLD_STATE_TOUCHES_H
 
-#include "subadmm/world.h"
+#include "subadmm/types.h"
 
 /* Two shapes that touch, or a sensor and what it sees. */
 struct sadmm_touch {

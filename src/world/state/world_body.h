@@ -6,7 +6,7 @@
 #include "core/solve/resident.h"
 #include "subadmm/hull.h"
 #include "subadmm/mesh.h"
-#include "subadmm/world.h"
+#include "subadmm/types.h"
 
 enum { SADMM_NAME_SIZE = 64 }; /* a name is cut to what fits, with its final 0 */
 
