@@ -9,7 +9,8 @@ usage() {
 usage: scripts/docs.sh [--python PROGRAM] [--help]
 
 Writes build-docs/html/index.html. Warnings are errors. Needs Doxygen (installed where that is possible, as by
-scripts/test.sh) and Sphinx, Breathe and MyST, which go into an environment of its own, build-docs/environment.
+scripts/test.sh) and Sphinx, Breathe and MyST, which go into an environment of its own, build-docs/environment. Exit status
+77: these cannot be installed here.
 
 --python PROGRAM  a Python with the package installed, whose docstrings are taken (default: build-python's, which
                   scripts/test.sh --only python makes; without one the Python reference is left out)
@@ -26,13 +27,16 @@ while (($#)); do
     shift
 done
 
-install_packages doxygen=doxygen python3-venv
+(install_packages doxygen=doxygen python3-venv) && command -v doxygen >/dev/null || exit 77
 out=$project/build-docs
 source=$out/source
 mkdir -p "$out"
 if [[ ! -x $out/environment/bin/sphinx-build ]]; then
     python3 -m venv "$out/environment"
-    "$out/environment/bin/pip" install --quiet --disable-pip-version-check sphinx breathe myst-parser
+    "$out/environment/bin/pip" install --quiet --disable-pip-version-check sphinx breathe myst-parser || {
+        rm -rf "$out/environment"
+        exit 77
+    }
 fi
 
 say "Doxygen: the public headers"

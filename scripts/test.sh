@@ -4,7 +4,7 @@ set -euo pipefail
 # shellcheck source=scripts/lib.sh
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
-steps=(plain python asan tsan clang minimal cuda)
+steps=(plain python docs asan tsan clang minimal cuda)
 slow_steps=(fuzz) # with --slow
 more_steps=(gpu)  # only when asked for
 
@@ -15,6 +15,8 @@ usage: scripts/test.sh [--slow] [--only STEP]... [--help]
 Installs what is missing (Debian and Ubuntu, as root or by sudo without a password; else says what to install), then:
     plain    every feature but CUDA, warnings are errors, the whole suite; on the emulated CUDA device only with --slow
     python   the Python package: pip install into an environment of its own, and its tests
+    docs     the documents as web pages, with the reference made from headers and docstrings: warnings are errors; left out
+             where Doxygen or Sphinx cannot be installed
     asan     address and undefined-behaviour sanitizers, the whole suite, also on the emulated CUDA device (single precision)
     tsan     thread sanitizer, the tests of suite 'threads'
     clang    by clang with LLVM's OpenMP, the tests of suite 'threads': it writes a lane of a vector by storing the whole vector,
@@ -119,6 +121,15 @@ step_python() {
     # Away from the sources, so that what was installed is what is tested.
     (cd "$folder" && SUBADMM=$folder/build/src/subadmm environment/bin/python -m pytest -q --junitxml=meson-logs/pytest.xml "$project/python/tests") || true
     logs+=("$folder/meson-logs/pytest.xml")
+}
+
+step_docs() {
+    local status=0
+    say "docs: guide, internals and reference as web pages"
+    "$project/scripts/docs.sh" || status=$?
+    ((status == 77)) || return "$status"
+    echo "Doxygen or Sphinx cannot be installed here"
+    left_out+=(docs)
 }
 
 step_asan() {
