@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "core/math/array3.h"
-#include "core/math/trapezoid.h"
+#include "core/model/body_trapezoid.h"
 #include "core/model/rolling.h"
 #include "core/model/system_terms.h"
 #include "cpu_rows.h"
@@ -90,9 +90,7 @@ static struct trapezoid_touch touch_of(const struct sadmm_context *c, const stru
     const double rest[2] = {a->rest, b->rest};
     struct trapezoid_touch touch = {atomic_load_explicit(&c->touch[label], memory_order_relaxed),
                                     {bits_of_body(c, pair->body_a), bits_of_body(c, pair->body_b)}};
-    touch.island |= pair->body_a >= 0 && pair->body_b >= 0 ? TOUCH_INNER
-                    : pair->friction > 0                   ? TOUCH_FRICTION
-                                                           : TOUCH_SMOOTH;
+    touch.island |= body_contact_touch(pair->body_a >= 0 && pair->body_b >= 0, pair->friction);
     touch.island |= a->touch | b->touch;
     if (sadmm_pair_is_kinematic(c->system, pair)) touch.island |= TOUCH_PENETRATES;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
@@ -108,15 +106,14 @@ static struct trapezoid_touch touch_of(const struct sadmm_context *c, const stru
             if (touch.body[0] & touch.body[1] & TOUCH_MOVED) break;
             continue;
         }
-        const double *v_a = pair->body_a >= 0 ? &c->system->velocity[6 * (size_t)pair->body_a] : still,
-                     *v_b = pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still;
+        const double *const v[2] = {
+            pair->body_a >= 0 ? &c->system->velocity[6 * (size_t)pair->body_a] : still,
+            pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still};
+        const double *const own[2] = {a->correction, b->correction};
         const struct rolling_halfway at = rolling_halfway_of(
             n, point, sadmm_migration_of(c->system->contacts->points, c->system->contacts->migrations, k));
-        const double corrections[2] = {-trapezoid_along(at.normal, a->correction, at.arm_a),
-                                       trapezoid_along(at.normal, b->correction, at.arm_b)};
-        const double speed = trapezoid_along(at.normal, v_b, at.arm_b) - trapezoid_along(at.normal, v_a, at.arm_a);
-        const struct trapezoid_separation separation = {point->separation, speed, {size3(arm_a), size3(arm_b)},
-                                                        point->migrates};
+        double corrections[2];
+        const struct trapezoid_separation separation = body_point_way(&at, point, v, own, corrections);
         trapezoid_add_way(&touch, separation, corrections, size, dt, slop);
     }
     return touch;
@@ -135,9 +132,9 @@ static void touch_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
 /* The correction that the body takes, in place of its own. */
 static void choose_trapezoid(const struct sadmm_context *c, size_t i, struct sadmm_trapezoid *trapezoid)
 {
-    if (c->system->rigid[i].was_hit) return; /* as sadmm_find_trapezoids has it */
-    trapezoid->kind = trapezoid_kind_of(atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
-                                        atomic_load_explicit(&c->touch[i], memory_order_relaxed));
+    trapezoid->kind =
+        body_trapezoid_kind(&c->system->rigid[i], atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
+                            atomic_load_explicit(&c->touch[i], memory_order_relaxed));
     switch (trapezoid->kind) {
     case TRAPEZOID_OFF: memset(trapezoid->correction, 0, sizeof trapezoid->correction); break;
     case TRAPEZOID_SHARED: trapezoid_shared(c->settings.gravity, c->settings.dt, trapezoid->correction); break;

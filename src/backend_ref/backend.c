@@ -3,6 +3,7 @@
 
 #include "core/solve/backends.h"
 #include "core/base/memory.h"
+#include "core/model/body_trapezoid.h"
 #include "core/model/system_math.h"
 #include "literal.h"
 
@@ -72,28 +73,28 @@ static void touch_point(struct sadmm_context *c, const struct sadmm_contact_pair
     const struct sadmm_contact_set *contacts = c->system->contacts;
     const struct ref_constraint *constraint = &c->constraints[k];
     const bool inner = constraint->side[0].body >= 0 && constraint->side[1].body >= 0;
-    struct trapezoid_touch touch = {inner ? TOUCH_INNER : constraint->mu > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH, {0, 0}};
+    struct trapezoid_touch touch = {body_contact_touch(inner, constraint->mu), {0, 0}};
     const struct rolling_halfway at =
         rolling_halfway_of(
         pair->normal, &contacts->points[k], sadmm_migration_of(contacts->points, contacts->migrations, k));
-    double speed = 0, correction[2] = {0, 0}, size[2] = {0, 0}, moves[2] = {0, 0}, rest[2] = {0, 0};
+    static const double still[6];
+    const struct sadmm_contact_point *point = &contacts->points[k];
+    const double *v[2] = {still, still}, *own[2] = {still, still};
+    double correction[2], size[2] = {0, 0}, moves[2] = {0, 0}, rest[2] = {0, 0};
     for (int s = 0; s < 2; ++s) {
         const struct ref_side *side = &constraint->side[s];
         if (side->body < 0) continue;
-        const double sign = s ? 1 : -1, *arm_halfway = s ? at.arm_b : at.arm_a;
-        speed += sign * trapezoid_along(at.normal, c->bodies[side->body].v, arm_halfway);
-        correction[s] = sign * trapezoid_along(at.normal, c->bodies[side->body].correction, arm_halfway);
-        const double *arm = s ? contacts->points[k].arm_b : contacts->points[k].arm_a;
-        size[s] = trapezoid_size(c->bodies[side->body].correction, arm);
-        moves[s] = trapezoid_speed(c->system->rigid[side->body].velocity, c->bodies[side->body].v, arm);
+        const double *arm = s ? point->arm_b : point->arm_a;
+        v[s] = c->bodies[side->body].v;
+        own[s] = c->bodies[side->body].correction;
+        size[s] = trapezoid_size(own[s], arm);
+        moves[s] = trapezoid_speed(c->system->rigid[side->body].velocity, v[s], arm);
         const struct sadmm_rigid *rigid = &c->system->rigid[side->body];
         rest[s] = trapezoid_rest_speed(c->settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
                                        c->settings->dt);
         touch.island |= forces_touch(rigid);
     }
-    const struct sadmm_contact_point *point = &contacts->points[k];
-    const struct trapezoid_separation separation = {
-        point->separation, speed, {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
+    const struct trapezoid_separation separation = body_point_way(&at, point, v, own, correction);
     trapezoid_add_point(&touch, separation,
                         constraint->lambda[0], correction, size, moves, rest,
                         c->settings->dt, c->settings->slop);
@@ -114,8 +115,7 @@ static void touch(struct sadmm_context *c)
         double before[6];
         body->touch = body->island_touch = 0;
         spin_before(&c->system->rigid[i], c->settings->dt, before);
-        trapezoid_own(before, body->v, body->correction);
-        for (int k = 0; k < 3 && c->system->rigid[i].was_hit; ++k) body->correction[k] = 0;
+        body_trapezoid(&c->system->rigid[i], before, body->v, body->correction);
     }
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
@@ -142,7 +142,7 @@ static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next,
         const struct ref_body *from = &c->bodies[i];
         const struct sadmm_rigid *start = &c->system->rigid[i];
         const enum trapezoid_kind kind =
-            start->was_hit ? TRAPEZOID_OWN : trapezoid_kind_of(c->bodies[from->label].island_touch, from->touch);
+            body_trapezoid_kind(start, c->bodies[from->label].island_touch, from->touch);
         double correction[6] = {0}, mean[6];
         if (kind == TRAPEZOID_SHARED) trapezoid_shared(c->settings->gravity, dt, correction);
         if (kind == TRAPEZOID_OWN) memcpy(correction, from->correction, sizeof correction);

@@ -4,7 +4,7 @@
 
 #include "backend_cuda/device/double.h"
 #include "backend_cuda/device/wide.h"
-#include "core/math/trapezoid.h"
+#include "core/model/body_trapezoid.h"
 #include "core/model/spin.h"
 
 /* Multiplier of a point as a world vector on b. */
@@ -17,19 +17,6 @@ static __device__ __forceinline__ vec3 point_impulse(const contact_view &contact
 static __device__ __forceinline__ const double *halfway_of(const cuda_view &v, int32_t i)
 {
     return row_at(v.bodies.halfway, (size_t)i);
-}
-
-/* The trapezoid correction of a body: of one that was hit, its turning's alone (sadmm_rigid.was_hit). */
-static __device__ __forceinline__ enum trapezoid_kind body_trapezoid_kind(const struct sadmm_rigid *body, int island,
-                                                                          int own)
-{
-    return body->was_hit ? TRAPEZOID_OWN : trapezoid_kind_of(island, own);
-}
-static __device__ __forceinline__ void body_trapezoid(const struct sadmm_rigid *body, const double before[6],
-                                                      const double velocity[6], double correction[6])
-{
-    trapezoid_own(before, velocity, correction);
-    for (int k = 0; k < 3; ++k) correction[k] = body->was_hit ? 0 : correction[k];
 }
 
 /* Q: where a body for which `velocity` is solved gets to by that less its trapezoid correction (math/trapezoid.h):

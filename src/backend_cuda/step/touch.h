@@ -173,7 +173,7 @@ static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, 
             fetch_impulses(v.contacts, t, k, &points);
         }
         if (TRAPEZOID && t.pair >= 0)
-            sums.touch |= t.other >= 0 ? TOUCH_INNER : t.friction > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH;
+            sums.touch |= body_contact_touch(t.other >= 0, t.friction);
         at += LANES;
         if (at >= begun->end) break;
         t = fetch_touching(v, at, begun->end);

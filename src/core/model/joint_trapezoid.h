@@ -4,8 +4,8 @@
 #ifndef SADMM_CORE_MODEL_JOINT_TRAPEZOID_H
 #define SADMM_CORE_MODEL_JOINT_TRAPEZOID_H
 
+#include "body_trapezoid.h"
 #include "core/base/contact_set.h"
-#include "core/math/trapezoid.h"
 #include "joint_law.h"
 #include "rolling.h"
 #include "spin.h"
@@ -62,21 +62,20 @@ SADMM_INLINE void joint_contact_touches(const double normal[3], const struct sad
                                         struct trapezoid_touch *touch)
 {
     const struct rolling_halfway at = rolling_halfway_of(normal, point, migration);
-    double speed = 0, correction[2], size[2], moves[2] = {0, 0}, rest[2] = {0, 0};
+    const double *const v[2] = {bodies[0].velocity, bodies[1].velocity},
+                 *const own[2] = {bodies[0].correction, bodies[1].correction};
+    double correction[2], size[2], moves[2] = {0, 0}, rest[2] = {0, 0};
     int s;
     for (s = 0; s < 2; ++s) {
         const struct joint_trapezoid *body = &bodies[s];
-        const double *arm = s ? at.arm_b : at.arm_a, sign = s ? 1 : -1;
-        speed += sign * trapezoid_along(at.normal, body->velocity, arm);
-        correction[s] = sign * trapezoid_along(at.normal, body->correction, arm);
+        const double *arm = s ? at.arm_b : at.arm_a;
         size[s] = trapezoid_size(body->correction, arm);
         if (!body->rigid) continue;
         moves[s] = trapezoid_speed(body->rigid->velocity, body->velocity, arm);
         rest[s] = trapezoid_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
                                        body->rigid->mass, settings->dt);
     }
-    const struct trapezoid_separation separation = {point->separation, speed,
-                                                    {size3(point->arm_a), size3(point->arm_b)}, point->migrates};
+    const struct trapezoid_separation separation = body_point_way(&at, point, v, own, correction);
     trapezoid_add_point(touch, separation, dot3(normal, point->impulse), correction, size, moves, rest, settings->dt,
                         settings->slop);
 }

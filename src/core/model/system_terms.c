@@ -1,7 +1,9 @@
 #include "system_terms.h"
 
+#include <string.h>
+
+#include "body_trapezoid.h"
 #include "core/math/packed6.h"
-#include "core/math/trapezoid.h"
 #include "system_math.h"
 
 static void pack(const double A[36], double out[PACKED6])
@@ -52,9 +54,10 @@ void sadmm_find_trapezoids(size_t count, const struct sadmm_rigid *bodies, const
 {
     for (size_t i = 0; i < count; ++i) {
         struct sadmm_trapezoid *out = &trapezoids[i];
-        trapezoid_own(bodies[i].velocity, velocity + 6 * i, out->correction);
-        for (int k = 0; k < 3; ++k) out->correction[3 + k] = (velocity[6 * i + 3 + (size_t)k] - out->spin[k]) / 2;
-        for (int k = 0; k < 3 && bodies[i].was_hit; ++k) out->correction[k] = 0;
+        double before[6];
+        memcpy(before, bodies[i].velocity, 3 * sizeof *before);
+        memcpy(before + 3, out->spin, 3 * sizeof *before);
+        body_trapezoid(&bodies[i], before, velocity + 6 * i, out->correction);
         out->kind = TRAPEZOID_OWN;
         out->linear = size3(out->correction);
         out->angular = size3(out->correction + 3);
@@ -62,7 +65,6 @@ void sadmm_find_trapezoids(size_t count, const struct sadmm_rigid *bodies, const
         out->moves_angular = trapezoid_speed_part(bodies[i].velocity, velocity + 6 * i, 1);
         out->rest = trapezoid_rest_speed(settings->gravity, bodies[i].gravity_scale, bodies[i].wrench, bodies[i].mass,
                                          settings->dt);
-        out->kind = TRAPEZOID_OWN;
         out->touch = forces_touch(&bodies[i]);
     }
 }
