@@ -81,7 +81,7 @@ static __global__ void __launch_bounds__(HIT_THREADS) replace_kernel(const __gri
 static __device__ __forceinline__ double since_of(const hits_view &v, const struct sadmm_proxy *a,
                                                   const struct sadmm_proxy *b)
 {
-    return larger_of(v.since[a->body], v.since[b->body]);
+    return max_of(v.since[a->body], v.since[b->body]);
 }
 
 /* From where a pair with a mesh that moves on is found, as find_triangles has it on the host: where it first touches any
@@ -96,7 +96,7 @@ static __device__ __noinline__ void start_on_mesh(const hits_view &v, const stru
     double least = HUGE_VAL;
     for (int64_t i = lower_bound(v.c.candidates, count, key);
          i < count && v.c.candidates[i] >> v.c.subshape_bits == key >> v.c.subshape_bits; ++i)
-        least = smaller_of(
+        least = min_of(
             mesh_first_touch(a, b, v.c.hulls, candidate_of(v.c, v.c.candidates[i]).subshape, gravity, left), least);
     mesh_start_at(a, b, least, step.margin, gravity, left, start);
 }

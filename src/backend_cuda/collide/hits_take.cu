@@ -355,7 +355,7 @@ static __device__ __noinline__ void take_hit(const hits_view &v, uint64_t mark, 
     memset(&hit, 0, sizeof hit);
     hit.friction = contact_friction(v.c.friction_pairs, v.c.friction_values, v.c.friction_count,
                                     (uint32_t)(item.key >> 32), (uint32_t)item.key, &a, &b);
-    hit.restitution = larger_of(a.restitution, b.restitution);
+    hit.restitution = max_of(a.restitution, b.restitution);
     swept_bodies_hit(of, &item.touch, v.step.settings->restitution_threshold, pose, &hit);
     if (last) swept_bodies_hit_centre(of, pose, &item.touch, &hit);
     hit_solve(&hit);

@@ -98,7 +98,7 @@ static __device__ double first_touch(const collision_view &v, const struct candi
     double least = HUGE_VAL;
     for (int64_t i = lower_bound(v.candidates, count, first);
          i < count && v.candidates[i] >> v.subshape_bits == first >> v.subshape_bits; ++i)
-        least = smaller_of(v.touches[i], least);
+        least = min_of(v.touches[i], least);
     return least;
 }
 

@@ -53,7 +53,7 @@ SADMM_INLINE void convex_pair_make(const struct sadmm_geometry *a, const struct 
     convex_of(b, hulls, &pair->b);
     for (i = 0; i < 3; ++i) pair->R.r[i] = r3_vec3(pose->R[i]);
     pair->t = r3_vec3(pose->t);
-    pair->thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
+    pair->thin = (real)min_of(geometry_thickness(a), geometry_thickness(b));
     pair->size = (real)(geometry_radius(a) + geometry_radius(b)) + v3_norm(pair->t);
     convex_pair_finish(pair);
     convex_pair_tips(pose, v3(0, 0, 0), pair);

@@ -55,7 +55,7 @@ struct pair_motion {
 SADMM_RARE double arms_take(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
                             const double way[3], double dt)
 {
-    const double thin = smaller_of(a->thin, b->thin), along = dot3(normal, way),
+    const double thin = min_of(a->thin, b->thin), along = dot3(normal, way),
                  across = dot3(way, way) - along * along, step = relative_speed(a->velocity, b->velocity) * dt,
                  most = ARMS_GIVE * thin * thin * thin;
     return across * step > most ? sqrt(most / (across * step)) : 1;

@@ -89,7 +89,7 @@ SADMM_INLINE double contact_radius(const struct sadmm_proxy *a, const struct sad
     if (!contact_is_curved(a, b, count)) return 0;
     ra = geometry_is_curved(&a->geometry) ? proxy_curvature_radius(a, normal, 1, point->arm_a) : HUGE_VAL;
     rb = geometry_is_curved(&b->geometry) ? proxy_curvature_radius(b, normal, -1, point->arm_b) : HUGE_VAL;
-    const double radius = ra < HUGE_VAL && rb < HUGE_VAL ? (ra + rb > 0 ? ra * rb / (ra + rb) : 0) : smaller_of(ra, rb);
+    const double radius = ra < HUGE_VAL && rb < HUGE_VAL ? (ra + rb > 0 ? ra * rb / (ra + rb) : 0) : min_of(ra, rb);
     const double least = radius / (1 + CURVATURE_ROUNDING);
     const bool rocks = (a->system_body >= 0 && least > rolling_height(normal, point->arm_a, point->separation)) ||
                        (b->system_body >= 0 && least > rolling_height(normal, point->arm_b, point->separation));
@@ -120,7 +120,7 @@ SADMM_INLINE bool contact_lasts(const struct sadmm_proxy *a, const struct sadmm_
                                 const struct sadmm_contact_pair *before, const struct sadmm_contact_point *points,
                                 int32_t count)
 {
-    const double deep = ROLLING_DEPTH * smaller_of(a->thin, b->thin);
+    const double deep = ROLLING_DEPTH * min_of(a->thin, b->thin);
     bool presses = false;
     int32_t k;
     if (before->count != count || count > ROLLING_POINTS) return false;

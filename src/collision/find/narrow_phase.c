@@ -18,7 +18,7 @@ static const struct old_pairs no_pairs = {0, 0};
 static double since_of(const struct sadmm_collision_input *input, const struct sadmm_proxy *a,
                        const struct sadmm_proxy *b)
 {
-    return input->since ? larger_of(input->since[a->body], input->since[b->body]) : 0;
+    return input->since ? max_of(input->since[a->body], input->since[b->body]) : 0;
 }
 
 static void begin_later(const struct sadmm_collision_input *input, const struct sadmm_proxy *p, double since,
@@ -174,7 +174,7 @@ static double touch_any(const struct narrow_phase *n, const struct mesh *mesh, c
     struct mesh_walk walk;
     mesh_walk_begin(mesh, box, &walk);
     for (int32_t triangle = mesh_walk_next(mesh, &walk); triangle >= 0; triangle = mesh_walk_next(mesh, &walk))
-        first = smaller_of(mesh_first_touch(a, b, n->input->hulls, (uint32_t)triangle, gravity, dt), first);
+        first = min_of(mesh_first_touch(a, b, n->input->hulls, (uint32_t)triangle, gravity, dt), first);
     return first;
 }
 

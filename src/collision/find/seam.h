@@ -293,7 +293,7 @@ SADMM_RARE bool seam_hides(const struct seam_view *seams, const struct sadmm_pro
                            uint32_t a, uint32_t b, uint32_t subshape, const struct manifold *m)
 {
     const struct sadmm_proxy *pa = &proxies[a], *pb = &proxies[b];
-    const double thin = smaller_of(pa->thin, pb->thin);
+    const double thin = min_of(pa->thin, pb->thin);
     const vec3 way = v3((real)offset_displacement(pa, pb, m->time_offset, 0),
                         (real)offset_displacement(pa, pb, m->time_offset, 1),
                         (real)offset_displacement(pa, pb, m->time_offset, 2));

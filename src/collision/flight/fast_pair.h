@@ -20,7 +20,7 @@ SADMM_INLINE bool pair_passes(const struct sadmm_proxy *a, const struct sadmm_pr
 {
     const double thin_a = sadmm_body_moves(a->system_body) ? a->thin : HUGE_VAL,
                  thin_b = sadmm_body_moves(b->system_body) ? b->thin : HUGE_VAL;
-    return (a->system_body >= 0 || b->system_body >= 0) && way > smaller_of(thin_a, thin_b);
+    return (a->system_body >= 0 || b->system_body >= 0) && way > min_of(thin_a, thin_b);
 }
 
 /* Are hits of the pair looked for? threshold: of restitution, m/s. */

@@ -196,7 +196,7 @@ SADMM_CALLED double touch_free_for(const struct sadmm_swept_pair *p, const struc
 {
     const vec3 acceleration = v3_sub(v3_load(p->b.flight->acceleration), v3_load(p->a.flight->acceleration));
     const double bends = touch_bending(&p->a, &at->a) + touch_bending(&p->b, &at->b) +
-                         larger_of(-v3_dot(v3_load(at->normal), acceleration), 0),
+                         max_of(-v3_dot(v3_load(at->normal), acceleration), 0),
                  now = touch_left_between(p, at, bends, 0) + room;
     if (!(now > 0)) return 0;
     const double trial = bends * most * most > 2 * now ? sqrt(2 * now / bends) : most,
@@ -209,7 +209,7 @@ SADMM_CALLED double touch_free_for(const struct sadmm_swept_pair *p, const struc
 
 SADMM_INLINE double touch_thinner(const struct sadmm_swept_pair *p)
 {
-    return smaller_of(geometry_thickness(p->a.geometry), geometry_thickness(p->b.geometry));
+    return min_of(geometry_thickness(p->a.geometry), geometry_thickness(p->b.geometry));
 }
 
 /* Among points that approach fast enough the one that gets there first: by when, s; HUGE_VAL: there is none. */
@@ -301,7 +301,7 @@ SADMM_RARE bool touch_find(struct sadmm_swept_pair *p, struct sadmm_flight fligh
         if (at.distance > TOUCH_NEAR * thin) {
             if (!(most > p->threshold)) return false;
             low = t;
-            t += larger_of(at.distance / most, touch_free_for(p, &at, 0, to - t));
+            t += max_of(at.distance / most, touch_free_for(p, &at, 0, to - t));
             if (!(t <= to)) return false;
             continue;
         }
@@ -311,7 +311,7 @@ SADMM_RARE bool touch_find(struct sadmm_swept_pair *p, struct sadmm_flight fligh
         if (next < HUGE_VAL && (fabs(separation) <= TOUCH_NONE * thin + touch_rounding(&at) || t + next == t ||
                                 (separation < 0 && t <= from) ||
                                 (separation < 0 && t + next <= low &&
-                                 smaller_of(-separation, (t - low) * most) <= TOUCH_NEAR * thin))) {
+                                 min_of(-separation, (t - low) * most) <= TOUCH_NEAR * thin))) {
             touch_keep(&at, t, fabs(separation) + TOUCH_TOGETHER * thin, touch);
             return true;
         }
@@ -324,7 +324,7 @@ SADMM_RARE bool touch_find(struct sadmm_swept_pair *p, struct sadmm_flight fligh
         /* what is near parts, or is slow: on to where another point may touch */
         if (!(t < to) || !(most > p->threshold)) return false;
         low = t;
-        t = smaller_of(t + larger_of(at.distance / most, touch_free_for(p, &at, TOUCH_PASSED_WAY * thin, passed)), to);
+        t = min_of(t + max_of(at.distance / most, touch_free_for(p, &at, TOUCH_PASSED_WAY * thin, passed)), to);
     }
     p->lost = true;
     return false;

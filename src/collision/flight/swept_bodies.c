@@ -60,8 +60,8 @@ static struct fastest fastest_of(const struct sadmm_candidates *c, const struct 
     for (size_t slot = 0; slot < c->slot_count; ++slot) {
         const struct sadmm_proxy *p = &c->proxies[slot];
         if (!(c->state[slot] & SLOT_PRESENT) || !sadmm_body_moves(p->system_body)) continue;
-        of.way = larger_of(of.way, length3(p->velocity) * input->dt + p->spin + p->fall);
-        of.thin = smaller_of(of.thin, p->thin);
+        of.way = max_of(of.way, length3(p->velocity) * input->dt + p->spin + p->fall);
+        of.thin = min_of(of.thin, p->thin);
     }
     of.way = (1 + 16 * DBL_EPSILON) * (2 * of.way + fall_of(input->gravity, input->dt));
     return of;
@@ -94,7 +94,7 @@ void sadmm_collision_pair_law(const struct sadmm_collision *collision, const str
     const struct sadmm_proxy *a = &collision->candidates.proxies[slot_a], *b = &collision->candidates.proxies[slot_b];
     *friction = contact_friction(input->friction_pairs, input->friction_values, (int64_t)input->friction_pair_count,
                                  slot_a, slot_b, a, b);
-    *restitution = larger_of(a->restitution, b->restitution);
+    *restitution = max_of(a->restitution, b->restitution);
 }
 
 bool sadmm_collision_set_box(struct sadmm_collision *collision, uint32_t slot, const struct sadmm_box3 *swept)

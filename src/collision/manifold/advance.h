@@ -216,7 +216,7 @@ SADMM_INLINE struct first_touch first_touch_of(const struct sadmm_proxy *a, cons
                                                const double *hulls, uint32_t subshape, double from, double gravity,
                                                double dt)
 {
-    const double touch = ADVANCE_TOUCH * smaller_of(a->thin, b->thin),
+    const double touch = ADVANCE_TOUCH * min_of(a->thin, b->thin),
                  falls = (fall_of(gravity, dt) + a->fall + b->fall) / dt, lever_a = proxy_lever(a),
                  lever_b = proxy_lever(b);
     struct first_touch first = {from, false};

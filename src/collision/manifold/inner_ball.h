@@ -242,7 +242,7 @@ SADMM_INLINE bool inner_forgets(const struct sadmm_proxy *a, const struct sadmm_
 SADMM_INLINE bool inner_is_deep(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct manifold *m,
                                 double share)
 {
-    const double deep = -share * smaller_of(a->thin, b->thin);
+    const double deep = -share * min_of(a->thin, b->thin);
     int k;
     for (k = 0; k < m->count; ++k)
         if ((double)m->points[k].separation < deep) return true;
@@ -348,8 +348,8 @@ SADMM_INLINE bool inner_is_behind(const struct sadmm_proxy *a, const struct sadm
 SADMM_INLINE bool inner_is_asked(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double gravity, double dt,
                                  const struct manifold *m)
 {
-    return fall_of(gravity, dt) + a->fall + b->fall > 2 * MIDPOINT_TRAVEL * smaller_of(a->thin, b->thin) ||
-           (a->spin + b->spin > INNER_ROCKS * smaller_of(a->thin, b->thin) && inner_is_deep(a, b, m, INNER_SINKS));
+    return fall_of(gravity, dt) + a->fall + b->fall > 2 * MIDPOINT_TRAVEL * min_of(a->thin, b->thin) ||
+           (a->spin + b->spin > INNER_ROCKS * min_of(a->thin, b->thin) && inner_is_deep(a, b, m, INNER_SINKS));
 }
 
 #endif

@@ -31,7 +31,7 @@ SADMM_INLINE void polytope_pair_make(const struct sadmm_geometry *a, const struc
     polytope_of(b, hulls, &pair->b);
     for (i = 0; i < 3; ++i) pair->R.r[i] = r3_vec3(pose->R[i]);
     pair->t = r3_vec3(pose->t);
-    pair->thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
+    pair->thin = (real)min_of(geometry_thickness(a), geometry_thickness(b));
     pair->size = (real)(geometry_radius(a) + geometry_radius(b)) + v3_norm(pair->t);
     pair->slack = 8 * SADMM_EPSILON * pair->size;
 }

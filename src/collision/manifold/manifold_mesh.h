@@ -52,7 +52,7 @@ SADMM_INLINE struct mesh_place mesh_place_of(const struct sadmm_geometry *a, con
         size2 = real_max(size2, v3_norm2(mesh_corner(triangle, k)));
     }
     place.t = v3_sub(r3_vec3(pose->t), triangle->origin);
-    place.thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
+    place.thin = (real)min_of(geometry_thickness(a), geometry_thickness(b));
     place.size = (real)geometry_radius(a) + real_sqrt(size2) + v3_norm(place.t);
     return place;
 }
@@ -251,8 +251,8 @@ SADMM_RARE bool mesh_came_through(const struct mesh *m, vec3 from, vec3 to, vec3
     const real a[3] = {from.x, from.y, from.z}, b[3] = {to.x, to.y, to.z};
     for (k = 0; k < 3; ++k) {
         const double rounding = 16 * (double)SADMM_EPSILON * (fabs((double)a[k]) + fabs((double)b[k]));
-        box.lo[k] = smaller_of((double)a[k], (double)b[k]) - rounding;
-        box.hi[k] = (double)a[k] + (double)b[k] - smaller_of((double)a[k], (double)b[k]) + rounding;
+        box.lo[k] = min_of((double)a[k], (double)b[k]) - rounding;
+        box.hi[k] = (double)a[k] + (double)b[k] - min_of((double)a[k], (double)b[k]) + rounding;
     }
     mesh_walk_begin(m, &box, &walk);
     for (triangle = mesh_walk_next(m, &walk); triangle >= 0; triangle = mesh_walk_next(m, &walk)) {

@@ -20,7 +20,7 @@ struct mesh_walk {
 SADMM_INLINE void mesh_reach(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct sadmm_box3 *own,
                              double margin, double gravity, double dt, double time, struct sadmm_box3 *box)
 {
-    const double thin = smaller_of(a->thin, b->thin), speed = v3_norm(v3_load(b->velocity)),
+    const double thin = min_of(a->thin, b->thin), speed = v3_norm(v3_load(b->velocity)),
                  reach =
                      shape_reach(margin, thin, b->fall, fall_of(gravity, dt)) + b->spin * (time / dt) + speed * time;
     double middle[3], half[3];

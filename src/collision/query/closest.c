@@ -98,7 +98,7 @@ static bool convex_closest(const struct sadmm_placed *a, const struct sadmm_plac
                            double limit, struct sadmm_separation *separation)
 {
     const struct sadmm_geometry *ga = &a->geometry, *gb = &b->geometry;
-    const double thin = smaller_of(geometry_thickness(ga), geometry_thickness(gb)),
+    const double thin = min_of(geometry_thickness(ga), geometry_thickness(gb)),
                  size = geometry_radius(ga) + geometry_radius(gb) + v3_norm(pose->t);
     const vec3 start = v3_neg(pose->t);
     if (!geometry_is_smooth(ga) && !geometry_is_smooth(gb)) {

@@ -24,7 +24,7 @@ struct search {
 static void triangle_pair(const struct search *s, const struct mesh_triangle *t, double *thin, double *size, vec3 *move)
 {
     double reach2 = 0;
-    for (int k = 0; k < 3; ++k) reach2 = larger_of(reach2, v3_norm2(mesh_corner(t, k)));
+    for (int k = 0; k < 3; ++k) reach2 = max_of(reach2, v3_norm2(mesh_corner(t, k)));
     *thin = geometry_thickness(&s->a->geometry);
     *move = v3_sub(s->pose->t, t->origin);
     *size = geometry_radius(&s->a->geometry) + sqrt(reach2) + v3_norm(*move);
@@ -95,7 +95,7 @@ static double box_separation2(const struct sadmm_box3 *box, const double lo[3], 
 {
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
-        const double apart = larger_of(larger_of(lo[k] - box->hi[k], box->lo[k] - hi[k]), 0);
+        const double apart = max_of(max_of(lo[k] - box->hi[k], box->lo[k] - hi[k]), 0);
         sum += apart * apart;
     }
     return sum;
@@ -124,8 +124,8 @@ static bool triangle_is_near(const struct search *s, int32_t triangle)
         double x[3];
         v3_store(mesh_vertex(s->mesh, corner[c]), x);
         for (int k = 0; k < 3; ++k) {
-            lo[k] = smaller_of(lo[k], x[k]);
-            hi[k] = larger_of(hi[k], x[k]);
+            lo[k] = min_of(lo[k], x[k]);
+            hi[k] = max_of(hi[k], x[k]);
         }
     }
     return box_is_near(s, lo, hi);

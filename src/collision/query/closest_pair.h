@@ -70,7 +70,7 @@ static inline void closest_middle(const struct convex_pair *pair, struct convex_
     int nearest = 0;
     bool witness;
     convex_clip_manifold(pair, axis->n, axis->separation, SADMM_REAL_MAX, &m, &witness);
-    for (int k = 0; k < m.count; ++k) least = smaller_of(m.points[k].separation, least);
+    for (int k = 0; k < m.count; ++k) least = min_of(m.points[k].separation, least);
     for (int k = 0; k < m.count; ++k) {
         if (m.points[k].separation > least + 1e-9 * pair->size) continue;
         sum = v3_add(sum, m.points[k].position);

@@ -2,6 +2,7 @@
 #ifndef SADMM_COLLISION_SHAPES_GEOMETRY_H
 #define SADMM_COLLISION_SHAPES_GEOMETRY_H
 
+#include "core/math/max.h"
 #include "core/math/real.h"
 #include "shape.h"
 
@@ -17,24 +18,20 @@ SADMM_INLINE int geometry_is_smooth(const struct sadmm_geometry *g)
     return g->type >= SADMM_SHAPE_CYLINDER && g->type <= SADMM_SHAPE_ELLIPSOID;
 }
 
-/* Not by fmin, which is a call where instructions see NaN in another way. */
-SADMM_INLINE double smaller_of(double a, double b) { return a < b ? a : b; }
-SADMM_INLINE double larger_of(double a, double b) { return a > b ? a : b; }
-
 /* Smallest extent, m; a plane has none that limits, and of a mesh it is the whole that counts. */
 SADMM_INLINE double geometry_thickness(const struct sadmm_geometry *g)
 {
     switch ((sadmm_shape_type)g->type) {
     case SADMM_SHAPE_SPHERE:
     case SADMM_SHAPE_CAPSULE: return 2 * g->size[0];
-    case SADMM_SHAPE_CYLINDER: return 2 * smaller_of(g->size[0], g->size[1]);
+    case SADMM_SHAPE_CYLINDER: return 2 * min_of(g->size[0], g->size[1]);
     case SADMM_SHAPE_CONE: /* its height, or what a line of its side and the rim across from it are apart */
         return 2 * g->size[1] *
-               smaller_of(1, 2 * g->size[0] / sqrt(g->size[0] * g->size[0] + 4 * (g->size[1] * g->size[1])));
+               min_of(1, 2 * g->size[0] / sqrt(g->size[0] * g->size[0] + 4 * (g->size[1] * g->size[1])));
     case SADMM_SHAPE_BOX:
     case SADMM_SHAPE_ELLIPSOID:
-    case SADMM_SHAPE_HULL: return 2 * smaller_of(g->size[0], smaller_of(g->size[1], g->size[2]));
-    case SADMM_SHAPE_MESH: return -2 * smaller_of(-g->size[0], smaller_of(-g->size[1], -g->size[2]));
+    case SADMM_SHAPE_HULL: return 2 * min_of(g->size[0], min_of(g->size[1], g->size[2]));
+    case SADMM_SHAPE_MESH: return -2 * min_of(-g->size[0], min_of(-g->size[1], -g->size[2]));
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
@@ -49,7 +46,7 @@ SADMM_INLINE double geometry_radius(const struct sadmm_geometry *g)
     case SADMM_SHAPE_CAPSULE: return g->size[0] + g->size[1];
     case SADMM_SHAPE_CYLINDER:
     case SADMM_SHAPE_CONE: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1]);
-    case SADMM_SHAPE_ELLIPSOID: return larger_of(g->size[0], larger_of(g->size[1], g->size[2]));
+    case SADMM_SHAPE_ELLIPSOID: return max_of(g->size[0], max_of(g->size[1], g->size[2]));
     case SADMM_SHAPE_BOX:
     case SADMM_SHAPE_HULL:
     case SADMM_SHAPE_MESH: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1] + g->size[2] * g->size[2]);
