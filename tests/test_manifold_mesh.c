@@ -127,8 +127,9 @@ static double distance_of(const struct beside *b, bool *at_end)
 /* ---- what the library finds -------------------------------------------------------------------------------------- */
 
 /* The least separation of all points, HUGE_VAL: none. memory: by triangle, NULL: none. */
-static double smallest_separation(const struct beside *b, double limit, uint32_t *memory, int *points)
+static double smallest_separation(const void *beside, double limit, uint32_t *memory, int *points)
 {
+    const struct beside *b = beside;
     double least = HUGE_VAL;
     const struct pair_pose pose = pair_pose(false, b->R, b->x, unturned, origin);
     *points = 0;
@@ -253,8 +254,7 @@ START_TEST(a_convex_mesh_is_its_hull)
 }
 END_TEST
 
-/* Along a path over the surface the least separation changes no faster than the shape moves, but for what the memory of
- * an axis may keep, 10 % of the depth and 0.5 % of the thickness (manifold.h), and a little for clipping. */
+/* Along a path over the surface (soup_walk_on). */
 START_TEST(nothing_jumps_along_a_path)
 {
     sadmm_mesh *mesh = soup_some_mesh(_i / SHAPES);
@@ -263,34 +263,22 @@ START_TEST(nothing_jumps_along_a_path)
     take_mesh(&b, mesh);
     take_shape(&b, _i % SHAPES, 1);
     uint32_t *memory = calloc((size_t)b.mesh.triangles, sizeof *memory);
-    const double limit = 0.03, thin = geometry_thickness(&b.shape), reach = geometry_radius(&b.shape);
+    const double limit = 0.03, thin = geometry_thickness(&b.shape);
     for (int path = 0; path < fewer(3); ++path) {
-        double last = HUGE_VAL, way[3], axis[3], angle = 2e-3;
+        const struct soup_walk walk = {.R = b.R,
+                                       .x = b.x,
+                                       .limit = limit,
+                                       .thin = thin,
+                                       .reach = geometry_radius(&b.shape),
+                                       .deepest = 0.1,
+                                       .separation = smallest_separation,
+                                       .beside = &b,
+                                       .memory = memory};
         place_over(&b, &r, 0.2 * limit);
         bool at_end = false;
         if (distance_of(&b, &at_end) < 1e-6 || at_end) continue;
-        for (int k = 0; k < 3; ++k) way[k] = random_in(&r, -1e-3, 1e-3);
-        for (int k = 0; k < 3; ++k) axis[k] = random_in(&r, -1, 1);
         memset(memory, 0, (size_t)b.mesh.triangles * sizeof *memory);
-        for (int i = 0; i < 60; ++i) {
-            double turn_by[9], turned[9];
-            int points;
-            const double length = t_norm(axis);
-            rotation(turn_by, axis[0] / length, axis[1] / length, axis[2] / length, angle);
-            multiply(turn_by, b.R, turned);
-            memcpy(b.R, turned, sizeof b.R);
-            for (int k = 0; k < 3; ++k) b.x[k] += way[k];
-            const double separation = smallest_separation(&b, limit, memory, &points),
-                         moved = t_norm(way) + angle * reach;
-            if (separation < -0.1 * thin) break; /* beyond what is shallow, the nearest way out may be another one */
-            if (separation < HUGE_VAL && last < HUGE_VAL)
-                ck_assert_msg(fabs(separation - last) <= 1.01 * moved + 0.12 * fmax(0, -separation) + 0.006 * thin,
-                              "path %d, step %d: from %g to %g, moved by %g", path, i, last, separation, moved);
-            else if (separation < HUGE_VAL || last < HUGE_VAL) /* comes or goes at the limit */
-                ck_assert_msg(fmin(separation, last) >= limit - 1.01 * moved - 1e-9 || i == 0,
-                              "path %d, step %d: from %g to %g, limit %g", path, i, last, separation, limit);
-            last = separation;
-        }
+        soup_walk_on(&walk, &r, path);
     }
     free(memory);
     free(b.shape_data);

@@ -123,8 +123,9 @@ static double distance_of(struct beside *b, bool *at_end)
 }
 
 /* The least separation of all points, HUGE_VAL: none. memory: by triangle, NULL: none. */
-static double smallest_separation(const struct beside *b, double limit, uint32_t *memory, int *points)
+static double smallest_separation(const void *beside, double limit, uint32_t *memory, int *points)
 {
+    const struct beside *b = beside;
     double least = HUGE_VAL;
     *points = 0;
     for (int32_t k = 0; k < b->mesh.triangles; ++k) {
@@ -180,8 +181,7 @@ START_TEST(the_nearest_point_is_found)
 }
 END_TEST
 
-/* Along a path over the surface the least separation changes no faster than the shape moves, but for what the memory of
- * an axis may keep, 10 % of the depth and 0.5 % of the thickness (manifold.h), and a little for clipping. */
+/* Along a path over the surface (soup_walk_on). */
 START_TEST(nothing_jumps_along_a_path)
 {
     sadmm_mesh *mesh = soup_some_mesh(_i / SHAPES);
@@ -189,36 +189,17 @@ START_TEST(nothing_jumps_along_a_path)
     struct random r = {5000 + (uint64_t)_i};
     take_shape(b, _i % SHAPES, 1);
     uint32_t *memory = calloc((size_t)b->mesh.triangles, sizeof *memory);
-    const double limit = 0.03, thin = geometry_thickness(&b->t.g[0]), reach = geometry_radius(&b->t.g[0]);
+    const double limit = 0.03, thin = geometry_thickness(&b->t.g[0]);
     int steps = 0;
     for (int path = 0; path < 40 && steps < 120; ++path) {
-        double last = HUGE_VAL, way[3], axis[3], angle = 2e-3;
+        const struct soup_walk walk = {.R = b->t.R[0], .x = b->t.x[0], .limit = limit, .thin = thin,
+                                       .reach = geometry_radius(&b->t.g[0]), .deepest = MESH_SHALLOW,
+                                       .separation = smallest_separation, .beside = b, .memory = memory};
         place_over(b, &r, 0.2 * limit);
         bool at_end = false;
         if (distance_of(b, &at_end) < 0 || at_end) continue;
-        for (int k = 0; k < 3; ++k) way[k] = random_in(&r, -1e-3, 1e-3);
-        for (int k = 0; k < 3; ++k) axis[k] = random_in(&r, -1, 1);
         memset(memory, 0, (size_t)b->mesh.triangles * sizeof *memory);
-        for (int i = 0; i < 60; ++i) {
-            double turn_by[9], turned[9];
-            int points;
-            const double length = t_norm(axis);
-            rotation(turn_by, axis[0] / length, axis[1] / length, axis[2] / length, angle);
-            multiply(turn_by, b->t.R[0], turned);
-            memcpy(b->t.R[0], turned, sizeof turned);
-            for (int k = 0; k < 3; ++k) b->t.x[0][k] += way[k];
-            const double separation = smallest_separation(b, limit, memory, &points),
-                         moved = t_norm(way) + angle * reach;
-            if (separation < -MESH_SHALLOW * thin) break; /* deeper, the nearest way out may be another one */
-            if (separation < HUGE_VAL && last < HUGE_VAL)
-                ck_assert_msg(fabs(separation - last) <= 1.01 * moved + 0.12 * fmax(0, -separation) + 0.006 * thin,
-                              "path %d, step %d: from %g to %g, moved by %g", path, i, last, separation, moved);
-            else if (separation < HUGE_VAL || last < HUGE_VAL) /* comes or goes at the limit */
-                ck_assert_msg(fmin(separation, last) >= limit - 1.01 * moved - 1e-9 || i == 0,
-                              "path %d, step %d: from %g to %g, limit %g", path, i, last, separation, limit);
-            last = separation;
-            ++steps;
-        }
+        steps += soup_walk_on(&walk, &r, path);
     }
     ck_assert_int_gt(steps, 20);
     free(memory);
