@@ -454,6 +454,7 @@ struct cuda_args {
     int32_t relax;      /* fast, STREAM: bits of enum cuda_relax */
     double factor;
     double row_floor;   /* fast: weight_row_floor */
+    unsigned long long condition; /* that the kernel sets (device/condition.h) */
 };
 
 /* fast: what goes as many times as far as the settings' relaxation says; else once. */

@@ -294,12 +294,19 @@ static __device__ __forceinline__ bool moves_again(const cuda_view &v)
     return again || (closed && unpressed);
 }
 
-/* What is pushed is moved again before it is pushed. A thread a body. */
+/* Are there pushes? Then what has to be moved again is, before it is pushed. */
+static __device__ __forceinline__ bool some_pushed(const push_view &push)
+{
+    return push.planned && push.due[PUSH_DUE] != 0;
+}
+
+/* A thread a body. */
 static __global__ void __launch_bounds__(TURN_THREADS)
     move_again_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)TURN_THREADS + threadIdx.x);
-    if (i >= v.model.bodies || v.model.live->abort_code || !as_planned(v.model, v.step)) return;
+    if (i >= v.model.bodies || v.model.live->abort_code || !as_planned(v.model, v.step) || !some_pushed(v.push)) return;
     const bool again = moves_again(v), articulated = v.joints.count > 0 && !v.joints.apart;
     if (again || articulated) move_once_more(v, i, again, articulated);
 }
@@ -363,7 +370,7 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
     struct cuda_step_control *control = v.step.control;
     if (v.model.live->abort_code) return;
     const bool articulated = v.joints.count > 0 && !v.joints.apart, again = moves_again(v),
-               moves = (again || articulated) && !v.push.planned, any = moves || rolls_again(v);
+               moves = (again || articulated) && !some_pushed(v.push), any = moves || rolls_again(v);
     if (moves && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
         move_once_more(v, (int32_t)own, again, articulated);
     if (articulated) end_joints(v, (int32_t)t);
@@ -397,7 +404,7 @@ static __device__ __forceinline__ void commit_bodies(const cuda_view &v, int32_t
 {
     const int32_t lanes = commit_lanes(v.model.bodies), i = thread / lanes, lane = thread % lanes;
     const bool again = moves_again(v), rolls = rolls_again(v);
-    if (lane == 0 && (again || articulated) && !v.push.planned && i < v.model.bodies)
+    if (lane == 0 && (again || articulated) && !some_pushed(v.push) && i < v.model.bodies)
         move_once_more(v, i, again, articulated);
     if (!rolls) return;
     if (lanes == 1) return keep_rolling_of_warp(v, i);
@@ -485,7 +492,7 @@ sadmm_status CUDA(launch_move_again)(struct sadmm_context *c, struct sadmm_error
 {
     const cuda_args args = {};
     const int64_t blocks = ((int64_t)c->view.model.bodies + TURN_THREADS - 1) / TURN_THREADS;
-    return CUDA(launch_without_pdl)(c, move_again_kernel, "move again", blocks, TURN_THREADS, &args, error);
+    return CUDA(launch_of)(c, move_again_kernel, "move again", blocks, TURN_THREADS, &args, error);
 }
 
 sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *error)

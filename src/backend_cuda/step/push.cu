@@ -1,8 +1,10 @@
 /* Islands that are pushed apart without a velocity (core/solve/push.h): the second problem of a step, in a context of its
  * own. Its partition is made for as many contacts as the step may have. It has all bodies, under their own numbers, and
- * the pairs of the islands that are pushed, one after the other; where there are none its kernels leave at once. */
+ * the pairs of the islands that are pushed, one after the other; where there are none its kernels are not launched, or
+ * leave at once. */
 #include "backend_cuda/device/double.h"
 
+#include "backend_cuda/device/condition.h"
 #include "backend_cuda/device/parallel.h"
 #include "backend_cuda/device/plan_check.h"
 #include "backend_cuda/graph/graph.h"
@@ -16,6 +18,7 @@
 /* Islands with constraints given by rows, before contacts speak. A thread a constraint. */
 static __global__ void push_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t k = thread_index();
     if (k >= live_rows(v.model, v.rows)) return;
     const struct sadmm_row_constraint *rows = &v.raw.constraints[k];
@@ -25,6 +28,7 @@ static __global__ void push_rows_kernel(const __grid_constant__ cuda_view v, con
 /* A thread a pair. */
 static __global__ void push_report_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t p = thread_index();
     const bool live = p < live_pairs(v.model);
     double separation = 0;
@@ -33,10 +37,13 @@ static __global__ void push_report_kernel(const __grid_constant__ cuda_view v, c
     report_push(v, live ? p : -1, separation);
 }
 
-/* e of the step's problem: what overlaps is not to come nearer, and no more. A thread a pair, capacity included. */
-static __global__ void push_hold_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* e of the step's problem: what overlaps is not to come nearer, and no more; and whether there is a second one. A
+ * thread a pair, capacity included. */
+static __global__ void push_hold_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t p = thread_index();
+    if (p == 0) set_condition(args.condition, v.push.due[PUSH_DUE] != 0);
     if (p >= v.contacts.pair_capacity) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
     const bool pushed = p < live_pairs(v.model) && island_is_pushed(v.push, label_of(v.graph, pair));
@@ -75,6 +82,7 @@ static __device__ __forceinline__ void gather_pair(const cuda_view &v, int32_t p
 /* A thread a body or pair, once the step's impulses are in its points. */
 static __global__ void push_gather_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t i = thread_index();
     if (v.model.live->abort_code || !as_planned(v.model, v.step)) return;
     if (i < v.contacts.pair_capacity && v.push.points[i] > 0) gather_pair(v, i);
@@ -93,6 +101,7 @@ static __device__ __forceinline__ int32_t kind_of(const cuda_view &v, int32_t pa
 /* One thread. args.begin: it has been gathered; args.count: kinds that go on. */
 static __global__ void push_kind_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    pdl_wait_if(all_pdl(v.model.bodies));
     if (threadIdx.x > 0) return;
     const int32_t last = v.contacts.pair_capacity - 1;
     const uint64_t all = v.push.places[last] + size_of(v.push.points[last]);
@@ -113,6 +122,7 @@ static __global__ void push_kind_kernel(const __grid_constant__ cuda_view v, con
 /* Of the second problem, solved. A thread a body. */
 static __global__ void push_way_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t i = thread_index();
     if (i >= v.model.bodies || !v.push.due[PUSH_KIND]) return;
     solver_real velocity[6];
@@ -155,6 +165,7 @@ static __device__ __noinline__ void move_island(const cuda_view &v, int32_t labe
 /* A thread a body; of islands in the air that of the body which names it. */
 static __global__ void push_move_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t i = thread_index();
     if (i >= v.model.bodies || !v.push.due[PUSH_KIND]) return;
     const int32_t label = v.graph.label[i];
@@ -173,28 +184,27 @@ static __global__ void push_move_kernel(const __grid_constant__ cuda_view v, con
 static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t threads,
                            struct sadmm_error *error)
 {
-    const cuda_args args = {};
-    return CUDA(launch_without_pdl)(c, kernel, name, blocks_for(threads), THREADS, &args, error);
+    cuda_args args = {};
+    args.condition = c->step ? c->step->some_pushed : 0;
+    return CUDA(launch)(c, kernel, name, blocks_for(threads), &args, error);
 }
 
 sadmm_status CUDA(launch_push_choice)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_view *v = &c->view;
-    cuda_buffer *sort = &c->buffers[BUFFER_PUSH_SORT];
-    size_t bytes = sort->capacity;
     TRY(launch(c, push_rows_kernel, "islands with rows", v->rows.count, error));
     TRY(launch(c, push_report_kernel, "pushes of islands", v->contacts.pair_capacity, error));
-    TRY(launch(c, push_hold_kernel, "pushed contacts", v->contacts.pair_capacity, error));
-    CUDA_CALL(c,
-              COLLISION(sum)(sort->data, &bytes, v->push.points, v->push.places, v->contacts.pair_capacity, c->stream),
-              "places of pushed pairs");
-    return SADMM_OK;
+    return launch(c, push_hold_kernel, "pushed contacts", v->contacts.pair_capacity, error);
 }
 
 sadmm_status CUDA(launch_push_gather)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_view *v = &c->view;
     const int32_t bodies = v->model.bodies, pairs = v->contacts.pair_capacity;
+    cuda_buffer *sort = &c->buffers[BUFFER_PUSH_SORT];
+    size_t bytes = sort->capacity;
+    CUDA_CALL(c, COLLISION(sum)(sort->data, &bytes, v->push.points, v->push.places, pairs, c->stream),
+              "places of pushed pairs");
     return launch(c, push_gather_kernel, "the second problem", bodies > pairs ? bodies : pairs, error);
 }
 
@@ -203,7 +213,7 @@ sadmm_status CUDA(launch_push_kind)(struct sadmm_context *c, bool first, int kin
     cuda_args args = {};
     args.begin = first;
     args.count = kinds;
-    return CUDA(launch_without_pdl)(c, push_kind_kernel, "kind of the second problem", 1, WARP, &args, error);
+    return CUDA(launch_of)(c, push_kind_kernel, "kind of the second problem", 1, WARP, &args, error);
 }
 
 sadmm_status CUDA(launch_push_move)(struct sadmm_context *c, struct sadmm_error *error)

@@ -1,5 +1,6 @@
 /* Whole steps on the device: a step, launch by launch, and the graph that is made of it (step/world.h). */
 #include "backend_cuda/assemble/assemble.h"
+#include "backend_cuda/device/condition.h"
 #include "backend_cuda/graph/graph.h"
 #include "backend_cuda/iterate/iterate.h"
 #include "backend_cuda/weight/weight.h"
@@ -162,13 +163,20 @@ static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *e
     return joints ? record_joints(c, error) : SADMM_OK;
 }
 
+/* Which islands are pushed, and whether any is. */
+static sadmm_status record_push_choice(struct sadmm_context *c, struct sadmm_error *error)
+{
+    CUDA_CALL(c, make_condition(c->stream, &c->step->some_pushed), "a condition of the step");
+    return CUDA(launch_push_choice)(c, error);
+}
+
 /* record_plan where there are kinematic bodies: one after the other. */
 static sadmm_status record_kinematic_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     TRY(CUDA(launch_support)(c, error));
     TRY(CUDA(enqueue_bodies)(c, error));
-    if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error));
+    if (c->view.push.planned) TRY(record_push_choice(c, error));
     if (c->view.joints.count > 0) {
         TRY(CUDA(assemble_rows)(c, error));
         TRY(record_articulations(c, error));
@@ -203,7 +211,7 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
     if (side) TRY(record_contacts(c, late, error));
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
-    if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error)); /* it says what contacts are */
+    if (c->view.push.planned) TRY(record_push_choice(c, error)); /* it says what contacts are */
     if (together && !beside) TRY(record_articulations(c, error));
     if (together) TRY(wait_for_joints(c, error));
     return side ? SADMM_OK : CUDA(assemble_contacts)(c, error);
@@ -318,7 +326,6 @@ static sadmm_status record_kinds(struct sadmm_context *c, struct sadmm_error *er
 {
     struct sadmm_context *p = c->step->push;
     const bool differ = sadmm_plan_depends_on_warmth(&p->settings);
-    TRY(CUDA(launch_push_kind)(c, true, PUSH_ANY, error));
     TRY(CUDA(enqueue_statistics_and_layout)(p, true, &p->partition, error));
     for (int warm = 0; warm <= differ; ++warm) {
         TRY(CUDA(launch_push_kind)(c, false, !differ ? PUSH_ANY : warm ? PUSH_WARM : PUSH_COLD, error));
@@ -328,18 +335,30 @@ static sadmm_status record_kinds(struct sadmm_context *c, struct sadmm_error *er
     return CUDA(launch_push_move)(c, error);
 }
 
-/* Behind the end of the step. */
+/* What bodies that are pushed do, from where the step moves them to. */
+static sadmm_status record_pushed(struct sadmm_context *c, struct sadmm_error *error)
+{
+    TRY(CUDA(launch_move_again)(c, error));
+    TRY(CUDA(launch_push_gather)(c, error));
+    TRY(CUDA(launch_push_kind)(c, true, PUSH_ANY, error));
+    return record_kinds(c, error);
+}
+
+/* Behind the end of the step; most steps that are planned to have pushes have none. */
 static sadmm_status record_push(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct sadmm_context *p = c->step->push;
-    const cudaStream_t own = p->stream;
-    TRY(CUDA(launch_move_again)(c, error));
-    TRY(CUDA(launch_push_gather)(c, error));
-    p->stream = c->stream;
+    const cudaStream_t main = c->stream, own = p->stream;
+    const condition some = c->step->some_pushed;
+    if (some) CUDA_CALL(c, begin_part(main, some, own), "a part of the step");
+    c->stream = p->stream = some ? own : main;
     p->recording = true;
-    const sadmm_status status = record_kinds(c, error);
+    sadmm_status status = record_pushed(c, error);
     p->recording = false;
+    c->stream = main;
     p->stream = own;
+    const cudaError_t code = some ? end_part(own) : cudaSuccess;
+    if (status == SADMM_OK && code != cudaSuccess) status = CUDA(fail)(c, code, "a part of the step", error);
     return status;
 }
 

@@ -70,6 +70,7 @@ struct cuda_step {
     bool push_streams;          /* which has not fitted its partition once: tier STREAM */
     int32_t quiet;              /* but none has been for so many steps */
     struct sadmm_context *push; /* of that; made with the first one */
+    unsigned long long some_pushed; /* the condition of that in the sub-step that is recorded (device/condition.h) */
 
     bool hits_planned;          /* hits are searched for, where the world has any (takes_hits), */
     int32_t calm;               /* but no pair has been fast for so many steps */
@@ -189,12 +190,12 @@ void CUDA(view_push)(struct sadmm_context *);
 void CUDA(plan_second)(struct sadmm_context *, bool warm);
 /* of what kind it is (first: gathered just now); its kernels from here on work if it is one of these; */
 sadmm_status CUDA(launch_push_kind)(struct sadmm_context *, bool first, int kinds, struct sadmm_error *error);
-/* which islands are pushed, once A and b and the layout are made, before contacts are; the second problem, after finish
- * and the launch of move_again; and what bodies move by when it is solved. */
+/* which islands are pushed, once A and b and the layout are made, before contacts are, and the condition some_pushed;
+ * the second problem, after finish and the launch of move_again; and what bodies move by when it is solved. */
 sadmm_status CUDA(launch_push_choice)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_push_gather)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_push_move)(struct sadmm_context *, struct sadmm_error *error);
-/* kernels.cu: bodies that have to be moved again, before commit or turn would. */
+/* kernels.cu: bodies that have to be moved again, where some are pushed, before commit or turn would. */
 sadmm_status CUDA(launch_move_again)(struct sadmm_context *, struct sadmm_error *error);
 
 /* gears.cu: the same for gears, of which joints.cu sees to all of this: */
