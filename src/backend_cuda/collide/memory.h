@@ -18,8 +18,8 @@ struct collision_buffer {
 enum buffer_name {
     /* device */
     PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_NUMBERS, LEAF_NUMBERS_2, NODES, GROUPS, PARENTS, ARRIVALS,
-    COUNTER, GRID, CANDIDATES, CANDIDATES_2, LISTED, WALKS, MESH_PAIRS, TOUCHES, MANIFOLDS, MATCHES, SIZES, EMIT_GENERAL,
-    PLACES, TEMP, BOXES, REACHES, PAIR_OF,
+    COUNTER, GRID, CANDIDATES, CANDIDATES_2, LISTED, IS_LISTED, WALKS, MESH_PAIRS, TOUCHES, MANIFOLDS, MATCHES, SIZES,
+    EMIT_GENERAL, PLACES, TEMP, BOXES, REACHES, PAIR_OF,
     PAIRS, POINTS, MIGRATIONS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, MIGRATIONS_2, PAIR_KEYS_2, COUNTS_2,
     PAIRS_3, POINTS_3, MIGRATIONS_3, PAIR_KEYS_3, COUNTS_3,
     TOUCHING,
@@ -39,7 +39,8 @@ enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
 static const char *const buffer_names[BUFFERS] = {
     "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "groups",
     "parents", "arrivals", "counter", "grid", "candidates", "sorted candidates", "listed candidates",
-    "walks of listed candidates", "pairs with meshes", "first touches", "manifolds", "matches", "sizes",
+    "which candidates are listed", "walks of listed candidates", "pairs with meshes", "first touches", "manifolds",
+    "matches", "sizes",
     "general candidates", "places", "sort", "boxes of sub-steps", "reaches", "pairs of candidates",
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
@@ -105,6 +106,8 @@ struct sadmm_cuda_collision {
     bool can_undo;
 
     cudaStream_t stream;        /* where work is pending */
+    cudaStream_t side;          /* what goes beside it: */
+    cudaEvent_t made, hidden;   /* seams, from when there are manifolds until they are done */
     bool pending;
     const char *kernel;         /* launched last: what an asynchronous error is about, or what ran before it */
 

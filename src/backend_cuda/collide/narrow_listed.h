@@ -28,7 +28,9 @@ at_once_kernel(const __grid_constant__ collision_view v)
     struct gjk_walk walk;
     walk.end = GJK_FAR;
     if (i >= (int64_t)v.candidate_capacity + SIZES_BEYOND) return;
-    if (!narrow_candidate<FOR, HOW>(v, i, &walk)) {
+    const bool done = narrow_candidate<FOR, HOW>(v, i, &walk);
+    if (with_hulls(HOW) && v.is_listed && i < v.candidate_capacity) v.is_listed[i] = !done;
+    if (!done) {
         if constexpr (with_hulls(HOW)) {
             const unsigned long long at = atomicAdd(v.candidate_count + COUNT_LISTED, 1ull);
             v.listed[at] = (int32_t)i;

@@ -1,7 +1,7 @@
 /* Manifolds that the union of neighbouring shapes does not have are left out (collision/find/seam.h): in plain worlds
  * by the thread that has made them, since a kernel more takes longer than what a few pairs need; in others, whose
- * kernels are short of registers, by one of its own (seams.cu). A function, which other worlds' candidates do not come
- * to. */
+ * kernels are short of registers, by kernels of their own (seams.cu). A function, which other worlds' candidates do not
+ * come to. */
 #ifndef SADMM_CUDA_COLLIDE_NARROW_SEAMS_H
 #define SADMM_CUDA_COLLIDE_NARROW_SEAMS_H
 

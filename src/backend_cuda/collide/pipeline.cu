@@ -16,6 +16,15 @@
 enum { TREE_FROM = 6144, BY_WARP_FROM = 16384 };
 static const int64_t RADIX_FROM = 16385;
 
+static sadmm_status make_branch(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    ENTER(c);
+    CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->made, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->hidden, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+    return SADMM_OK;
+}
+
 extern "C" sadmm_status COLLISION(create)(int device, struct sadmm_cuda_collision **out, struct sadmm_error *error)
 {
     int count = 0;
@@ -35,6 +44,11 @@ extern "C" sadmm_status COLLISION(create)(int device, struct sadmm_cuda_collisio
     c->by_warp_from = BY_WARP_FROM;
     c->radix_from = RADIX_FROM;
     for (size_t &bytes : c->input_bytes) bytes = SIZE_MAX;
+    const sadmm_status status = make_branch(c, error);
+    if (status != SADMM_OK) {
+        COLLISION(destroy)(c);
+        return status;
+    }
     COLLISION(broad_phase_kernels)(&c->kernels);
     COLLISION(sort_kernels)(&c->kernels);
     COLLISION(narrow_phase_kernels)(&c->kernels);
@@ -57,6 +71,9 @@ extern "C" void COLLISION(destroy)(struct sadmm_cuda_collision *c)
         current_device scope(c->device);
         if (c->pending) (void)cudaStreamSynchronize(c->stream);
         for (int name = 0; name < BUFFERS; ++name) release(c, name);
+        if (c->hidden) (void)cudaEventDestroy(c->hidden);
+        if (c->made) (void)cudaEventDestroy(c->made);
+        if (c->side) (void)cudaStreamDestroy(c->side);
         (void)cudaGetLastError();
     }
     sadmm_free(c->present);

@@ -65,6 +65,7 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
     TRY(reserve(c, LISTED, candidates, sizeof *v->listed, error));
     if (v->hulls) TRY(reserve(c, WALKS, candidates, sizeof *v->walks, error));
+    if (v->hulls) TRY(reserve(c, IS_LISTED, candidates, sizeof *v->is_listed, error));
     if (v->mesh_count > 0) TRY(reserve(c, MESH_PAIRS, candidates, sizeof *v->mesh_pairs, error));
     if (v->mesh_count > 0) TRY(reserve(c, TOUCHES, candidates, sizeof *v->touches, error));
     TRY(reserve(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
@@ -179,6 +180,20 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, b
     return sort_candidates(c, error);
 }
 
+/* Seams of candidates that are not listed, beside what comes next on the stream. */
+static sadmm_status hide_beside(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    const cudaStream_t main = c->stream;
+    CUDA_CALL(c, cudaEventRecord(c->made, main), "cudaEventRecord");
+    CUDA_CALL(c, cudaStreamWaitEvent(c->side, c->made, 0), "cudaStreamWaitEvent");
+    c->stream = c->side;
+    const sadmm_status status = launch(c, c->kernels.seams, c->view.candidate_capacity, error);
+    c->stream = main;
+    TRY(status);
+    CUDA_CALL(c, cudaEventRecord(c->hidden, c->side), "cudaEventRecord");
+    return SADMM_OK;
+}
+
 static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
     const struct collision_view *v = &c->view;
@@ -192,7 +207,11 @@ static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_er
     if (v->mesh_count > 0)
         TRY(launch(c, one ? with->touch : first ? with->touch_first : with->touch_again, v->candidate_capacity, error));
     TRY(launch(c, one ? with->at_once : first ? with->at_once_first : with->at_once_again, candidates, error));
-    return v->hulls ? launch(c, with->listed, v->candidate_capacity, error) : SADMM_OK;
+    if (v->is_listed) TRY(hide_beside(c, error));
+    if (v->hulls) TRY(launch(c, with->listed, v->candidate_capacity, error));
+    if (!v->is_listed) return SADMM_OK;
+    CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->hidden, 0), "cudaStreamWaitEvent");
+    return launch(c, c->kernels.listed_seams, v->candidate_capacity, error);
 }
 
 static sadmm_status emit_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
@@ -215,10 +234,11 @@ static sadmm_status make_contacts(struct sadmm_cuda_collision *c, const struct s
 {
     struct collision_view *v = &c->view;
     v->hides = v->seams.first && !v->hulls && !hits;
+    v->is_listed = v->seams.first && v->hulls && !hits ? in<uint8_t>(c, IS_LISTED) : nullptr;
     v->carries = v->mesh_count > 0 && !hits && ranked(c);
     TRY(narrow_phase(c, error));
     if (hits) TRY(COLLISION(narrow_hits)(c, hits, error));
-    if (v->seams.first && !v->hides) TRY(launch(c, c->kernels.seams, v->candidate_capacity, error));
+    if (v->seams.first && !v->hides && !v->is_listed) TRY(launch(c, c->kernels.seams, v->candidate_capacity, error));
     TRY(emit_contacts(c, error));
     if (hits) TRY(COLLISION(reopen_hits)(c, hits, error));
     if (v->mesh_count == 0 || v->carries) return SADMM_OK;

@@ -182,6 +182,7 @@ struct collision_view {
     int32_t body_count;                            /* slots */
     bool pdl;                                      /* kernels are launched with PDL (device/pdl.h) */
     bool hides;                                    /* the narrow phase itself sees to seams */
+    uint8_t *is_listed;                            /* by candidate; not NULL: seams of listed ones are seen to later */
     bool carries;                                  /* what makes points also lets them slide over meshes */
     struct collision_grid *grid;                   /* of this step */
     int32_t *abort_code;                           /* not NULL and not 0: do nothing */
@@ -313,7 +314,7 @@ struct narrow_kernels {
 struct collision_kernels {
     struct collision_launch place[2], place_first[2], place_again[2]; /* of few shapes, of many (by_warp_from) */
     struct collision_launch grid, build, refit, clear, walk, tiles, small_tiles, rank,
-        expand, expand_first, seams, emit, emit_few, emit_general, carry;
+        expand, expand_first, seams, listed_seams, emit, emit_few, emit_general, carry;
     struct narrow_kernels plain, with_hulls, with_meshes, with_smooth; /* by what kinds of shapes there are */
     int expand_warps; /* expand is launched for */
 };

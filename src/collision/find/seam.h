@@ -207,22 +207,28 @@ SADMM_INLINE vec3 seam_farthest(const struct seam_piece *piece, vec3 u)
     return v3_add(t.origin, mesh_corner(&t, best));
 }
 
-/* Is all of the piece's surface beside x that faces along u hidden as well? */
-SADMM_RARE bool seam_hides_around(const struct seam_piece *piece, vec3 x, vec3 u)
+/* Is the piece's surface beside x in the k-th of SEAM_DIRECTIONS hidden as well, as far as it faces along u? */
+SADMM_INLINE bool seam_hides_beside(const struct seam_piece *piece, vec3 x, vec3 u, int k)
 {
     const real half = (real)0.70710678118654752;
-    vec3 t1, t2;
-    int k;
+    const real cosine = k % 4 == 2 ? 0 : k % 2 ? half : 1, sine = k % 4 == 0 ? 0 : k % 2 ? half : 1;
+    vec3 t1, t2, turned, d;
+    real length;
     v3_tangents(u, &t1, &t2);
-    for (k = 0; k < SEAM_DIRECTIONS; ++k) {
-        const real cosine = k % 4 == 2 ? 0 : k % 2 ? half : 1, sine = k % 4 == 0 ? 0 : k % 2 ? half : 1;
-        const vec3 turned = v3_madd(v3_madd(u, (real)SEAM_TURN * (k > 2 && k < 6 ? -cosine : cosine), t1),
-                                    (real)SEAM_TURN * (k > 4 ? -sine : sine), t2);
-        const vec3 d = v3_sub(seam_farthest(piece, v3_scale(turned, 1 / v3_norm(turned))), x);
-        const real length = v3_norm(d);
-        if (!(length > (real)(4 * piece->flush)) || v3_dot(d, u) < -(real)SEAM_SLOPE * length) continue;
-        if (!seam_hides_point(piece, v3_madd(x, real_min(1, (real)piece->beside / length), d), u)) return false;
-    }
+    turned = v3_madd(v3_madd(u, (real)SEAM_TURN * (k > 2 && k < 6 ? -cosine : cosine), t1),
+                     (real)SEAM_TURN * (k > 4 ? -sine : sine), t2);
+    d = v3_sub(seam_farthest(piece, v3_scale(turned, 1 / v3_norm(turned))), x);
+    length = v3_norm(d);
+    if (!(length > (real)(4 * piece->flush)) || v3_dot(d, u) < -(real)SEAM_SLOPE * length) return true;
+    return seam_hides_point(piece, v3_madd(x, real_min(1, (real)piece->beside / length), d), u);
+}
+
+/* And in all of them? */
+SADMM_RARE bool seam_hides_around(const struct seam_piece *piece, vec3 x, vec3 u)
+{
+    int k;
+    for (k = 0; k < SEAM_DIRECTIONS; ++k)
+        if (!seam_hides_beside(piece, x, u, k)) return false;
     return true;
 }
 
@@ -256,31 +262,70 @@ SADMM_INLINE bool seam_flat(const struct seam_piece *piece, int k, vec3 x, vec3 
     return true;
 }
 
-/* Is x in a corner between the piece and what hides it: on a flat that pushes along u as well, which is hidden at x and
- * not beside it? What is deep there is pushed along an edge, which is hidden, by what is not. */
-SADMM_RARE bool seam_is_corner(const struct seam_piece *piece, vec3 x, vec3 u)
+/* Is x in a corner between the piece and what hides it: on a flat, the k-th, that pushes along u as well, which is
+ * hidden at x and not beside it? What is deep there is pushed along an edge, which is hidden, by what is not. *there:
+ * the piece has a k-th flat. */
+SADMM_INLINE bool seam_is_corner_at(const struct seam_piece *piece, int k, vec3 x, vec3 u, bool *there)
 {
     vec3 normal;
     bool has;
+    *there = seam_flat(piece, k, x, &normal, &has);
+    return *there && has && v3_dot(normal, u) > (real)SEAM_SLOPE && seam_hides_point(piece, x, normal) &&
+           !seam_hides_around(piece, x, normal);
+}
+SADMM_RARE bool seam_is_corner(const struct seam_piece *piece, vec3 x, vec3 u)
+{
+    bool there;
     int k;
-    for (k = 0; seam_flat(piece, k, x, &normal, &has); ++k)
-        if (has && v3_dot(normal, u) > (real)SEAM_SLOPE && seam_hides_point(piece, x, normal) &&
-            !seam_hides_around(piece, x, normal))
-            return true;
-    return false;
+    for (k = 0; !seam_is_corner_at(piece, k, x, u, &there); ++k)
+        if (!there) return false;
+    return true;
 }
 
-/* Is the manifold hidden at one of its two shapes? shift: what its points, in the frame of b, are to be moved by in the
- * world; side: of b, 1, or of a, -1. */
-SADMM_RARE bool seam_hides_at(const struct seam_piece *piece, const struct sadmm_proxy *b, const struct manifold *m,
-                              vec3 shift, real side)
+/* One of the two shapes of a manifold, a where `of_a`, else b; false: it has no neighbours. */
+SADMM_INLINE bool seam_piece_of(const struct seam_view *seams, const struct sadmm_proxy *proxies, const double *hulls,
+                                uint32_t a, uint32_t b, uint32_t subshape, bool of_a, struct seam_piece *piece)
 {
-    const vec3 u = seam_to_own(piece->own, seam_to_world(b, v3_scale(m->normal, -side)));
+    const double thin = min_of(proxies[a].thin, proxies[b].thin);
+    const uint32_t slot = of_a ? a : b;
+    piece->first = seams->neighbours + seams->first[slot];
+    piece->last = seams->neighbours + seams->first[slot + 1];
+    piece->proxies = proxies;
+    piece->hulls = hulls;
+    piece->own = &proxies[slot];
+    piece->flush = SEAM_FLUSH * thin;
+    piece->beside = SEAM_BESIDE * thin;
+    piece->triangle = (int32_t)subshape;
+    piece->axis = seam_axis(&piece->own->geometry);
+    return piece->first < piece->last;
+}
+
+/* The direction that the piece pushes along, and a point of the manifold on its surface: both in its own frame. normal,
+ * position, separation: of the manifold, in the frame of b; time_offset: where its points are. */
+SADMM_INLINE vec3 seam_direction(const struct seam_piece *piece, const struct sadmm_proxy *b, vec3 normal, bool of_a)
+{
+    return seam_to_own(piece->own, seam_to_world(b, v3_scale(normal, of_a ? 1 : -1)));
+}
+SADMM_INLINE vec3 seam_point(const struct seam_piece *piece, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                             vec3 normal, double time_offset, vec3 position, real separation, bool of_a)
+{
+    const vec3 at = v3_madd(position, (of_a ? -1 : 1) * separation / 2, normal);
+    vec3 shift = v3(0, 0, 0);
+    if (of_a)
+        shift = v3((real)offset_displacement(a, b, time_offset, 0), (real)offset_displacement(a, b, time_offset, 1),
+                   (real)offset_displacement(a, b, time_offset, 2));
+    return seam_to_own(piece->own, v3_add(v3_sub(seam_to_world(b, at), seam_between(b, piece->own)), shift));
+}
+
+/* Is the manifold hidden at one of its two shapes? */
+SADMM_RARE bool seam_hides_at(const struct seam_piece *piece, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                              const struct manifold *m, bool of_a)
+{
+    const vec3 u = seam_direction(piece, b, m->normal, of_a);
     vec3 x[SADMM_MANIFOLD_POINTS];
     int k;
     for (k = 0; k < m->count; ++k) {
-        const vec3 at = v3_madd(m->points[k].position, side * m->points[k].separation / 2, m->normal);
-        x[k] = seam_to_own(piece->own, v3_add(v3_sub(seam_to_world(b, at), seam_between(b, piece->own)), shift));
+        x[k] = seam_point(piece, a, b, m->normal, m->time_offset, m->points[k].position, m->points[k].separation, of_a);
         if (!seam_hides_point(piece, x[k], u)) return false;
     }
     for (k = 0; k < m->count; ++k)
@@ -292,27 +337,12 @@ SADMM_RARE bool seam_hides_at(const struct seam_piece *piece, const struct sadmm
 SADMM_RARE bool seam_hides(const struct seam_view *seams, const struct sadmm_proxy *proxies, const double *hulls,
                            uint32_t a, uint32_t b, uint32_t subshape, const struct manifold *m)
 {
-    const struct sadmm_proxy *pa = &proxies[a], *pb = &proxies[b];
-    const double thin = min_of(pa->thin, pb->thin);
-    const vec3 way = v3((real)offset_displacement(pa, pb, m->time_offset, 0),
-                        (real)offset_displacement(pa, pb, m->time_offset, 1),
-                        (real)offset_displacement(pa, pb, m->time_offset, 2));
-    int side;
-    for (side = 0; side < 2; ++side) {
-        const uint32_t slot = side ? a : b;
-        struct seam_piece piece;
-        piece.first = seams->neighbours + seams->first[slot];
-        piece.last = seams->neighbours + seams->first[slot + 1];
-        if (piece.first == piece.last) continue;
-        piece.proxies = proxies;
-        piece.hulls = hulls;
-        piece.own = &proxies[slot];
-        piece.flush = SEAM_FLUSH * thin;
-        piece.beside = SEAM_BESIDE * thin;
-        piece.triangle = (int32_t)subshape;
-        piece.axis = seam_axis(&piece.own->geometry);
-        if (seam_hides_at(&piece, pb, m, side ? way : v3(0, 0, 0), side ? -1 : 1)) return true;
-    }
+    struct seam_piece piece;
+    int of_a;
+    for (of_a = 0; of_a < 2; ++of_a)
+        if (seam_piece_of(seams, proxies, hulls, a, b, subshape, of_a, &piece) &&
+            seam_hides_at(&piece, &proxies[a], &proxies[b], m, of_a))
+            return true;
     return false;
 }
 
