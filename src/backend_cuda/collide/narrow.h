@@ -294,8 +294,9 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     const bool known = find == NARROW_AGAIN || ((int)find_key_near(near, ordered_key(own.a, own.b), &before) &
                                                (int)(v.subshape_bits == 0));
     struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
-    if (is_at_once(HOW) && v.threshold) note_fast(v, step, pair_way(&a, &b, step.gravity, step.dt), pa, pb);
-    const bool on_mesh = with_meshes(HOW) && b.geometry.type == SADMM_SHAPE_MESH;
+    const bool on_mesh = with_meshes(HOW) && b.geometry.type == SADMM_SHAPE_MESH; /* whose hits are the solve's */
+    if (is_at_once(HOW) && v.threshold && !on_mesh)
+        note_fast(v, step, pair_way(&a, &b, step.gravity, step.dt), pa, pb);
     if (on_mesh) {
         if (find != NARROW_ONE && !triangle_now(v, step, own, a, b)) {
             v.sizes[i] = 0;
