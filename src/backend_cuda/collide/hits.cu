@@ -226,6 +226,7 @@ static void view_hits(struct sadmm_cuda_collision *c, const struct sadmm_cuda_hi
     c->hits.c = c->view;
     c->hits.step = *step;
     c->hits.few = c->view.candidate_capacity < c->radix_from;
+    c->hits.takes = false;
 }
 
 static sadmm_status launch_hits(struct sadmm_cuda_collision *c, const struct hits_launch &what, int64_t threads,
@@ -246,6 +247,7 @@ sadmm_status COLLISION(take_hits)(struct sadmm_cuda_collision *c, const struct s
     view_hits(c, step);
     TRY(launch_hits(c, k->list, std::min(candidates, MOST_THREADS), error));
     TRY(launch_hits(c, k->foresee, std::min<int64_t>(candidates, FORESEE_BLOCKS * FORESEE_THREADS), error));
+    c->hits.takes = true;
     TRY(launch_hits(c, k->take, (int64_t)TAKE_THREADS * std::min<int32_t>(c->hits.group_count, TAKE_BLOCKS), error));
     return launch_hits(c, k->replace, std::min(std::max<int64_t>(c->view.leaf_count, 1), MOST_THREADS), error);
 }

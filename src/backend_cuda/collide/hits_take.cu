@@ -182,9 +182,8 @@ static __device__ __forceinline__ struct candidate listed_pair(const hits_view &
 }
 
 /* Beside it all swept bodies and boxes for `take`. */
-static __global__ void __launch_bounds__(FORESEE_THREADS) foresee_kernel(const __grid_constant__ hits_view v)
+static __device__ __forceinline__ void foresee_all(const hits_view &v)
 {
-    pdl_wait_if(v.c.pdl);
     const int64_t thread = collision_thread(FORESEE_THREADS), stride = (int64_t)gridDim.x * FORESEE_THREADS;
     if (aborted(v.c)) return;
     const int64_t count = (int64_t)v.state->listed;
@@ -606,9 +605,8 @@ static __device__ void take_group(const hits_view &v, int32_t group, uint64_t ep
     v.state->quiet = 0;
 }
 
-static __global__ void __launch_bounds__(TAKE_THREADS) take_kernel(const __grid_constant__ hits_view v)
+static __device__ __forceinline__ void take_all_groups(const hits_view &v)
 {
-    pdl_wait_if(v.c.pdl);
     COLLISION_SHARED(take_shared, shared);
     if (aborted(v.c) || v.state->listed == 0) return;
     const uint64_t epoch = v.state->epoch + 1;
@@ -616,9 +614,17 @@ static __global__ void __launch_bounds__(TAKE_THREADS) take_kernel(const __grid_
         if (v.progress[group].followed != 0) take_group(v, group, epoch, &shared);
 }
 
+/* One kernel for both: most of either is when two shapes touch, which takes its compiler a minute. */
+static __global__ void __launch_bounds__(TAKE_THREADS) touch_kernel(const __grid_constant__ hits_view v)
+{
+    pdl_wait_if(v.c.pdl);
+    if (v.takes) take_all_groups(v);
+    else foresee_all(v);
+}
+
 void COLLISION(hits_take_kernels)(struct hits_kernels *kernels)
 {
     kernels->list = {list_kernel, HIT_THREADS, 0, "fast pairs"};
-    kernels->foresee = {foresee_kernel, FORESEE_THREADS, 0, "first touches"};
-    kernels->take = {take_kernel, TAKE_THREADS, sizeof(struct take_shared), "hits"};
+    kernels->foresee = {touch_kernel, FORESEE_THREADS, sizeof(struct take_shared), "first touches"};
+    kernels->take = {touch_kernel, TAKE_THREADS, sizeof(struct take_shared), "hits"};
 }

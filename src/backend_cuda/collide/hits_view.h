@@ -107,6 +107,7 @@ struct hits_view {
     struct sadmm_world_hit *taken, *records; /* by group, of the sub-step; of two steps, record_capacity each */
     int32_t record_capacity, shape_count;
     bool few;                       /* candidates are ranked: the list need not be cleared */
+    bool takes;                     /* `take`, else `foresee`: they are one kernel */
 };
 
 struct hits_launch {

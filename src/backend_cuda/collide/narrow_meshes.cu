@@ -5,10 +5,7 @@
 void COLLISION(narrow_meshes_kernels)(struct collision_kernels *kernels)
 {
     struct narrow_kernels *k = &kernels->with_meshes;
-    k->at_once = {at_once_kernel<NARROW_ONE, NARROW_MESHES_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of meshes"};
-    k->at_once_first = {at_once_kernel<NARROW_FIRST, NARROW_MESHES_AT_ONCE>, NARROW_THREADS, 0,
-                        "narrow phase of meshes"};
-    k->at_once_again = {at_once_kernel<NARROW_AGAIN, NARROW_MESHES_AT_ONCE>, NARROW_THREADS, 0,
-                        "narrow phase of meshes"};
+    k->at_once = k->at_once_first = k->at_once_again = {at_once_kernel<NARROW_ANY, NARROW_MESHES_AT_ONCE>,
+                                                        NARROW_THREADS, 0, "narrow phase of meshes"};
     k->listed = {listed_kernel<NARROW_ANY, NARROW_MESHES_LISTED>, NARROW_THREADS, 0, "narrow phase of listed pairs"};
 }

@@ -93,7 +93,7 @@ SADMM_INLINE void advance_pair_make(const struct sadmm_geometry *a, const struct
 {
     struct mesh_place place;
     struct mesh mesh;
-    if (b->type != SADMM_SHAPE_MESH) {
+    if (!geometry_is_mesh(b)) {
         convex_pair_make(a, b, hulls, pose, pair);
         return;
     }
@@ -158,7 +158,7 @@ SADMM_INLINE real shapes_apart(const struct sadmm_geometry *a, const struct sadm
     const vec3 t = r3_vec3(pose->t);
     mat3 R;
     int k;
-    if (hulls && a->type == SADMM_SHAPE_SPHERE && b->type == SADMM_SHAPE_MESH)
+    if (hulls && a->type == SADMM_SHAPE_SPHERE && geometry_is_mesh(b))
         return ball_from_triangle((real)a->size[0], t, hulls, b, subshape, normal);
     if (hulls && a->type != SADMM_SHAPE_PLANE && b->type > SADMM_SHAPE_BOX)
         return pieces_apart(a, b, hulls, subshape, pose, normal);

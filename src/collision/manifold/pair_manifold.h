@@ -175,7 +175,7 @@ SADMM_CALLED void ball_manifold(const struct sadmm_geometry *shape_a, const stru
     else if (shape_b->type == SADMM_SHAPE_BOX) manifold_sphere_box(radius, b, pose, far, 0, m);
     else if (!hulls) return;
     else if (shape_b->type == SADMM_SHAPE_HULL) hull_manifold(shape_a, shape_b, hulls, pose, far, 0, m);
-    else if (shape_b->type == SADMM_SHAPE_MESH) mesh_manifold(shape_a, shape_b, hulls, subshape, pose, far, 0, m);
+    else if (geometry_is_mesh(shape_b)) mesh_manifold(shape_a, shape_b, hulls, subshape, pose, far, 0, m);
 #ifndef SADMM_WITHOUT_SMOOTH
     else SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, subshape, pose, far, 0, m);
 #endif
@@ -220,7 +220,7 @@ SADMM_INLINE bool pair_sinks(const struct sadmm_proxy *a, const struct sadmm_pro
                              const struct manifold *m)
 {
     return inner_is_asked(a, b, gravity, dt, m) ||
-           (hulls && b->geometry.type == SADMM_SHAPE_MESH && inner_is_behind(a, b, hulls, subshape, &start->pose));
+           (hulls && geometry_is_mesh(&b->geometry) && inner_is_behind(a, b, hulls, subshape, &start->pose));
 }
 SADMM_INLINE bool pair_asks_balls(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
                                   uint32_t subshape, const struct pair_start *start, double gravity, double dt,

@@ -12,6 +12,18 @@
  * are what their triangles' other shapes are seen from: they come last. */
 SADMM_INLINE int geometry_rank(int type) { return type == SADMM_SHAPE_MESH ? (int)SADMM_SHAPE_TYPE_COUNT : type; }
 
+/* Who includes this may say that there are no meshes (SADMM_WITHOUT_MESHES): a device's compiler leaves out what they
+ * need, which takes it minutes. */
+SADMM_INLINE bool geometry_is_mesh(const struct sadmm_geometry *g)
+{
+#ifdef SADMM_WITHOUT_MESHES
+    (void)g;
+    return false;
+#else
+    return g->type == SADMM_SHAPE_MESH;
+#endif
+}
+
 /* Is it one of those that hulls and the like meet by convex.h, and for which a world has shape data (hull_data.h)? */
 SADMM_INLINE int geometry_is_smooth(const struct sadmm_geometry *g)
 {
