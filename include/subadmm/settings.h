@@ -98,12 +98,11 @@ typedef struct sadmm_settings {
                                     (docs/internals/algorithm.md) */
 
     int ncp_points;              /* worlds: islands with joints and at most so many contact points are solved directly
-                                    after the iterations (docs/internals/algorithm.md, "Dense contact solve (NCP)"),
-                                    contacts and rows to rounding: robots that stand, walk, grasp. In [0,
-                                    SADMM_MOST_NCP_POINTS = 128]; 0: none; default 0. It costs what the iterations
-                                    leave to do: little where they leave less than 1e-9 m/s, else 0.1 to 0.5 ms a robot
-                                    of ten points on one core, and some 10 ms an island that nothing solves (links deep
-                                    in a table). On CUDA such steps go through the host */
+                                    before the iterations, and need none then (docs/internals/algorithm.md, "Dense
+                                    contact solve (NCP)"), contacts and rows to rounding: robots that stand, walk,
+                                    grasp. In [0, SADMM_MOST_NCP_POINTS = 128]; 0: none; default 0. Some 10 ms on one
+                                    core are lost on an island that nothing solves (links deep in a table). On CUDA such
+                                    steps go through the host */
 
     double residual_tolerance;   /* stop when |r_primal|_inf (m/s) and |r_dual|_inf (N s) are both <= this;
                                     0 = never; finite, >= 0; default 0 */

@@ -231,8 +231,8 @@ typedef struct sadmm_step_report {
     int32_t couplings;             /* couplings that took part (coupling.h): enabled, with gains */
     int32_t contacts;              /* contact points of the solve, without hits within the step (settings.hits) */
     int32_t pairs;                 /* shape pairs with at least one contact */
-    int iterations;                /* iterations done; with a stop rule on CUDA (below): the largest number of any
-                                      island */
+    int iterations;                /* iterations done, 0 where every island was solved directly (settings.ncp_points);
+                                      with a stop rule on CUDA (below): the largest number of any island */
     double iterations_mean;        /* mean over islands. Differs from `iterations` only on CUDA with a stop rule (method
                                       FAST, settings.certificate_tolerance, at most 64 convergence checks a step), where
                                       every island stops on its own */

@@ -19,6 +19,7 @@
 #include "world/step/coupling_step.h"
 #include "world/step/gather.h"
 #include "world/step/hits.h"
+#include "world/step/integrate.h"
 #include "world/step/joint_move.h"
 #include "world/step/joint_rows.h"
 #include "world/step/joint_stiffen.h"
@@ -172,7 +173,7 @@ struct host_step {
     int iterations;        /* of all of them */
     bool unconverged;      /* one of them has not met a stop rule */
     int32_t limited;       /* islands, most of any */
-    int32_t ncp;           /* islands changed by the dense contact solve in this sub-step */
+    int32_t ncp;           /* islands that the dense contact solve has changed in this sub-step */
     int32_t pushed;        /* bodies moved out of overlaps in this sub-step */
     int64_t islands_above; /* likewise, but of the last sub-step; -1: no stop rule */
     double ms[SADMM_PHASE_COUNT];
@@ -198,14 +199,25 @@ static sadmm_status begin_articulations(struct host_step *step)
     return stiffened ? solve_articulations(step, world->stiffened, false) : SADMM_OK;
 }
 
-/* The dense contact solve (NCP) of islands with joints (core/solve/ncp.h). */
-static sadmm_status solve_ncp(struct host_step *step)
+/* The dense contact solve (NCP) of islands with joints (core/solve/ncp.h). Before the iterations no island of a world is
+ * solved where some are seen from their supports, or where the iterations themselves are asked for. */
+static sadmm_status solve_ncp(struct host_step *step, bool again)
 {
     sadmm_world *world = step->world;
+    const struct sadmm_ncp_input input = {world->articulations, &step->system, world->joint_constraints, &step->settings};
     if (!world->ncp) world->ncp = sadmm_ncp_create();
     if (!world->ncp) return sadmm_fail_memory(&world->error, "islands of the dense contact solve");
-    return sadmm_ncp_solve(world->ncp, world->articulations, &step->system, world->joint_constraints, &step->settings,
-                           &step->ncp, &world->error);
+    if (again) {
+        int32_t solved;
+        step->system.support_motion = NULL;
+        TRY(sadmm_ncp_solve_again(world->ncp, &input, &solved, &world->error));
+        step->ncp += solved;
+        return SADMM_OK;
+    }
+    if (step->system.support_motion || world->plan.residuals || step->pushed > 0) return SADMM_OK;
+    TRY(sadmm_ncp_solve(world->ncp, &input, &step->stages.solved, &step->ncp, &world->error));
+    step->report.converged = step->stages.solved && step->settings.certificate_tolerance > 0;
+    return SADMM_OK;
 }
 
 /* Which islands are pushed apart without a velocity (core/solve/push.h). */
@@ -249,6 +261,7 @@ static sadmm_status make_plan(struct host_step *step)
     step->report = sadmm_solve_report_empty(world->kernels);
     step->ncp = step->pushed = 0;
     if (world->articulations) sadmm_articulations_begin(world->articulations);
+    if (world->ncp) sadmm_ncp_begin(world->ncp);
     TRY(keep_start(world, &step->depth_now));
     step->depth = step->depth_now > step->depth ? step->depth_now : step->depth;
     return SADMM_OK;
@@ -275,6 +288,10 @@ static sadmm_status integrate(struct host_step *step)
 {
     sadmm_world *world = step->world;
     sadmm_world_leave_support_frame(world, &step->system);
+    if (step->stages.solved) {
+        sadmm_world_integrate(world, &step->settings);
+        return SADMM_OK;
+    }
     return world->kernels->integrate(world->context, world->next, &world->error);
 }
 
@@ -301,8 +318,10 @@ static sadmm_status find_wrenches(const struct host_step *step)
 {
     sadmm_world *world = step->world;
     sadmm_world_add_kinematic_wrenches(world, &step->settings);
-    if (step->ncp == 0) TRY(world->kernels->recover_wrenches(world->context, world->wrench, &world->error));
-    else sadmm_world_find_wrenches(world, &step->settings); /* by impulses that the backend has not */
+    if (step->ncp > 0 || step->stages.solved) /* by impulses that the backend has not */
+        sadmm_world_find_wrenches(world, &step->settings);
+    else
+        TRY(world->kernels->recover_wrenches(world->context, world->wrench, &world->error));
     for (size_t i = 0; i < (size_t)world->dynamic_count; ++i)
         for (int k = 0; k < 6; ++k)
             world->wrench[6 * i + (size_t)k] += rolling_wrench(&world->start.rigid[i], step->settings.dt, k);
@@ -334,7 +353,8 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     case SADMM_STAGE_PUSH_SOLVE: return solve_pushes(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
     case SADMM_STAGE_BLOCK_SOLVE_AGAIN: return solve_articulations(step, NULL, true);
-    case SADMM_STAGE_NCP_SOLVE: return solve_ncp(step);
+    case SADMM_STAGE_NCP_SOLVE: return solve_ncp(step, false);
+    case SADMM_STAGE_NCP_SOLVE_AGAIN: return solve_ncp(step, true);
     case SADMM_STAGE_REACTIONS: sadmm_world_keep_rows(world, settings); return SADMM_OK;
     case SADMM_STAGE_KINEMATIC: return move_kinematic(step);
     case SADMM_STAGE_JOINT_MOTION: return sadmm_world_move_articulated(world, settings, &step->joint_drift);

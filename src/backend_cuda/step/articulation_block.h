@@ -88,7 +88,8 @@ static __device__ __forceinline__ void begin_part(const articulation_view &p, co
     __syncthreads();
     each(p.s.columns * SADMM_MAX_ROWS, [&](int32_t r) {
         if (p.state[r] == ROW_ABSENT) return;
-        articulation_begin_row(&p, r, earlier ? earlier[row_in_world(p, r)] : (uint8_t)ROW_ABSENT);
+        articulation_begin_row(&p, r, earlier ? earlier[row_in_world(p, r)] : (uint8_t)ROW_ABSENT,
+                               articulation_regularisation(&p, r));
     });
     __syncthreads();
 }

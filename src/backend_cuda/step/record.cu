@@ -417,6 +417,7 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_INITIALISE:
     case SADMM_STAGE_CERTIFY:
     case SADMM_STAGE_NCP_SOLVE:
+    case SADMM_STAGE_NCP_SOLVE_AGAIN:
     case SADMM_STAGE_COUNT: return SADMM_OK;
     }
     return SADMM_OK;

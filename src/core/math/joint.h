@@ -17,6 +17,8 @@
 #ifndef SADMM_MATH_JOINT_H
 #define SADMM_MATH_JOINT_H
 
+#include <stdbool.h>
+
 #include "quat.h"
 
 enum { JOINT_COORDINATES = 6, JOINT_ALL_LOCKED = 63 };
@@ -101,15 +103,19 @@ SADMM_INLINE void joint_swing(quat relative, int free, real value[3])
     value[free] = v3_part(q_log(twist), free);
 }
 
-/* Rotation `locked` is, the other two are free: axes of `axis` that are not a's, and values. */
-SADMM_INLINE void joint_cross(mat3 a, mat3 b, int locked, vec3 axis[3], real value[3])
+/* Rotation `locked` is, the other two are free: axes of `axis` that are not a's; values. */
+SADMM_INLINE void joint_cross_axes(mat3 a, mat3 b, int locked, vec3 axis[3])
+{
+    const vec3 a_i = m3_column(a, (locked + 1) % 3), b_j = m3_column(b, (locked + 2) % 3), n = v3_cross(a_i, b_j);
+    const real size = v3_norm(n);
+    axis[(locked + 2) % 3] = b_j;
+    axis[locked] = size > 0 ? v3_scale(n, 1 / size) : m3_column(a, locked);
+}
+SADMM_INLINE void joint_cross_values(mat3 a, mat3 b, int locked, real value[3])
 {
     const int i = (locked + 1) % 3, j = (locked + 2) % 3;
-    const vec3 a_i = m3_column(a, i), b_j = m3_column(b, j), n = v3_cross(a_i, b_j);
-    const real size = v3_norm(n);
-    axis[j] = b_j;
-    axis[locked] = size > 0 ? v3_scale(n, 1 / size) : m3_column(a, locked);
-    value[locked] = (real)atan2((double)-v3_dot(a_i, b_j), (double)size);
+    const vec3 a_i = m3_column(a, i), b_j = m3_column(b, j);
+    value[locked] = (real)atan2((double)-v3_dot(a_i, b_j), (double)v3_norm(v3_cross(a_i, b_j)));
     value[i] = (real)atan2((double)v3_dot(b_j, m3_column(a, locked)), (double)v3_dot(b_j, m3_column(a, j)));
     value[j] = (real)atan2((double)v3_dot(a_i, m3_column(b, locked)), (double)v3_dot(a_i, m3_column(b, i)));
 }
@@ -117,14 +123,15 @@ SADMM_INLINE void joint_cross(mat3 a, mat3 b, int locked, vec3 axis[3], real val
 /* A length below this has no direction: a's x axis stands for it. */
 #define JOINT_LEAST_LENGTH 1e-12
 
-SADMM_INLINE struct joint_geometry joint_geometry_of(const struct joint_end *a, const struct joint_end *b,
-                                                     uint32_t locks, int radial)
+/* values: else `value` is left as it is, for what asks where the axes are and not how far. */
+SADMM_ALWAYS_INLINE struct joint_geometry joint_geometry_with(const struct joint_end *a, const struct joint_end *b,
+                                                              uint32_t locks, int radial, bool values)
 {
     struct joint_geometry g;
     const mat3 frame = q_matrix(a->orientation);
     const vec3 way = v3_sub(b->point, a->point);
     const int locked = joint_locked_rotations(locks), odd = joint_odd_rotation(locks);
-    const quat relative = q_mul(q_conjugate(a->orientation), b->orientation);
+    quat relative;
     int k;
     g.arm_a = v3_add(a->arm, way);
     g.arm_b = b->arm;
@@ -138,15 +145,31 @@ SADMM_INLINE struct joint_geometry joint_geometry_of(const struct joint_end *a, 
         if (length > (real)JOINT_LEAST_LENGTH) g.axis[0] = v3_scale(way, 1 / length);
         g.value[0] = length;
     }
+    if (locked == 1) {
+        const mat3 other = q_matrix(b->orientation);
+        joint_cross_axes(frame, other, odd, g.axis + 3);
+        if (values) joint_cross_values(frame, other, odd, g.value + 3);
+        return g;
+    }
+    if (!values) return g;
+    relative = q_mul(q_conjugate(a->orientation), b->orientation);
     if (locked == 2) {
         joint_swing(relative, odd, g.value + 3);
-    } else if (locked == 1) {
-        joint_cross(frame, q_matrix(b->orientation), odd, g.axis + 3, g.value + 3);
     } else {
         const vec3 turn = q_log(relative);
         g.value[3] = turn.x, g.value[4] = turn.y, g.value[5] = turn.z;
     }
     return g;
+}
+SADMM_INLINE struct joint_geometry joint_geometry_of(const struct joint_end *a, const struct joint_end *b,
+                                                     uint32_t locks, int radial)
+{
+    return joint_geometry_with(a, b, locks, radial, true);
+}
+SADMM_INLINE struct joint_geometry joint_axes_of(const struct joint_end *a, const struct joint_end *b, uint32_t locks,
+                                                 int radial)
+{
+    return joint_geometry_with(a, b, locks, radial, false);
 }
 
 /* Is coordinate k an angle that goes on beyond a half turn? */

@@ -36,7 +36,7 @@ enum { ARTICULATION_REFINEMENTS = 8 };
 /* The rows at bounds are found in so many passes at most; one or two do mostly, and 9 in all but of ragdolls that fall
  * on each other. A row that is at a bound against its law by less than the rounding of its numbers and
  * ARTICULATION_SLACK, m/s or rad/s, stays there, or rounding would let rows change for good. */
-enum { ARTICULATION_PASSES = 16 };
+enum { ARTICULATION_PASSES = 16, ARTICULATION_TREE_PASSES = 64 };
 #define ARTICULATION_SLACK 1e-9
 
 /* Where a row is: between its bounds, at one of them, or fixed: it does not depend on the motion. Or it is absent: its
@@ -292,15 +292,21 @@ SADMM_INLINE double articulation_scale(const struct articulation_view *v, int32_
     return a > 0 && b > 0 ? 2 * (a < b ? a : b) : a + b;
 }
 
+SADMM_INLINE double articulation_regularisation(const struct articulation_view *v, int32_t r)
+{
+    return ARTICULATION_REGULARISATION * articulation_scale(v, r);
+}
+
 /* Where a row that is there is before the first pass. earlier: where a solve of this step has left it, which is mostly
- * where it is still: iterations leave multipliers near bounds on either side. ROW_ABSENT: there was none. */
-SADMM_INLINE void articulation_begin_row(const struct articulation_view *v, int32_t r, uint8_t earlier)
+ * where it is still: iterations leave multipliers near bounds on either side. ROW_ABSENT: there was none. hard: the
+ * regularisation, if it is a hard one. */
+SADMM_INLINE void articulation_begin_row(const struct articulation_view *v, int32_t r, uint8_t earlier, double hard)
 {
     const struct articulation_row *row = &v->rows[r];
     const double lambda = row->lambda, lo = row->lo, hi = row->hi;
     double residual;
     v->regularisation[r] = sadmm_law_is_coupled(row->compliance, lo, hi)
-                           ? ARTICULATION_REGULARISATION * articulation_scale(v, r) : row->compliance;
+                               ? hard : row->compliance;
     v->change[r] = articulation_clamp(lambda, lo, hi) - lambda;
     if (row->gain == 0 || !(hi > lo)) {
         const double fixed = row->compliance > 0 ? -row->bias / row->compliance : lambda;
@@ -335,6 +341,17 @@ SADMM_INLINE bool articulation_change_row(const struct articulation_view *v, int
     }
     if (next == state) return false;
     articulation_put_state(v, r, next);
+    return true;
+}
+
+/* A row without a multiplier of its own that is not met: it goes to the bound that would meet it. Did it? */
+SADMM_INLINE bool articulation_yield_row(const struct articulation_view *v, int32_t r)
+{
+    const struct articulation_row *row = &v->rows[r];
+    const double residual = articulation_row_residual(v, r, true, true);
+    const bool down = residual > 0;
+    if (!(fabs(residual) > ARTICULATION_SLACK * (1 + fabs(row->bias))) || !isfinite(down ? row->lo : row->hi)) return false;
+    articulation_put_state(v, r, down ? ROW_AT_LO : ROW_AT_HI);
     return true;
 }
 

@@ -123,8 +123,8 @@ struct joint_side {
 
 struct acting_joint {
     struct joint_side side[2];
-    struct joint_geometry start, middle;
-    quat frame; /* of a, in the middle */
+    struct joint_geometry start, middle; /* middle: but its values */
+    quat frame;                          /* of a, in the middle */
 };
 
 SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struct sadmm_settings *settings)
@@ -171,23 +171,30 @@ SADMM_INLINE void joint_hold_translations(const struct joint_end start[2], struc
     }
 }
 
-SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const struct joint_frame frame[2],
-                                           const struct joint_body body[2], const struct sadmm_settings *settings)
+/* acting->side: of its bodies; target: that of a is a coupling's. */
+SADMM_INLINE void joint_act_between(const sadmm_joint_def *def, const struct joint_frame frame[2], bool target,
+                                    const struct sadmm_settings *settings, struct acting_joint *acting)
 {
     const int radial = joint_is_radial(def->kind);
-    struct acting_joint acting;
     struct joint_end start[2], middle[2];
     int s;
     for (s = 0; s < 2; ++s) {
-        struct joint_side *side = &acting.side[s];
-        *side = joint_side_of(body[s], settings);
+        const struct joint_side *side = &acting->side[s];
         start[s] = middle[s] = joint_end_on(&frame[s], side->rigid);
         if (side->system_body >= 0 || side->prescribed) middle[s] = joint_end_halfway(&frame[s], side, settings->dt);
     }
-    acting.start = joint_geometry_of(&start[0], &start[1], def->locks, radial);
-    acting.middle = joint_geometry_of(&middle[0], &middle[1], def->locks, radial);
-    acting.frame = middle[0].orientation;
-    if (body[0].target) joint_hold_translations(start, &acting);
+    acting->start = joint_geometry_of(&start[0], &start[1], def->locks, radial);
+    acting->middle = joint_axes_of(&middle[0], &middle[1], def->locks, radial);
+    acting->frame = middle[0].orientation;
+    if (target) joint_hold_translations(start, acting);
+}
+SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const struct joint_frame frame[2],
+                                           const struct joint_body body[2], const struct sadmm_settings *settings)
+{
+    struct acting_joint acting;
+    int s;
+    for (s = 0; s < 2; ++s) acting.side[s] = joint_side_of(body[s], settings);
+    joint_act_between(def, frame, body[0].target, settings, &acting);
     return acting;
 }
 

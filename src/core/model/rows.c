@@ -49,6 +49,13 @@ int32_t sadmm_rows_add(struct sadmm_rows *rows, int32_t count, int32_t body_a, i
     return (int32_t)first;
 }
 
+void sadmm_rows_set_rigid(struct sadmm_rows *rows, const double offset[3])
+{
+    struct sadmm_row_constraint *constraint = &rows->constraints[rows->constraint_count - 1];
+    constraint->rigid = true;
+    memcpy(constraint->offset, offset, sizeof constraint->offset);
+}
+
 bool sadmm_rows_add_block(struct sadmm_rows *rows, const sadmm_problem_block *block, const double *lambda)
 {
     const int32_t first = sadmm_rows_add(rows, block->rows, block->body_a, block->body_b);

@@ -26,6 +26,8 @@ struct sadmm_row_constraint {
     int32_t first, count;   /* rows */
     bool cone;
     double friction;        /* cone: mu */
+    bool rigid;             /* each of its rows is a wrench at one point of space on b, and its opposite on a; */
+    double offset[3];       /* then from a's centre of mass to b's where the rows are made, m, world frame */
 };
 
 struct sadmm_rows {
@@ -46,6 +48,9 @@ bool sadmm_rows_reserve(struct sadmm_rows *rows, size_t constraints, size_t row_
 /* Add a constraint of `count` rows whose Jacobians and multipliers are 0 and whose laws are hard with bias 0: its first
  * row, -1 when memory runs out. Bodies as in sadmm_problem_block. */
 int32_t sadmm_rows_add(struct sadmm_rows *rows, int32_t count, int32_t body_a, int32_t body_b);
+
+/* Of the constraint that was added last: it is rigid, b's centre of mass is at `offset` from a's. */
+void sadmm_rows_set_rigid(struct sadmm_rows *rows, const double offset[3]);
 
 /* Add what a block means, and its multipliers (6, or NULL for 0). False when memory runs out. */
 bool sadmm_rows_add_block(struct sadmm_rows *rows, const sadmm_problem_block *block, const double *lambda);

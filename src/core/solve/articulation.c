@@ -26,8 +26,9 @@ void sadmm_articulations_destroy(struct sadmm_articulations *j)
 {
     if (!j) return;
     sadmm_articulation_order_free(&j->order);
-    void *blocks[] = {j->bodies,  j->parts,         j->part,        j->entry,      j->work,
-                      j->impulse, j->kept_velocity, j->kept_lambda, j->kept_states};
+    void *blocks[] = {j->bodies,        j->parts,       j->part,        j->entry, j->work,         j->impulse,
+                      j->kept_velocity, j->kept_lambda, j->kept_states, j->nodes, j->tree_numbers, j->roles,
+                      j->directions};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(j);
 }
@@ -45,6 +46,33 @@ static bool same_graph(const struct solving *s)
     return true;
 }
 
+static bool make_tree_room(struct sadmm_articulations *j, size_t members, size_t columns)
+{
+    const size_t rows = SADMM_MAX_ROWS * columns;
+    return sadmm_grow_empty(&j->nodes, &j->nodes_capacity, members, sizeof *j->nodes) &&
+           sadmm_grow_empty(&j->tree_numbers, &j->tree_number_capacity, 3 * members + columns + rows,
+                            sizeof *j->tree_numbers) &&
+           sadmm_grow_empty(&j->roles, &j->role_capacity, 3 * rows, sizeof *j->roles) &&
+           sadmm_grow_empty(&j->directions, &j->direction_capacity, 6 * (rows + members), sizeof *j->directions);
+}
+
+/* Where the tree's arrays are of a part that comes after so many bodies and columns of all. */
+static struct articulation_tree tree_at(const struct sadmm_articulations *j, const struct articulation_structure *s,
+                                        size_t members, size_t columns, size_t all, size_t all_columns)
+{
+    const size_t rows = SADMM_MAX_ROWS * (size_t)s->columns;
+    uint8_t *bytes = j->roles + 3 * SADMM_MAX_ROWS * columns;
+    return (struct articulation_tree){.node = j->nodes + members,
+                                      .node_of = j->tree_numbers + members,
+                                      .joint = j->tree_numbers + all + columns,
+                                      .soft = j->tree_numbers + all + all_columns + SADMM_MAX_ROWS * columns,
+                                      .total = j->directions + 6 * (SADMM_MAX_ROWS * all_columns + members),
+                                      .role = bytes,
+                                      .own = bytes + rows,
+                                      .factored = bytes + 2 * rows,
+                                      .direction = j->directions + 6 * SADMM_MAX_ROWS * columns};
+}
+
 /* Views, and which bodies they have. */
 static bool make_parts(struct sadmm_articulations *j, size_t bodies)
 {
@@ -60,10 +88,13 @@ static bool make_parts(struct sadmm_articulations *j, size_t bodies)
         !sadmm_grow_empty(&j->work, &j->work_capacity, work, sizeof *j->work) ||
         !sadmm_grow_empty(&j->kept_states, &j->kept_states_capacity, SADMM_MAX_ROWS * columns,
                           sizeof *j->kept_states) ||
-        !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 6 * members, sizeof *j->impulse) ||
-        !sadmm_grow_empty(&j->kept_velocity, &j->kept_velocity_capacity, 6 * members, sizeof *j->kept_velocity))
+        !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 12 * members, sizeof *j->impulse) ||
+        !sadmm_grow_empty(&j->kept_velocity, &j->kept_velocity_capacity, 6 * members, sizeof *j->kept_velocity) ||
+        !make_tree_room(j, members, columns))
         return false;
     for (size_t i = 0; i < bodies; ++i) j->part[i] = -1;
+    const size_t all = members, all_columns = columns;
+    int32_t *const queue = j->tree_numbers + all + (1 + SADMM_MAX_ROWS) * all_columns; /* and parents: members each */
     work = members = columns = 0;
     j->loops = false;
     for (int32_t k = 0; k < j->order.parts; ++k) {
@@ -71,9 +102,12 @@ static bool make_parts(struct sadmm_articulations *j, size_t bodies)
         j->parts[k] = (struct articulation_part){.view = articulation_view_at(&s, j->work + work),
                                                  .loop = articulation_has_loop(&s),
                                                  .impulse = j->impulse + 6 * members,
+                                                 .without = j->impulse + 6 * (all + members),
                                                  .kept_velocity = j->kept_velocity + 6 * members,
                                                  .kept_state = j->kept_states + SADMM_MAX_ROWS * columns};
         j->loops = j->loops || j->parts[k].loop;
+        j->parts[k].tree = tree_at(j, &s, members, columns, all, all_columns);
+        sadmm_articulation_tree_make(&s, queue, queue + s.bodies, &j->parts[k].tree);
         for (int32_t e = 0; e < s.bodies; ++e) {
             j->part[s.body[e]] = k;
             j->entry[s.body[e]] = e;
@@ -140,10 +174,17 @@ static void add_impulse(struct articulation_part *part, const struct sadmm_conta
                         int side, size_t entry)
 {
     part->touched = true;
+    part->points += count;
     for (int32_t p = 0; p < count; ++p)
         for (size_t k = 0; k < 6; ++k)
             part->impulse[6 * entry + k] +=
                 articulation_point_load(arm_of(&points[p], side), points[p].impulse, side, (int)k);
+}
+
+/* Is it left to the dense contact solve, if its island is small enough? */
+static bool is_for_ncp(const struct articulation_part *part, const struct sadmm_settings *settings)
+{
+    return part->by_tree && part->points <= settings->ncp_points;
 }
 
 /* C, to A where the part is solved. */
@@ -165,6 +206,7 @@ static void find_impulses(const struct solving *s)
     for (int32_t k = 0; k < j->order.parts; ++k) {
         struct articulation_part *part = &j->parts[k];
         part->touched = false;
+        part->points = 0;
         memset(part->impulse, 0, 6 * (size_t)part->view.s.bodies * sizeof *part->impulse);
     }
     each_contact(s, add_impulse);
@@ -231,6 +273,8 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
     for (int32_t k = 0; k < articulations->order.parts; ++k)
         if (!articulations->parts[k].left && !is_solved(&articulations->parts[k]))
             sadmm_articulation_part_load(&articulations->parts[k], system, settings, slots);
+    for (int32_t k = 0; k < articulations->order.parts; ++k)
+        if (!after && is_for_ncp(&articulations->parts[k], settings)) articulations->parts[k].speed = 0;
     if (solves) each_contact(&s, add_weight);
     for (int32_t k = 0; k < articulations->order.parts; ++k) {
         struct articulation_part *part = &articulations->parts[k];
@@ -240,11 +284,12 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
             continue;
         }
         if (part->touched && settings->method == SADMM_METHOD_PAPER) leave_to_contacts(&part->view);
-        const bool solved = sadmm_articulation_part_solve(&part->view, part->kept ? part->kept_state : NULL,
+        const bool solved = sadmm_articulation_part_solve(part, part->kept ? part->kept_state : NULL,
                                                           settings->ncp_points > 0);
         /* Rows that are not solved are left as they are: velocities that go with multipliers beyond their bounds have
          * energy from nowhere. */
         if (solved) sadmm_articulation_part_store(&part->view, system, slots);
+        part->loaded = solved && !after && is_for_ncp(part, settings);
         if (!after) keep_part(&s, part, solved);
     }
     articulations->kept = !after;
@@ -296,7 +341,7 @@ static void close_part(const struct solving *s, struct articulation_part *part, 
     for (int32_t e = 0; speeds && e < v->s.bodies; ++e)
         memcpy(v->velocity + 6 * (size_t)e, bodies[v->s.body[e]].velocity, 6 * sizeof *v->velocity);
     leave_to_contacts(v); /* nothing but the errors moves bodies */
-    if (!sadmm_articulation_part_solve(v, NULL, true)) return;
+    if (!sadmm_articulation_part_solve(part, NULL, true)) return;
     if (speeds) change_speeds(v, bodies);
     else move_by(v, bodies);
 }

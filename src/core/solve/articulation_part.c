@@ -28,19 +28,29 @@ void sadmm_articulation_part_load(struct articulation_part *part, const struct s
     }
     for (int32_t e = 0; e < v->s.bodies; ++e) {
         const size_t i = (size_t)v->s.body[e];
-        double *A = v->factor + 36 * (size_t)e, *impulse = part->impulse + 6 * (size_t)e, b[6];
+        double *A = v->factor + 36 * (size_t)e, *impulse = part->impulse + 6 * (size_t)e, b[6], contacts[6];
+        memcpy(contacts, impulse, sizeof contacts);
         memcpy(v->velocity + 6 * (size_t)e, system->velocity + 6 * i, 6 * sizeof *v->velocity);
         for (int32_t at = v->s.first_around[e]; at < v->s.first_around[e + 1]; ++at)
             for (int k = 0; k < 6; ++k) impulse[k] += articulation_row_load(v, v->s.around[at], k);
         sadmm_system_body(system, settings, (int32_t)i, A, b);
         for (int k = 0; k < 6; ++k) v->residual[6 * e + k] = articulation_body_residual(v, e, k, b[k], impulse[k]);
+        for (int k = 0; k < 6; ++k) part->without[6 * e + k] = v->residual[6 * e + k] - contacts[k];
         energy += articulation_energy(A, impulse);
         mass += A[0];
     }
     part->speed = articulation_speed(energy, mass);
+    part->loaded = false;
+    part->by_tree = part->tree.nodes > 0 && sadmm_articulation_tree_begin(&part->tree, v, slots);
 }
 
-void sadmm_articulation_part_free(const struct articulation_view *v)
+void sadmm_articulation_part_put_contacts(const struct articulation_part *part, const double *loads)
+{
+    for (int32_t k = 0; k < 6 * part->view.s.bodies; ++k) part->view.residual[k] = part->without[k] + loads[k];
+}
+
+/* The factors of the bodies' A + C, and their response to the residual: the free change. */
+static void free_bodies(const struct articulation_view *v)
 {
     for (int32_t e = 0; e < v->s.bodies; ++e) {
         ldl6_factor(v->factor + 36 * (size_t)e, v->factor + 36 * (size_t)e);
@@ -50,18 +60,54 @@ void sadmm_articulation_part_free(const struct articulation_view *v)
 
 /* ---- its rows ---------------------------------------------------------------------------------------------------- */
 
-void sadmm_articulation_part_begin_rows(const struct articulation_view *v, const uint8_t *earlier)
+/* Where rows are before the first pass. */
+static void begin_rows(const struct articulation_part *part, const uint8_t *earlier)
 {
+    const struct articulation_view *v = &part->view;
     for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) {
-        for (int side = 0; side < 2; ++side) articulation_respond(v, r, side);
-        if (v->state[r] != ROW_ABSENT) articulation_begin_row(v, r, earlier ? earlier[r] : ROW_ABSENT);
+        double hard = 0;
+        if (!part->by_tree) {
+            for (int side = 0; side < 2; ++side) articulation_respond(v, r, side);
+            hard = articulation_regularisation(v, r);
+        }
+        if (v->state[r] != ROW_ABSENT) articulation_begin_row(v, r, earlier ? earlier[r] : ROW_ABSENT, hard);
     }
 }
 
-bool sadmm_articulation_part_change_rows(const struct articulation_view *v)
+double sadmm_articulation_part_scale(const struct articulation_part *part, int32_t r)
+{
+    const struct articulation_view *v = &part->view;
+    double own[2] = {0, 0};
+    if (!part->by_tree) return articulation_scale(v, r);
+    for (int side = 0; side < 2; ++side) {
+        const int32_t e = v->s.side[2 * (r / SADMM_MAX_ROWS) + side];
+        double L[36], response[6];
+        if (e < 0) continue;
+        ldl6_factor(v->factor + 36 * (size_t)e, L);
+        ldl6_solve(L, v->rows[r].jacobian[side], response);
+        own[side] = six_product(v->rows[r].jacobian[side], response);
+    }
+    return own[0] > 0 && own[1] > 0 ? 2 * fmin(own[0], own[1]) : own[0] + own[1];
+}
+
+/* Rows that left their bounds, or are at them against their law: did any change its state? one: the first of them alone,
+ * which comes to an end where all at once go round in circles (Murty, 1974). */
+static bool change_rows(const struct articulation_view *v, bool one)
 {
     bool changed = false;
-    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) changed = articulation_change_row(v, r) || changed;
+    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns && !(changed && one); ++r)
+        changed = articulation_change_row(v, r) || changed;
+    return changed;
+}
+
+/* In a tree a row that says what another one says has no multiplier. If it asks for another rate, it goes to the bound that
+ * pulls there: friction that a motor moves against. Did any? */
+static bool yield_rows(const struct articulation_part *part)
+{
+    bool changed = false;
+    for (int32_t r = 0; part->by_tree && r < SADMM_MAX_ROWS * part->view.s.columns; ++r)
+        if (sadmm_articulation_tree_leaves(&part->tree, &part->view, r))
+            changed = articulation_yield_row(&part->view, r) || changed;
     return changed;
 }
 
@@ -77,7 +123,7 @@ static void make_node(const struct articulation_view *v, int32_t node, int32_t r
     }
 }
 
-void sadmm_articulation_part_factorize(const struct articulation_view *v)
+static void factorize(const struct articulation_view *v)
 {
     for (int32_t p = 0; p < v->s.columns; ++p) {
         double *diagonal = v->diagonal + ARTICULATION_BLOCK * (size_t)p, L[ARTICULATION_BLOCK];
@@ -97,7 +143,7 @@ static void move_bodies(const struct articulation_view *v)
         for (int k = 0; k < 6; ++k) articulation_move(v, e, k);
 }
 
-void sadmm_articulation_part_solve_rows(const struct articulation_view *v, bool again)
+static void solve_rows(const struct articulation_view *v, bool again)
 {
     const int32_t rows = SADMM_MAX_ROWS * v->s.columns;
     for (int32_t r = 0; r < rows; ++r) articulation_put_change(v, r, again, false);
@@ -118,6 +164,18 @@ void sadmm_articulation_part_solve_rows(const struct articulation_view *v, bool 
     move_bodies(v);
 }
 
+void sadmm_articulation_part_factorize(struct articulation_part *part)
+{
+    if (part->by_tree) sadmm_articulation_tree_factorize(&part->tree, &part->view);
+    else factorize(&part->view);
+}
+
+void sadmm_articulation_part_solve_rows(const struct articulation_part *part, bool again)
+{
+    if (part->by_tree) sadmm_articulation_tree_solve(&part->tree, &part->view, again);
+    else solve_rows(&part->view, again);
+}
+
 static bool needs_refinement(const struct articulation_view *v)
 {
     for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r)
@@ -134,9 +192,11 @@ static bool is_finite(const struct articulation_view *v)
 }
 
 /* The largest residual of a row inside its bounds, m/s or rad/s. */
-static double largest_residual(const struct articulation_view *v)
+static double largest_residual(const struct articulation_part *part)
 {
+    const struct articulation_view *v = &part->view;
     double most = 0;
+    if (part->by_tree) return sadmm_articulation_tree_residual(&part->tree, v);
     for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r)
         most = fmax(most, articulation_residual_size(v, r));
     return most;
@@ -145,33 +205,37 @@ static double largest_residual(const struct articulation_view *v)
 /* Iterative refinement: each solve takes away nearly all of what the regularisation has left, but where light bodies
  * between heavy ones pass on a load. Rows that contradict each other are left: more of it would only make their
  * multipliers grow. Have they stayed in their states? */
-static bool refine(const struct articulation_view *v)
+static bool refine(const struct articulation_part *part)
 {
-    double residual = largest_residual(v), last = HUGE_VAL;
+    const struct articulation_view *v = &part->view;
+    double residual = largest_residual(part), last = HUGE_VAL;
     for (int pass = 0; pass < ARTICULATION_REFINEMENTS && residual > ARTICULATION_EXACT && residual < last / 2;
          ++pass) {
         last = residual;
-        sadmm_articulation_part_solve_rows(v, true);
-        residual = largest_residual(v);
+        sadmm_articulation_part_solve_rows(part, true);
+        residual = largest_residual(part);
     }
-    return !sadmm_articulation_part_change_rows(v);
+    return !change_rows(v, false);
 }
 
-bool sadmm_articulation_part_solve(const struct articulation_view *v, const uint8_t *earlier, bool exact)
+bool sadmm_articulation_part_solve(struct articulation_part *part, const uint8_t *earlier, bool exact)
 {
+    const struct articulation_view *v = &part->view;
+    const int passes = part->by_tree ? ARTICULATION_TREE_PASSES : ARTICULATION_PASSES;
     bool solved = false;
-    sadmm_articulation_part_free(v);
-    sadmm_articulation_part_begin_rows(v, earlier);
-    for (int pass = 0; pass < ARTICULATION_PASSES && !solved; ++pass) {
-        sadmm_articulation_part_factorize(v);
-        sadmm_articulation_part_solve_rows(v, false);
-        if (sadmm_articulation_part_change_rows(v)) continue;
+    if (!part->by_tree) free_bodies(v);
+    begin_rows(part, earlier);
+    for (int pass = 0; pass < passes && !solved; ++pass) {
+        sadmm_articulation_part_factorize(part);
+        sadmm_articulation_part_solve_rows(part, false);
+        if (yield_rows(part)) sadmm_articulation_part_solve_rows(part, false);
+        if (change_rows(v, part->by_tree && pass >= ARTICULATION_PASSES / 2)) continue;
         solved = true;
         if (exact) {
-            solved = refine(v);
+            solved = refine(part);
         } else if (needs_refinement(v)) {
-            sadmm_articulation_part_solve_rows(v, true);
-            solved = !sadmm_articulation_part_change_rows(v);
+            sadmm_articulation_part_solve_rows(part, true);
+            solved = !change_rows(v, false);
         }
     }
     return solved && is_finite(v);

@@ -5,6 +5,7 @@
 #define SADMM_CORE_SOLVE_ARTICULATION_PART_H
 
 #include "articulation_order.h"
+#include "articulation_tree.h"
 #include "core/model/articulation.h"
 #include "core/model/system.h"
 
@@ -15,11 +16,16 @@ extern "C" {
 struct articulation_part {
     struct articulation_view view; /* arrays in `work` of sadmm_articulations */
     double *impulse;         /* bodies x 6, in lists of all parts: J^T lambda; */
+    double *without;         /* the residual without contacts; */
     double *kept_velocity;   /* that before the iterations */
+    struct articulation_tree tree;
+    bool by_tree;            /* this call's rows are solved by it; else by the sparse factor */
     bool loop;               /* its joints are more than hang it together */
     double speed;            /* that its impulses change it by; 0: it is not solved */
     bool left;               /* it is not this call's */
-    bool touched;            /* by a contact */
+    bool touched;            /* by a contact; */
+    int32_t points;          /* by so many points */
+    bool loaded;             /* and solved for the contacts' impulses as they are, without their weight */
     bool kept;               /* solved before the iterations: */
     uint8_t *kept_state;     /* rows; in `kept_states` */
 };
@@ -33,12 +39,17 @@ struct sadmm_articulations {
     bool loops;             /* a part has one */
     int32_t *part, *entry;  /* bodies: the part, -1: of none; number in it */
     double *work;           /* of all views */
-    double *impulse;        /* bodies of parts x 6 */
+    struct articulation_node *nodes; /* of all trees: bodies of parts */
+    int32_t *tree_numbers;  /* node_of, joint */
+    uint8_t *roles;         /* of rows of columns, and their states in factors */
+    double *directions;     /* x 6 */
+    double *impulse;        /* bodies of parts x 6; again: without contacts */
     bool kept;              /* velocities and multipliers from before the iterations are in: */
     double *kept_velocity, *kept_lambda; /* bodies of parts x 6; rows */
     uint8_t *kept_states;                /* columns x SADMM_MAX_ROWS of all parts */
     size_t bodies_capacity, part_capacity, entry_capacity, parts_capacity, work_capacity, impulse_capacity,
-        kept_velocity_capacity, kept_lambda_capacity, kept_states_capacity;
+        kept_velocity_capacity, kept_lambda_capacity, kept_states_capacity, nodes_capacity, tree_number_capacity,
+        role_capacity, direction_capacity;
 };
 
 /* Goes through the rows of a part: r, which is row `from` of the system; slots as of sadmm_articulations_solve. */
@@ -52,23 +63,21 @@ struct sadmm_articulations {
 void sadmm_articulation_part_load(struct articulation_part *part, const struct sadmm_system *system,
                                   const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots);
 
-/* The factors of the bodies' A + C, and their response to the residual: the free change. */
-void sadmm_articulation_part_free(const struct articulation_view *v);
+/* For G (ncp.h): the sparse factor with rows in their states; multipliers of rows inside their bounds, for what the others
+ * are. again: from what they are. */
+void sadmm_articulation_part_factorize(struct articulation_part *part);
+void sadmm_articulation_part_solve_rows(const struct articulation_part *part, bool again);
 
-/* Where rows are before the first pass. earlier: states of a solve of this step; NULL: none. */
-void sadmm_articulation_part_begin_rows(const struct articulation_view *v, const uint8_t *earlier);
+/* A part solved by its tree that was loaded before, for other impulses of contacts (bodies x 6). */
+void sadmm_articulation_part_put_contacts(const struct articulation_part *part, const double *loads);
 
-/* Rows that left their bounds, or are at them against their law: did any change its state? */
-bool sadmm_articulation_part_change_rows(const struct articulation_view *v);
+/* All of it but loading. earlier: states of a solve of this step, NULL: none. exact: hard rows are refined to rounding,
+ * not only where their regularisation leaves much. Is it solved? Rows may still change their states, or numbers are not
+ * finite. */
+bool sadmm_articulation_part_solve(struct articulation_part *part, const uint8_t *earlier, bool exact);
 
-void sadmm_articulation_part_factorize(const struct articulation_view *v);
-
-/* Multipliers of rows inside their bounds, for what the others are. again: from what they are. */
-void sadmm_articulation_part_solve_rows(const struct articulation_view *v, bool again);
-
-/* All of it but loading. exact: hard rows are refined to rounding, not only where their regularisation leaves much. Is
- * it solved? Rows may still change their states, or numbers are not finite. */
-bool sadmm_articulation_part_solve(const struct articulation_view *v, const uint8_t *earlier, bool exact);
+/* How a row's rate responds to its multiplier, were its bodies free: of that which responds less, twice. */
+double sadmm_articulation_part_scale(const struct articulation_part *part, int32_t r);
 
 /* Its velocities and multipliers to the system. */
 void sadmm_articulation_part_store(const struct articulation_view *v, const struct sadmm_system *system,

@@ -18,6 +18,8 @@ static const double ENOUGH = 1e-9, AIM = 1e-10, NEWTON_AIM = 1e-13;
 static const double REGULARISATION = 3e-12;
 /* Multiplications for an island, so that one that does not come to an end takes some 10 ms. */
 static const double BUDGET = 4e7;
+/* How many times larger impulses may be that are no solution. */
+static const double MOST_GROWTH = 4;
 /* Active rows, solved for together with the contacts, since they changed their states; how often it goes from contacts
  * to rows and back, in all and without coming nearer though no row changed; and passes of the inner rows. */
 enum { MOST_ACTIVE = 96, MOST_ROUNDS = 40, MOST_IDLE = 4, MOST_PASSES = 6 };
@@ -54,13 +56,20 @@ struct sadmm_ncp {
     int32_t *parts;            /* of the articulations */
     double *numbers;           /* lambda, u, G, Newton's work; the best */
     double *rows;              /* multipliers of the system's rows, the best */
+    int32_t *first_node;       /* (parts + 1) of trees (below); the last: of bodies without joints */
+    struct ncp_passed *passed; /* of each number */
+    const struct ncp_passed **passed_at; /* by node: of one number */
+    int32_t *passed_counts;
+    bool known;                /* the lists are of this (sub-)step, from before its iterations; then */
+    double *kept;              /* velocities, multipliers of rows, impulses at that time */
+    size_t kept_capacity, first_node_capacity, passed_capacity, passed_at_capacity, passed_count_capacity;
     uint8_t *states;           /* SADMM_MAX_ROWS a column, of the parts one after the other: those that G is for */
     size_t label_capacity, number_capacity, body_list_capacity, points_capacity, first_capacity, kind_capacity,
         pair_list_capacity, body_capacity, contact_capacity, law_capacity, part_capacity, numbers_capacity, row_capacity,
         state_capacity;
 };
 
-enum island_kind { ISLAND_ARTICULATED = 1, ISLAND_LEFT = 2 };
+enum island_kind { ISLAND_ARTICULATED = 1, ISLAND_LEFT = 2, ISLAND_SOLVED = 4 };
 
 /* The island that is solved. */
 struct island {
@@ -74,6 +83,7 @@ struct island {
     struct ncp_dense dense;
     double *best_lambda, *best_velocity; /* contacts x 3; bodies x 6 */
     double best;                         /* natural map, m/s */
+    bool again;                          /* after the iterations */
     double regularisation;               /* of contacts, a share of their response */
 };
 
@@ -86,7 +96,8 @@ void sadmm_ncp_destroy(struct sadmm_ncp *d)
 {
     if (!d) return;
     void *blocks[] = {d->label,  d->number,   d->next_body, d->points, d->first_pair, d->kind, d->next_pair,
-                      d->bodies, d->contacts, d->laws,      d->parts,  d->numbers,    d->rows, d->states};
+                      d->bodies, d->contacts, d->laws,      d->parts,  d->numbers,    d->rows, d->states,
+                      d->kept, d->first_node, d->passed, (void *)d->passed_at, d->passed_counts};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(d);
 }
@@ -245,9 +256,14 @@ static bool solve_for_impulses(struct island *s, uint8_t *states)
         struct articulation_part *part = part_of(s, k);
         const struct articulation_view *v = &part->view;
         const size_t rows = (size_t)(SADMM_MAX_ROWS * v->s.columns);
-        sadmm_articulation_part_load(part, s->system, s->settings, s->slots);
+        if (part->loaded) {
+            sadmm_articulation_part_put_contacts(part, part->impulse);
+        } else {
+            sadmm_articulation_part_load(part, s->system, s->settings, s->slots);
+            part->loaded = part->by_tree;
+        }
         fix_active(s, k);
-        solved = sadmm_articulation_part_solve(v, states, true) && solved;
+        solved = sadmm_articulation_part_solve(part, states, true) && solved;
         memcpy(states, v->state, rows);
         states += rows;
         for (int32_t e = 0; e < v->s.bodies; ++e) {
@@ -289,7 +305,7 @@ static bool activate(struct island *s, const uint8_t *before, const uint8_t *aft
             s->active_row[s->active] = (struct ncp_active){k, r};
             s->d->laws[s->contacts + s->active] = (struct ncp_law){
                 .first = number, .count = 1, .lo = v->rows[r].lo, .hi = v->rows[r].hi,
-                .response = v->rows[r].gain * articulation_scale(v, r) + v->rows[r].compliance};
+                .response = v->rows[r].gain * sadmm_articulation_part_scale(part_of(s, k), r) + v->rows[r].compliance};
             s->dense.lambda[number] = articulation_bounded(v, r);
             s->dense.u[number] = articulation_row_residual(v, r, true, true);
             ++s->active;
@@ -375,9 +391,11 @@ static void respond(const struct island *s, const struct impulse_side side[2], i
     for (int k = 0; k < sides; ++k) {
         const struct articulation_view *v = view_of(s, &side[k]);
         if (!v || (k == 1 && view_of(s, &side[0]) == v)) continue;
+        struct articulation_part *part =
+            &s->articulations->parts[s->articulations->part[s->d->bodies[side[k].number].body]];
         /* With a refinement: along what rows resist, their regularisation is all there is. */
-        sadmm_articulation_part_solve_rows(v, false);
-        sadmm_articulation_part_solve_rows(v, true);
+        sadmm_articulation_part_solve_rows(part, false);
+        sadmm_articulation_part_solve_rows(part, true);
     }
 }
 
@@ -390,8 +408,175 @@ static void take_back(const struct island *s, const struct impulse_side side[2],
     }
 }
 
+/* ---- G of trees --------------------------------------------------------------------------------------------------- */
+
+/* A column of G as its load goes to the roots: with a load's shares z along the joints on its way, and H z of each,
+ *
+ *     G_rc = sum z_r H z_c over the nodes that both have passed
+ *
+ * Nodes have numbers of their own in the island: those of its parts' trees one after the other, then bodies without
+ * joints, which are roots. */
+struct ncp_passed {
+    int32_t node, free;
+    double along[6], response[6];
+};
+
+static int32_t node_of(const struct island *s, int32_t number, int32_t *part)
+{
+    const int32_t i = s->d->bodies[number].body;
+    *part = s->articulations->part[i];
+    if (*part < 0) return s->d->first_node[s->parts] + number;
+    for (int32_t k = 0; k < s->parts; ++k)
+        if (s->d->parts[k] == *part) {
+            *part = k;
+            break;
+        }
+    return s->d->first_node[*part] + part_of(s, *part)->tree.node_of[s->articulations->entry[i]];
+}
+
+/* From a node's load, in: and its number -1 where nothing acts on it, to what comes next on its way. */
+struct way {
+    int32_t node, part; /* -1: at its end */
+    double load[6];
+};
+
+static void begin_way(const struct island *s, int32_t number, const double *row, struct way *way)
+{
+    way->node = node_of(s, number, &way->part);
+    memcpy(way->load, row, sizeof way->load);
+}
+
+static void pass_free(const struct island *s, struct way *way, struct ncp_passed *to)
+{
+    const struct ncp_body *body = &s->d->bodies[way->node - s->d->first_node[s->parts]];
+    to->node = way->node, to->free = 6;
+    memcpy(to->along, way->load, sizeof to->along);
+    ldl6_solve(body->factor, way->load, to->response);
+    way->node = -1;
+}
+
+static void pass_node(const struct island *s, struct way *way, const double *along, struct ncp_passed *to)
+{
+    if (way->part < 0) {
+        pass_free(s, way, to);
+        return;
+    }
+    const struct articulation_tree *tree = &part_of(s, way->part)->tree;
+    const struct articulation_node *node = &tree->node[way->node - s->d->first_node[way->part]];
+    const struct articulation_step step = sadmm_articulation_tree_pass(node, way->load, along);
+    to->node = way->node, to->free = node->free;
+    memcpy(to->along, step.along, sizeof to->along);
+    memcpy(to->response, step.response, sizeof to->response);
+    way->node = node->parent >= 0 && node->bound ? s->d->first_node[way->part] + node->parent : -1;
+}
+
+/* Both ways at once: children come before their parents, and what two ways have in common is one. */
+static int32_t pass_all(const struct island *s, struct way way[2], const double *along, struct ncp_passed *to)
+{
+    int32_t count = 0;
+    while (way[0].node >= 0 || way[1].node >= 0) {
+        if (way[0].node == way[1].node) {
+            for (int k = 0; k < 6; ++k) way[0].load[k] += way[1].load[k];
+            way[1].node = -1;
+        }
+        const int first = way[0].node < 0 || (way[1].node >= 0 && way[1].node < way[0].node);
+        pass_node(s, &way[first], along, &to[count++]);
+        along = NULL;
+    }
+    return count;
+}
+
+static int32_t pass_column(const struct island *s, int32_t number, struct ncp_passed *to)
+{
+    struct way way[2] = {{.node = -1}, {.node = -1}};
+    if (number < 3 * s->contacts) {
+        const struct ncp_contact *c = &s->d->contacts[number / 3];
+        for (int k = 0; k < 2; ++k)
+            if (c->body[k] >= 0) begin_way(s, c->body[k], c->row[k][number % 3], &way[k]);
+        return pass_all(s, way, NULL, to);
+    }
+    const struct ncp_active *active = &s->active_row[number - 3 * s->contacts];
+    const struct articulation_tree *tree = &part_of(s, active->part)->tree;
+    way[0].part = active->part;
+    way[0].node = s->d->first_node[active->part] + sadmm_articulation_tree_node(tree, &part_of(s, active->part)->view, active->r);
+    return pass_all(s, way, tree->direction + 6 * active->r, to);
+}
+
+static double gain_of(const struct island *s, int32_t number)
+{
+    if (number < 3 * s->contacts) return 1;
+    const struct ncp_active *active = &s->active_row[number - 3 * s->contacts];
+    return part_of(s, active->part)->view.rows[active->r].gain;
+}
+
+static double add_own(const struct island *s, int32_t number)
+{
+    if (number < 3 * s->contacts) return s->regularisation * s->d->laws[number / 3].response;
+    const struct ncp_active *active = &s->active_row[number - 3 * s->contacts];
+    return part_of(s, active->part)->view.rows[active->r].compliance;
+}
+
+static void find_first_nodes(struct island *s)
+{
+    int32_t first = 0;
+    for (int32_t k = 0; k < s->parts; ++k) {
+        s->d->first_node[k] = first;
+        first += part_of(s, k)->tree.nodes;
+    }
+    s->d->first_node[s->parts] = first;
+}
+
+/* Nodes on the way of a number, at most. */
+static int32_t longest_way(const struct island *s)
+{
+    int32_t most = 1;
+    for (int32_t k = 0; k < s->parts; ++k)
+        if (part_of(s, k)->tree.depth > most) most = part_of(s, k)->tree.depth;
+    return 2 * most;
+}
+
+static void make_tree_responses(struct island *s, double *G)
+{
+    const int32_t n = s->dense.size, room = longest_way(s), nodes = s->d->first_node[s->parts] + s->bodies;
+    const struct ncp_passed **at = s->d->passed_at;
+    int32_t *counts = s->d->passed_counts;
+    memset(at, 0, (size_t)nodes * sizeof *at);
+    s->dense.budget -= (double)n * n * room;
+    for (int32_t k = 0; k < s->parts; ++k) sadmm_articulation_part_factorize(part_of(s, k));
+    for (int32_t c = 0; c < n; ++c) {
+        struct ncp_passed *own = s->d->passed + (size_t)c * (size_t)room;
+        counts[c] = pass_column(s, c, own);
+        for (int32_t i = 0; i < counts[c]; ++i) at[own[i].node] = &own[i];
+        for (int32_t r = 0; r <= c; ++r) {
+            const struct ncp_passed *other = s->d->passed + (size_t)r * (size_t)room;
+            double sum = 0;
+            for (int32_t i = 0; i < counts[r]; ++i) {
+                const struct ncp_passed *common = at[other[i].node];
+                for (int j = 0; common && j < common->free; ++j) sum += other[i].along[j] * common->response[j];
+            }
+            G[(size_t)r * (size_t)n + (size_t)c] = gain_of(s, r) * sum;
+            G[(size_t)c * (size_t)n + (size_t)r] = gain_of(s, c) * sum;
+        }
+        G[(size_t)c * (size_t)n + (size_t)c] += add_own(s, c);
+        for (int32_t i = 0; i < counts[c]; ++i) at[own[i].node] = NULL;
+    }
+}
+
+static bool are_trees(const struct island *s)
+{
+    for (int32_t k = 0; k < s->parts; ++k)
+        if (!part_of(s, k)->by_tree) return false;
+    return true;
+}
+
+/* ---- G otherwise -------------------------------------------------------------------------------------------------- */
+
 static void make_responses(struct island *s, double *G)
 {
+    if (are_trees(s)) {
+        make_tree_responses(s, G);
+        return;
+    }
     const size_t n = (size_t)s->dense.size;
     int32_t columns = 0;
     for (int32_t k = 0; k < s->parts; ++k) columns += part_of(s, k)->view.s.columns;
@@ -581,11 +766,13 @@ static bool make_room(struct sadmm_ncp *d, const struct sadmm_articulations *art
                       const struct sadmm_system *system, const struct sadmm_settings *settings)
 {
     const size_t n = (size_t)system->body_count;
-    size_t points = 0, states = 0;
+    size_t points = 0, states = 0, depth = 1;
     for (size_t i = 0; i < n; ++i)
         if (is_taken(d, (int32_t)i, settings) && (size_t)d->points[i] > points) points = (size_t)d->points[i];
-    for (int32_t k = 0; k < articulations->order.parts; ++k)
+    for (int32_t k = 0; k < articulations->order.parts; ++k) {
         states += (size_t)(SADMM_MAX_ROWS * articulations->parts[k].view.s.columns);
+        if ((size_t)articulations->parts[k].tree.depth > depth) depth = (size_t)articulations->parts[k].tree.depth;
+    }
     const size_t size = 3 * points + MOST_ACTIVE;
     return sadmm_grow_empty(&d->bodies, &d->body_capacity, n, sizeof *d->bodies) &&
            sadmm_grow_empty(&d->contacts, &d->contact_capacity, points, sizeof *d->contacts) &&
@@ -593,8 +780,31 @@ static bool make_room(struct sadmm_ncp *d, const struct sadmm_articulations *art
            sadmm_grow_empty(&d->parts, &d->part_capacity, (size_t)articulations->order.parts, sizeof *d->parts) &&
            sadmm_grow_empty(&d->numbers, &d->numbers_capacity,
                             3 * size + size * size + ncp_work_size(size) + 6 * n, sizeof *d->numbers) &&
+           sadmm_grow_empty(&d->first_node, &d->first_node_capacity, (size_t)articulations->order.parts + 1,
+                            sizeof *d->first_node) &&
+           sadmm_grow_empty(&d->passed, &d->passed_capacity, 2 * depth * size, sizeof *d->passed) &&
+           sadmm_grow_empty(&d->passed_at, &d->passed_at_capacity, 2 * n, sizeof *d->passed_at) &&
+           sadmm_grow_empty(&d->passed_counts, &d->passed_count_capacity, size, sizeof *d->passed_counts) &&
            sadmm_grow_empty(&d->rows, &d->row_capacity, system->rows->row_count, sizeof *d->rows) &&
            sadmm_grow_empty(&d->states, &d->state_capacity, 2 * states, sizeof *d->states);
+}
+
+/* The largest speed that an impulse of the contacts makes by itself, or that there is: m/s. */
+static double size_of(const struct island *s, const double *lambda)
+{
+    double most = 0;
+    for (int32_t n = 0; n < 3 * s->contacts; ++n)
+        most = fmax(most, fmax(fabs(lambda[n]) * s->d->laws[n / 3].response, fabs(s->dense.u[n])));
+    return most;
+}
+
+/* Is what was found taken? A solution is. Where there is none, bodies that are wedged say, impulses may grow without
+ * bound and the natural map still sink a little: what is nearer to the laws has to be of impulses like those it is
+ * instead of. Before the iterations it is left to them. */
+static bool is_better(const struct island *s, double before, double size_before)
+{
+    if (!(s->best > ENOUGH)) return true;
+    return s->again && s->best < before && size_of(s, s->best_lambda) <= MOST_GROWTH * size_before;
 }
 
 static bool solve_island(struct island *s, int32_t label)
@@ -616,44 +826,134 @@ static bool solve_island(struct island *s, int32_t label)
         for (int32_t k = 0; k < contacts->pairs[p].count; ++k) add_contact(s, p, k);
     s->dense.laws = s->contacts;
     s->dense.size = 3 * s->contacts;
+    find_first_nodes(s);
     find_contact_velocities(s);
     const double before = fmax(ncp_natural_map(&s->dense), momentum_residual(s));
-    if (!(before > ENOUGH)) return false;
+    if (!(before > ENOUGH)) {
+        d->kind[label] |= ISLAND_SOLVED;
+        return false;
+    }
+    const double size_before = size_of(s, s->dense.lambda);
     size_t rows = 0;
     for (int32_t k = 0; k < s->parts; ++k) rows += (size_t)(SADMM_MAX_ROWS * part_of(s, k)->view.s.columns);
     s->best = before;
     s->dense.budget = BUDGET;
     search(s, G, d->states, d->states + rows, rows);
-    if (!(s->best < before)) return false;
+    for (int32_t k = 0; k < s->parts; ++k) part_of(s, k)->loaded = false; /* bounds of active rows are not their own */
+    if (!is_better(s, before, size_before)) return false;
     store_best(s);
+    if (!(s->best > ENOUGH)) d->kind[label] |= ISLAND_SOLVED;
     return true;
 }
 
-sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, struct sadmm_articulations *articulations,
-                             const struct sadmm_system *system, const struct sadmm_row_constraint *slots,
-                             const struct sadmm_settings *settings, int32_t *solved, struct sadmm_error *error)
+static bool make_lists(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, const struct sadmm_system *system)
 {
-    struct sadmm_system down = *system;
-    struct island s = {.d = ncp, .articulations = articulations, .system = &down, .slots = slots, .settings = settings};
-    const size_t n = (size_t)system->body_count;
-    down.support_motion = NULL;
-    *solved = 0;
-    if (system->contacts->pair_count == 0) return SADMM_OK;
-    if (!sadmm_grow_empty(&ncp->label, &ncp->label_capacity, n, sizeof *ncp->label) ||
-        !sadmm_grow_empty(&ncp->number, &ncp->number_capacity, n, sizeof *ncp->number) ||
-        !sadmm_grow_empty(&ncp->next_body, &ncp->body_list_capacity, n, sizeof *ncp->next_body) ||
-        !sadmm_grow_empty(&ncp->points, &ncp->points_capacity, n, sizeof *ncp->points) ||
-        !sadmm_grow_empty(&ncp->first_pair, &ncp->first_capacity, n, sizeof *ncp->first_pair) ||
-        !sadmm_grow_empty(&ncp->kind, &ncp->kind_capacity, n, sizeof *ncp->kind) ||
-        !sadmm_grow_empty(&ncp->next_pair, &ncp->pair_list_capacity, system->contacts->pair_count,
-                          sizeof *ncp->next_pair))
-        return sadmm_fail_memory(error, "islands of the dense contact solve");
-    sadmm_islands(&down, ncp->label);
-    list_islands(ncp, &down);
-    describe_islands(ncp, articulations, &down, slots);
-    if (!make_room(ncp, articulations, &down, settings))
-        return sadmm_fail_memory(error, "islands of the dense contact solve");
+    const size_t n = (size_t)system->body_count, pairs = system->contacts->pair_count;
+    if (!sadmm_grow_empty(&d->label, &d->label_capacity, n, sizeof *d->label) ||
+        !sadmm_grow_empty(&d->number, &d->number_capacity, n, sizeof *d->number) ||
+        !sadmm_grow_empty(&d->next_body, &d->body_list_capacity, n, sizeof *d->next_body) ||
+        !sadmm_grow_empty(&d->points, &d->points_capacity, n, sizeof *d->points) ||
+        !sadmm_grow_empty(&d->first_pair, &d->first_capacity, n, sizeof *d->first_pair) ||
+        !sadmm_grow_empty(&d->kind, &d->kind_capacity, n, sizeof *d->kind) ||
+        !sadmm_grow_empty(&d->next_pair, &d->pair_list_capacity, pairs, sizeof *d->next_pair))
+        return false;
+    sadmm_islands(system, d->label);
+    list_islands(d, system);
+    describe_islands(d, input->articulations, system, input->slots);
+    return make_room(d, input->articulations, system, input->settings);
+}
+
+/* Islands without contacts whose rows the block solve has solved, and bodies without either, which are given A^-1 b. */
+static void find_solved_without_contacts(struct sadmm_ncp *d, const struct sadmm_ncp_input *input)
+{
+    const struct sadmm_articulations *articulations = input->articulations;
+    const struct sadmm_system *system = input->system;
+    for (int32_t k = 0; k < articulations->order.parts; ++k)
+        if (!articulations->parts[k].kept) d->kind[d->label[articulations->parts[k].view.s.body[0]]] |= ISLAND_LEFT;
+    for (int32_t i = 0; i < system->body_count; ++i) {
+        const int32_t label = d->label[i];
+        if (d->points[label] > 0 || (d->kind[label] & ISLAND_LEFT)) continue;
+        d->kind[label] |= ISLAND_SOLVED;
+        if (articulations->part[i] >= 0 || d->kind[label] & ISLAND_ARTICULATED) continue;
+        double A[36], b[6];
+        sadmm_system_body(system, input->settings, i, A, b);
+        ldl6_factor(A, A);
+        ldl6_solve(A, b, system->velocity + 6 * (size_t)i);
+    }
+}
+
+static int32_t solve_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, bool again)
+{
+    struct island s = {.d = d, .articulations = input->articulations, .system = input->system, .slots = input->slots,
+                       .settings = input->settings, .again = again};
+    int32_t solved = 0;
+    for (int32_t i = 0; i < input->system->body_count; ++i)
+        if (d->label[i] == i && is_taken(d, i, input->settings)) solved += solve_island(&s, i);
+    return solved;
+}
+
+/* What solved islands are is kept while the iterations go on with others. */
+static bool keep(struct sadmm_ncp *d, const struct sadmm_system *system)
+{
+    const size_t numbers = 6 * (size_t)system->body_count, rows = system->rows->row_count,
+                 points = system->contacts->point_count;
+    if (!sadmm_grow_empty(&d->kept, &d->kept_capacity, numbers + rows + 3 * points, sizeof *d->kept)) return false;
+    memcpy(d->kept, system->velocity, numbers * sizeof *d->kept);
+    memcpy(d->kept + numbers, system->rows->lambda, rows * sizeof *d->kept);
+    for (size_t k = 0; k < points; ++k)
+        memcpy(d->kept + numbers + rows + 3 * k, system->contacts->points[k].impulse, 3 * sizeof *d->kept);
+    return true;
+}
+
+static bool is_solved(const struct sadmm_ncp *d, int32_t body_a, int32_t body_b)
+{
+    return (body_a >= 0 || body_b >= 0) && d->kind[island_of(d, body_a, body_b)] & ISLAND_SOLVED;
+}
+
+static void take_kept(const struct sadmm_ncp *d, const struct sadmm_system *system)
+{
+    const size_t numbers = 6 * (size_t)system->body_count, rows = system->rows->row_count;
     for (int32_t i = 0; i < system->body_count; ++i)
-        if (ncp->label[i] == i && is_taken(ncp, i, settings)) *solved += solve_island(&s, i);
+        if (is_solved(d, i, i)) memcpy(system->velocity + 6 * (size_t)i, d->kept + 6 * (size_t)i, 6 * sizeof *d->kept);
+    for (size_t k = 0; k < system->rows->constraint_count; ++k) {
+        const struct sadmm_row_constraint *c = &system->rows->constraints[k];
+        if (is_solved(d, c->body_a, c->body_b))
+            memcpy(system->rows->lambda + c->first, d->kept + numbers + (size_t)c->first,
+                   (size_t)c->count * sizeof *d->kept);
+    }
+    for (size_t p = 0; p < system->contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &system->contacts->pairs[p];
+        for (int32_t k = pair->first; is_solved(d, pair->body_a, pair->body_b) && k < pair->first + pair->count; ++k)
+            memcpy(system->contacts->points[k].impulse, d->kept + numbers + rows + 3 * (size_t)k,
+                   3 * sizeof *d->kept);
+    }
+}
+
+sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, bool *all, int32_t *solved,
+                             struct sadmm_error *error)
+{
+    const struct sadmm_system *system = input->system;
+    *solved = 0;
+    *all = true;
+    ncp->known = false;
+    if (!make_lists(ncp, input, system)) return sadmm_fail_memory(error, "islands of the dense contact solve");
+    find_solved_without_contacts(ncp, input);
+    *solved = solve_islands(ncp, input, false);
+    for (int32_t i = 0; i < system->body_count; ++i) *all = *all && is_solved(ncp, i, i);
+    if (!*all && !keep(ncp, system)) return sadmm_fail_memory(error, "islands of the dense contact solve");
+    ncp->known = true;
     return SADMM_OK;
 }
+
+sadmm_status sadmm_ncp_solve_again(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, int32_t *solved,
+                                   struct sadmm_error *error)
+{
+    *solved = 0;
+    if (ncp->known) take_kept(ncp, input->system);
+    else if (!make_lists(ncp, input, input->system))
+        return sadmm_fail_memory(error, "islands of the dense contact solve");
+    *solved = solve_islands(ncp, input, true);
+    return SADMM_OK;
+}
+
+void sadmm_ncp_begin(struct sadmm_ncp *ncp) { ncp->known = false; }

@@ -1,16 +1,17 @@
-/* The dense contact solve (NCP) of small islands with joints, which takes away what the iterations have left.
+/* The dense contact solve (NCP) of small islands with joints: contacts and joints at once, to rounding.
  *
  * An iteration brings the loads of mechanisms along one contact at a time, and may cycle where rows resist what
- * contacts push. So after the last iteration, and after the block direct solve of the rows (articulation.h), an island
- * with joints and at most settings->ncp_points contact points, whose natural map or momentum is off by more than
- * 1e-9 m/s, is solved as a whole:
+ * contacts push. So before the first iteration, and after the last one what is not solved by then, an island with joints
+ * and at most settings->ncp_points contact points, whose natural map or momentum is off by more than 1e-9 m/s, is solved
+ * as a whole:
  *
  *     G = J_c (A - rows)^-1 J_c^T, dense: the response of its contacts to each other, with rows in their present states
  *     contacts by semismooth Newton steps, where need be from an interior point (ncp_newton.h)
  *     rows again by those impulses; one that changes its state is active from then on: one more number of G
  *
- * until no row changes. What it ends with is taken where it is off by less than the iterations are; else all stays as it
- * is. In double. Islands are independent of each other. */
+ * until no row changes. What it ends with is taken where it is off by less than what there is; else all stays as it is.
+ * Islands that are solved before the first iteration need none, and keep their solution through those of others. In
+ * double. Islands are independent of each other. */
 #ifndef SADMM_CORE_SOLVE_NCP_H
 #define SADMM_CORE_SOLVE_NCP_H
 
@@ -28,12 +29,26 @@ struct sadmm_ncp;
 struct sadmm_ncp *sadmm_ncp_create(void);
 void sadmm_ncp_destroy(struct sadmm_ncp *ncp);
 
-/* system->velocity, impulses of system->contacts and multipliers of system->rows, in place. Velocities are those of the
- * world, not relative to supports. After sadmm_articulations_solve(after) of the same articulations and slots. solved:
- * islands that have changed. Errors: OUT_OF_MEMORY, nothing has changed. */
-sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, struct sadmm_articulations *articulations,
-                             const struct sadmm_system *system, const struct sadmm_row_constraint *slots,
-                             const struct sadmm_settings *settings, int32_t *solved, struct sadmm_error *error);
+/* A system of one (sub-)step: after the block solve of the same articulations and slots, before and after the
+ * iterations. Velocities are those of the world, not relative to supports. */
+struct sadmm_ncp_input {
+    struct sadmm_articulations *articulations;
+    const struct sadmm_system *system; /* velocity, impulses of contacts and multipliers of rows in place */
+    const struct sadmm_row_constraint *slots;
+    const struct sadmm_settings *settings;
+};
+
+/* A (sub-)step begins. */
+void sadmm_ncp_begin(struct sadmm_ncp *ncp);
+
+/* Before the iterations. all: every island is solved, those without constraints, too. solved: islands that have changed.
+ * Errors: OUT_OF_MEMORY, nothing has changed. */
+sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, bool *all, int32_t *solved,
+                             struct sadmm_error *error);
+
+/* After them: islands that were solved before are as they were then, others are solved from where they are. */
+sadmm_status sadmm_ncp_solve_again(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, int32_t *solved,
+                                   struct sadmm_error *error);
 
 #ifdef __cplusplus
 }

@@ -77,11 +77,13 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
     case SADMM_STAGE_PUSH_CHOICE:
     case SADMM_STAGE_PUSH_SOLVE:
     case SADMM_STAGE_PUSH_MOTION: return s->world && plan->points > 0;
-    case SADMM_STAGE_BLOCK_SOLVE: return s->world && plan->row_constraints > 0 && plan->warm_start;
-    case SADMM_STAGE_BLOCK_SOLVE_AGAIN:
+    case SADMM_STAGE_BLOCK_SOLVE:
+    case SADMM_STAGE_NCP_SOLVE: return s->world && plan->row_constraints > 0 && plan->warm_start;
+    case SADMM_STAGE_BLOCK_SOLVE_AGAIN: return s->world && plan->row_constraints > 0 && !s->solved;
+    case SADMM_STAGE_NCP_SOLVE_AGAIN:
+        return s->world && plan->row_constraints > 0 && s->settings->ncp_points > 0 && !s->solved;
     case SADMM_STAGE_REACTIONS:
     case SADMM_STAGE_JOINT_MOTION: return s->world && plan->row_constraints > 0;
-    case SADMM_STAGE_NCP_SOLVE: return s->world && plan->row_constraints > 0 && s->settings->ncp_points > 0;
     case SADMM_STAGE_TURN: return !sadmm_stages_in_last_substep(s);
     case SADMM_STAGE_WRENCHES: return s->world && plan->wrenches;
     case SADMM_STAGE_CERTIFY: return s->world && plan->certificate;
@@ -100,7 +102,8 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
 enum sadmm_phase sadmm_stage_phase(enum sadmm_stage_kind kind)
 {
     if (kind <= SADMM_STAGE_FIND || kind == SADMM_STAGE_TURN) return SADMM_PHASE_COLLIDE;
-    if (kind <= SADMM_STAGE_BLOCK_SOLVE || kind == SADMM_STAGE_COMMIT) return SADMM_PHASE_OTHER;
+    if (kind == SADMM_STAGE_BLOCK_SOLVE || kind == SADMM_STAGE_NCP_SOLVE) return SADMM_PHASE_SOLVE;
+    if (kind <= SADMM_STAGE_PUSH_CHOICE || kind == SADMM_STAGE_COMMIT) return SADMM_PHASE_OTHER;
     if (kind <= SADMM_STAGE_PENALTY) return SADMM_PHASE_ASSEMBLE;
     if (kind <= SADMM_STAGE_PUSH_SOLVE) return SADMM_PHASE_SOLVE;
     return kind == SADMM_STAGE_CERTIFY ? SADMM_PHASE_CERTIFY : SADMM_PHASE_FINISH;
@@ -118,6 +121,7 @@ static void begin_substep(struct sadmm_stages *s)
 bool sadmm_stages_next(struct sadmm_stages *s, struct sadmm_stage *stage)
 {
     while (s->next < SADMM_STAGE_COUNT) {
+        if (s->solved && s->next > SADMM_STAGE_NCP_SOLVE && s->next < SADMM_STAGE_INTEGRATE) s->next = SADMM_STAGE_INTEGRATE;
         const enum sadmm_stage_kind kind = (enum sadmm_stage_kind)s->next++;
         const int count = kind == SADMM_STAGE_ITERATE ? begin_batch(s) : 0;
         if (kind == SADMM_STAGE_BALANCE && !s->batch.last && !s->stopped) s->next = SADMM_STAGE_ITERATE;

@@ -1,12 +1,13 @@
 /* The schedule of a step: the paper's Fig. 4 as a list of stages, in order. It exists once.
  *
  *     step = GATHER  sub-step { TURN sub-step } *  CERTIFY COMMIT           (world level)
- *     sub-step = HITS FIND JOINT_ROWS PLAN PUSH_CHOICE BLOCK_SOLVE  solve  PUSH_SOLVE INTEGRATE BLOCK_SOLVE_AGAIN NCP_SOLVE
- *                REACTIONS KINEMATIC JOINT_MOTION PUSH_MOTION KEEP WRENCHES
+ *     sub-step = HITS FIND JOINT_ROWS PLAN PUSH_CHOICE BLOCK_SOLVE NCP_SOLVE  solve  PUSH_SOLVE INTEGRATE
+ *                BLOCK_SOLVE_AGAIN NCP_SOLVE_AGAIN REACTIONS KINEMATIC JOINT_MOTION PUSH_MOTION KEEP WRENCHES
  *     solve = INITIALISE BODIES CONTACTS ROWS PENALTY  iterations  ENERGY_LIMIT SOLUTION
  *     iterations = { ITERATE RESIDUALS CHECK WEIGHTS BALANCE } until the budget is spent or a check is met
  *
- * What the plan and the settings do not ask for is not in the list. Whoever executes it goes through it one stage after
+ * What the plan and the settings do not ask for is not in the list: no solve where BLOCK_SOLVE and NCP_SOLVE have solved
+ * all islands. Whoever executes it goes through it one stage after
  * the other: hosts run each stage (schedule.c, world/step.c), the CUDA backend records it into its graph. An executor
  * may begin a stage before its turn where all that the stage reads is there.
  */
@@ -27,6 +28,7 @@ enum sadmm_stage_kind {
     SADMM_STAGE_PLAN,               /* -    what this sub-step needs, found from its contacts and rows */
     SADMM_STAGE_PUSH_CHOICE,        /* -    islands that are pushed apart without a velocity (push.h) */
     SADMM_STAGE_BLOCK_SOLVE,        /* -    bodies with joints, directly (articulation.h), and what stiffens them */
+    SADMM_STAGE_NCP_SOLVE,          /* -    contacts of small islands with joints, exactly (ncp.h) */
     SADMM_STAGE_INITIALISE,         /* -    FAST: initial impulses (impulse_initialisation.h) */
     SADMM_STAGE_BODIES,             /* A    A_i, b_i */
     SADMM_STAGE_CONTACTS,           /* B    contacts in the solver's form */
@@ -43,7 +45,7 @@ enum sadmm_stage_kind {
     SADMM_STAGE_PUSH_SOLVE,         /* -    the second problem: velocities that push apart */
     SADMM_STAGE_INTEGRATE,          /* Q states after dt, each body's position correction included (math/trapezoid.h) */
     SADMM_STAGE_BLOCK_SOLVE_AGAIN,  /* -    bodies with joints, beside the contact impulses found */
-    SADMM_STAGE_NCP_SOLVE,          /* -    contacts of small islands with joints, exactly (ncp.h) */
+    SADMM_STAGE_NCP_SOLVE_AGAIN,    /* -    ... of those that were not solved before */
     SADMM_STAGE_REACTIONS,          /* -    what joints keep and report */
     SADMM_STAGE_KINEMATIC,          /* -    kinematic bodies and the targets of couplings go on */
     SADMM_STAGE_JOINT_MOTION,       /* -    states of bodies with joints after dt: correction, closing, momentum */
@@ -70,7 +72,8 @@ struct sadmm_stages {
     const struct sadmm_plan *plan;         /* read after PLAN */
     const struct sadmm_settings *settings; /* of a sub-step */
     bool world;                            /* a step; else a solve alone */
-    bool stopped;                          /* set by the executor: a check was met */
+    bool stopped;                          /* set by the executor: a check was met; */
+    bool solved;                           /* all islands are, before any iteration */
     int substep;                           /* from 0; after TURN: of the one that comes */
     int next;                              /* enum sadmm_stage_kind */
     struct {                               /* the iterations up to the next stage that needs their result */

@@ -30,6 +30,12 @@ struct sadmm_world_joint {
     int64_t set_at[SADMM_JOINT_UPDATES];
 };
 
+/* A dynamic body as joints have it in a (sub-)step, and in which one. */
+struct sadmm_world_joint_side {
+    struct joint_side side;
+    int64_t of;
+};
+
 /* K of a body's joints in its frame (model/stiffening.h); what they add to its inertia, kg m^2, world; its own
  * stiffness. */
 struct joint_stiffening {

@@ -86,6 +86,10 @@ struct sadmm_world {
         closing_cost_capacity, folding_capacity, row_left_capacity;
     struct sadmm_row_constraint *joint_constraints; /* all that joints may have, in order; most have rows in the step */
     size_t joint_constraint_count, joint_constraint_capacity;
+    struct acting_joint *acting_joints;       /* by slot: in the (sub-)step at hand; */
+    struct sadmm_world_joint_side *joint_sides; /* dynamic bodies: theirs, if it is of this number */
+    int64_t joint_sides_made;
+    size_t acting_joint_capacity, joint_side_capacity;
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
     uint16_t *joint_touch;                    /* of islands, at their labels (joint_move.c) */
     int32_t *joint_number;                    /* of bodies of islands whose momentum is restored (joint_momentum.c) */

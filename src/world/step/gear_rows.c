@@ -22,13 +22,13 @@ static struct gear_joint gear_joint_of(const sadmm_world *world, const struct sa
 }
 
 /* The row of a gear, on two bodies at most; *reaches: it can turn its wheels where they are. */
-static struct acting_gear act(const sadmm_world *world, const struct sadmm_world_gear *gear,
+static struct acting_gear act(sadmm_world *world, const struct sadmm_world_gear *gear,
                               const sadmm_settings *settings, bool *reaches)
 {
     const struct gear_joint joints[GEAR_JOINTS] = {gear_joint_of(world, gear, 0), gear_joint_of(world, gear, 1)};
     struct acting_gear out;
     for (int i = 0; i < GEAR_JOINTS; ++i)
-        out.joint[i] = sadmm_world_act_joint(world, &world->joints[gear->joint[i]], settings);
+        out.joint[i] = *sadmm_world_act_joint(world, (int32_t)gear->joint[i], settings);
     gear_act(joints, gear->def.offset, settings, &out);
     *reaches = out.count < GEAR_BODIES || gear_leave_carrier(joints, settings, &out);
     return out;

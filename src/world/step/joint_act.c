@@ -2,6 +2,10 @@
  * make their rows of it. */
 #include "joint_act.h"
 
+#include <string.h>
+
+#include "core/base/memory.h"
+
 struct joint_body sadmm_world_joint_body(const sadmm_world *world, int32_t slot)
 {
     struct joint_body out = {-1, NULL, false, false};
@@ -16,12 +20,42 @@ struct joint_body sadmm_world_joint_body(const sadmm_world *world, int32_t slot)
     return out;
 }
 
-struct acting_joint sadmm_world_act_joint(const sadmm_world *world, const struct sadmm_world_joint *joint,
-                                          const sadmm_settings *settings)
+static bool has_room(const sadmm_world *world) { return (size_t)world->dynamic_count <= 4 * world->joint_slots; }
+
+/* Of a dynamic body once a (sub-)step, however many joints it has; there is no room where few bodies have any. */
+static struct joint_side side_of(sadmm_world *world, struct joint_body body, const sadmm_settings *settings)
 {
+    if (body.system_body < 0 || !has_room(world)) return joint_side_of(body, settings);
+    struct sadmm_world_joint_side *kept = &world->joint_sides[body.system_body];
+    if (kept->of != world->joint_sides_made) {
+        kept->side = joint_side_of(body, settings);
+        kept->of = world->joint_sides_made;
+    }
+    return kept->side;
+}
+
+bool sadmm_world_begin_acting(sadmm_world *world)
+{
+    const size_t n = has_room(world) ? (size_t)world->dynamic_count : 0, before = world->joint_side_capacity;
+    if (!sadmm_grow_empty(&world->acting_joints, &world->acting_joint_capacity, world->joint_slots,
+                          sizeof *world->acting_joints) ||
+        !sadmm_grow_empty(&world->joint_sides, &world->joint_side_capacity, n, sizeof *world->joint_sides))
+        return false;
+    if (world->joint_side_capacity != before)
+        memset(world->joint_sides, 0, world->joint_side_capacity * sizeof *world->joint_sides);
+    ++world->joint_sides_made;
+    return true;
+}
+
+const struct acting_joint *sadmm_world_act_joint(sadmm_world *world, int32_t slot, const sadmm_settings *settings)
+{
+    const struct sadmm_world_joint *joint = &world->joints[slot];
+    struct acting_joint *acting = &world->acting_joints[slot];
     struct joint_body bodies[2] = {sadmm_world_joint_body(world, joint->body[0]),
                                    sadmm_world_joint_body(world, joint->body[1])};
     if (joint->coupling)
         bodies[0] = (struct joint_body){-1, &world->couplings[joint->coupling - 1].next.target, true, true};
-    return joint_act(&joint->def, joint->frame, bodies, settings);
+    for (int s = 0; s < 2; ++s) acting->side[s] = side_of(world, bodies[s], settings);
+    joint_act_between(&joint->def, joint->frame, bodies[0].target, settings, acting);
+    return acting;
 }

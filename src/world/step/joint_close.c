@@ -158,6 +158,9 @@ static bool add_rows(sadmm_world *world, const struct sadmm_row_constraint *plac
     const struct joint_closing c = closing_of(world, joint, settings);
     const int32_t first = sadmm_rows_add(rows, c.count, place->body_a, place->body_b);
     if (first < 0) return false;
+    double offset[3];
+    v3_store(v3_sub(c.geometry.arm_a, c.geometry.arm_b), offset);
+    sadmm_rows_set_rigid(rows, offset);
     for (int i = 0; i < c.count; ++i) {
         const size_t r = (size_t)(first + i);
         if (place->body_a >= 0) joint_closing_row(&c, i, 0, rows->jacobian_a + 6 * r);

@@ -46,12 +46,15 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
         !sadmm_grow(&world->start.multiplier, &world->start.multiplier_capacity, rows->row_count, all,
                     sizeof *world->start.multiplier))
         return false;
+    double offset[3];
+    v3_store(v3_sub(acting->middle.arm_a, acting->middle.arm_b), offset);
     for (int i = 0; i < laws->count; ++i) {
         const struct joint_law *law = &laws->law[i];
         if (i % SADMM_MAX_ROWS == 0) {
             const int left = laws->count - i, count = left < SADMM_MAX_ROWS ? left : SADMM_MAX_ROWS;
             if (sadmm_rows_add(rows, count, acting->side[0].system_body, acting->side[1].system_body) < 0)
                 return false;
+            sadmm_rows_set_rigid(rows, offset);
         }
         const size_t r = all - (size_t)laws->count + (size_t)i;
         for (int s = 0; s < 2; ++s) {
@@ -103,6 +106,8 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
     sadmm_rows_clear(&world->start.rows);
     world->joints_acting = world->couplings_acting = 0;
     world->joint_constraint_count = 0;
+    if (world->joint_count > 0 && !sadmm_world_begin_acting(world))
+        return sadmm_fail_memory(&world->error, "the joints' rows");
     for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
         struct sadmm_world_joint *joint = &world->joints[slot];
         struct all_laws laws;
@@ -112,10 +117,10 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
             if (!add_slots(world, joint, before)) return sadmm_fail_memory(&world->error, "the joints' rows");
             continue;
         }
-        const struct acting_joint acting = sadmm_world_act_joint(world, joint, settings);
-        find_laws(joint, &acting, settings, &laws);
+        const struct acting_joint *acting = sadmm_world_act_joint(world, (int32_t)slot, settings);
+        find_laws(joint, acting, settings, &laws);
         if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
-        if (!add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt) || !add_slots(world, joint, before))
+        if (!add_constraints(world, (int32_t)slot, acting, &laws, settings->dt) || !add_slots(world, joint, before))
             return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution says */
     }
@@ -170,19 +175,19 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
 {
     const struct sadmm_rows *rows = &world->start.rows;
     struct sadmm_world_joint *joint = NULL;
-    struct acting_joint acting;
+    const struct acting_joint *acting = NULL;
     for (size_t r = 0; r < world->joint_rows; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
         if (!joint || joint != &world->joints[source->joint]) {
-            if (joint) end_joint(world, joint, &acting, settings->dt);
+            if (joint) end_joint(world, joint, acting, settings->dt);
             joint = &world->joints[source->joint];
-            acting = sadmm_world_act_joint(world, joint, settings);
-            v3_store(acting.middle.point, joint->next.point);
+            acting = &world->acting_joints[source->joint];
+            v3_store(acting->middle.point, joint->next.point);
         }
         const double force = source->sign * rows->lambda[r] / settings->dt;
-        joint_keep_row(&joint->next, acting.middle.axis, source->role, source->coordinate, force);
+        joint_keep_row(&joint->next, acting->middle.axis, source->role, source->coordinate, force);
     }
-    if (joint) end_joint(world, joint, &acting, settings->dt);
+    if (joint) end_joint(world, joint, acting, settings->dt);
     sadmm_world_keep_gear_rows(world, settings->dt);
 }
 
