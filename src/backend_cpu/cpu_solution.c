@@ -3,8 +3,7 @@
 #include <string.h>
 
 #include "core/math/array3.h"
-#include "core/model/body_trapezoid.h"
-#include "core/model/rolling.h"
+#include "core/model/pair_touch.h"
 #include "core/model/system_terms.h"
 #include "cpu_rows.h"
 
@@ -72,51 +71,15 @@ static int bits_of_body(const struct sadmm_context *c, int32_t body)
     return body >= 0 ? atomic_load_explicit(&c->touch[body], memory_order_relaxed) : TOUCH_SUPPORTED | TOUCH_MOVED;
 }
 
-/* All is known that decides on the trapezoid correction. */
-static bool way_is_known(const struct trapezoid_touch *touch)
-{
-    return touch->island & TOUCH_PENETRATES && touch->body[0] & touch->body[1] & TOUCH_SUPPORTED;
-}
-
-/* What a pair's points touch (math/trapezoid.h), and what other pairs have found of that so far: bits that are known
- * are not looked for again. */
+/* What a pair's points touch, and what other pairs have found of that so far: bits that are known are not looked for
+ * again. */
 static struct trapezoid_touch touch_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair,
                                        int32_t label)
 {
-    static const double still[6];
-    const double dt = c->settings.dt, slop = c->settings.slop, *n = pair->normal;
-    const struct sadmm_trapezoid *a = &c->trapezoids[cpu_body(c, pair->body_a)],
-                                 *b = &c->trapezoids[cpu_body(c, pair->body_b)];
-    const double rest[2] = {a->rest, b->rest};
-    struct trapezoid_touch touch = {atomic_load_explicit(&c->touch[label], memory_order_relaxed),
-                                    {bits_of_body(c, pair->body_a), bits_of_body(c, pair->body_b)}};
-    touch.island |= body_contact_touch(pair->body_a >= 0 && pair->body_b >= 0, pair->friction);
-    touch.island |= a->touch | b->touch;
-    if (sadmm_pair_is_kinematic(c->system, pair)) touch.island |= TOUCH_PENETRATES;
-    for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
-        const struct sadmm_contact_point *point = &c->system->contacts->points[k];
-        const double *arm_a = point->arm_a, *arm_b = point->arm_b;
-        const double size[2] = {trapezoid_size_at(a->linear, a->angular, arm_a),
-                                trapezoid_size_at(b->linear, b->angular, arm_b)};
-        const double moves[2] = {trapezoid_size_at(a->moves_linear, a->moves_angular, arm_a),
-                                 trapezoid_size_at(b->moves_linear, b->moves_angular, arm_b)};
-        trapezoid_add_push(&touch, dot3(n, point->impulse), moves, rest);
-        if (trapezoid_is_still(size, dt, slop)) continue;
-        if (way_is_known(&touch)) {
-            if (touch.body[0] & touch.body[1] & TOUCH_MOVED) break;
-            continue;
-        }
-        const double *const v[2] = {
-            pair->body_a >= 0 ? &c->system->velocity[6 * (size_t)pair->body_a] : still,
-            pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still};
-        const double *const own[2] = {a->correction, b->correction};
-        const struct rolling_halfway at = rolling_halfway_of(
-            n, point, sadmm_migration_of(c->system->contacts->points, c->system->contacts->migrations, k));
-        double corrections[2];
-        const struct trapezoid_separation separation = body_point_way(&at, point, v, own, corrections);
-        trapezoid_add_way(&touch, separation, corrections, size, dt, slop);
-    }
-    return touch;
+    const struct trapezoid_touch known = {atomic_load_explicit(&c->touch[label], memory_order_relaxed),
+                                          {bits_of_body(c, pair->body_a), bits_of_body(c, pair->body_b)}};
+    return sadmm_pair_touch(c->system, &c->settings, pair, &c->trapezoids[cpu_body(c, pair->body_a)],
+                            &c->trapezoids[cpu_body(c, pair->body_b)], known);
 }
 
 /* Bodies have bits of their own, islands theirs at their labels: no bit means both. */
@@ -129,17 +92,11 @@ static void touch_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
     if (pair->body_b >= 0) add_bits(&c->touch[pair->body_b], touch.body[1], alone);
 }
 
-/* The correction that the body takes, in place of its own. */
 static void choose_trapezoid(const struct sadmm_context *c, size_t i, struct sadmm_trapezoid *trapezoid)
 {
-    trapezoid->kind =
-        body_trapezoid_kind(&c->system->rigid[i], atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
-                            atomic_load_explicit(&c->touch[i], memory_order_relaxed));
-    switch (trapezoid->kind) {
-    case TRAPEZOID_OFF: memset(trapezoid->correction, 0, sizeof trapezoid->correction); break;
-    case TRAPEZOID_SHARED: trapezoid_shared(c->settings.gravity, c->settings.dt, trapezoid->correction); break;
-    case TRAPEZOID_OWN: break;
-    }
+    sadmm_choose_trapezoid(&c->system->rigid[i], &c->settings,
+                           atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
+                           atomic_load_explicit(&c->touch[i], memory_order_relaxed), trapezoid);
 }
 
 struct integration {

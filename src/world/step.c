@@ -288,10 +288,8 @@ static sadmm_status integrate(struct host_step *step)
 {
     sadmm_world *world = step->world;
     sadmm_world_leave_support_frame(world, &step->system);
-    if (step->stages.solved) {
-        sadmm_world_integrate(world, &step->settings);
-        return SADMM_OK;
-    }
+    if (step->stages.solved)
+        return sadmm_world_integrate(world, &step->system, &step->settings, sadmm_ncp_islands(world->ncp));
     return world->kernels->integrate(world->context, world->next, &world->error);
 }
 

@@ -95,7 +95,7 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->shape_links, world->filtered_pairs, world->joints, world->couplings, world->gears,
                       world->joint_sources, world->joint_load, world->stiffening, world->stiffened,
                       world->opened, world->folding, world->row_left, world->closing_costs, world->closing_slots,
-                      world->acting_joints, world->joint_sides, world->joint_labels, world->joint_touch, world->joint_number,
+                      world->trapezoids, world->touch, world->acting_joints, world->joint_sides, world->joint_labels, world->joint_touch, world->joint_number,
                       world->joint_momentum, world->joint_constraints,
                       world->start.multiplier, world->last_start.multiplier,
                       world->collision_bodies, world->start.rigid, world->start.velocity,

@@ -758,7 +758,8 @@ static void describe_islands(struct sadmm_ncp *d, const struct sadmm_articulatio
 
 static bool is_taken(const struct sadmm_ncp *d, int32_t label, const struct sadmm_settings *settings)
 {
-    return d->kind[label] == ISLAND_ARTICULATED && d->points[label] > 0 && d->points[label] <= settings->ncp_points;
+    return !(d->kind[label] & (ISLAND_LEFT | ISLAND_SOLVED)) && d->points[label] > 0 &&
+           d->points[label] <= settings->ncp_points;
 }
 
 /* Room for any of them. */
@@ -868,8 +869,10 @@ static void find_solved_without_contacts(struct sadmm_ncp *d, const struct sadmm
 {
     const struct sadmm_articulations *articulations = input->articulations;
     const struct sadmm_system *system = input->system;
-    for (int32_t k = 0; k < articulations->order.parts; ++k)
-        if (!articulations->parts[k].kept) d->kind[d->label[articulations->parts[k].view.s.body[0]]] |= ISLAND_LEFT;
+    for (int32_t k = 0; k < articulations->order.parts; ++k) {
+        const int32_t label = d->label[articulations->parts[k].view.s.body[0]];
+        if (!articulations->parts[k].kept && d->points[label] == 0) d->kind[label] |= ISLAND_LEFT;
+    }
     for (int32_t i = 0; i < system->body_count; ++i) {
         const int32_t label = d->label[i];
         if (d->points[label] > 0 || (d->kind[label] & ISLAND_LEFT)) continue;
@@ -880,6 +883,23 @@ static void find_solved_without_contacts(struct sadmm_ncp *d, const struct sadmm
         ldl6_factor(A, A);
         ldl6_solve(A, b, system->velocity + 6 * (size_t)i);
     }
+}
+
+/* May every island be solved? Else those without joints are left to the iterations: they would not be spared. */
+static void choose_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input)
+{
+    bool all = true;
+    for (int32_t i = 0; i < input->system->body_count; ++i)
+        all = all && (d->kind[d->label[i]] & ISLAND_SOLVED || is_taken(d, d->label[i], input->settings));
+    for (int32_t i = 0; !all && i < input->system->body_count; ++i)
+        if (!(d->kind[i] & (ISLAND_ARTICULATED | ISLAND_SOLVED))) d->kind[i] |= ISLAND_LEFT;
+}
+
+/* Backends move bodies without joints by what their iterations end with. */
+static void leave_to_iterations(struct sadmm_ncp *d, const struct sadmm_system *system)
+{
+    for (int32_t i = 0; i < system->body_count; ++i)
+        if (!(d->kind[i] & ISLAND_ARTICULATED)) d->kind[i] = ISLAND_LEFT;
 }
 
 static int32_t solve_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, bool again)
@@ -938,10 +958,13 @@ sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input
     ncp->known = false;
     if (!make_lists(ncp, input, system)) return sadmm_fail_memory(error, "islands of the dense contact solve");
     find_solved_without_contacts(ncp, input);
+    choose_islands(ncp, input);
     *solved = solve_islands(ncp, input, false);
     for (int32_t i = 0; i < system->body_count; ++i) *all = *all && is_solved(ncp, i, i);
-    if (!*all && !keep(ncp, system)) return sadmm_fail_memory(error, "islands of the dense contact solve");
     ncp->known = true;
+    if (*all) return SADMM_OK;
+    leave_to_iterations(ncp, system);
+    if (!keep(ncp, system)) return sadmm_fail_memory(error, "islands of the dense contact solve");
     return SADMM_OK;
 }
 
@@ -952,8 +975,11 @@ sadmm_status sadmm_ncp_solve_again(struct sadmm_ncp *ncp, const struct sadmm_ncp
     if (ncp->known) take_kept(ncp, input->system);
     else if (!make_lists(ncp, input, input->system))
         return sadmm_fail_memory(error, "islands of the dense contact solve");
+    leave_to_iterations(ncp, input->system);
     *solved = solve_islands(ncp, input, true);
     return SADMM_OK;
 }
 
 void sadmm_ncp_begin(struct sadmm_ncp *ncp) { ncp->known = false; }
+
+const int32_t *sadmm_ncp_islands(const struct sadmm_ncp *ncp) { return ncp->label; }

@@ -46,6 +46,9 @@ void sadmm_ncp_begin(struct sadmm_ncp *ncp);
 sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, bool *all, int32_t *solved,
                              struct sadmm_error *error);
 
+/* The islands of that call, by their first body (core/model/islands.h); (body_count). */
+const int32_t *sadmm_ncp_islands(const struct sadmm_ncp *ncp);
+
 /* After them: islands that were solved before are as they were then, others are solved from where they are. */
 sadmm_status sadmm_ncp_solve_again(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, int32_t *solved,
                                    struct sadmm_error *error);

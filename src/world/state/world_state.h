@@ -90,6 +90,9 @@ struct sadmm_world {
     struct sadmm_world_joint_side *joint_sides; /* dynamic bodies: theirs, if it is of this number */
     int64_t joint_sides_made;
     size_t acting_joint_capacity, joint_side_capacity;
+    struct sadmm_trapezoid *trapezoids;       /* dynamic bodies, in steps without a solve, and one more; */
+    int32_t *touch;                           /* what their contacts say of them */
+    size_t trapezoid_capacity, touch_capacity;
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
     uint16_t *joint_touch;                    /* of islands, at their labels (joint_move.c) */
     int32_t *joint_number;                    /* of bodies of islands whose momentum is restored (joint_momentum.c) */

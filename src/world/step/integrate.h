@@ -4,7 +4,8 @@
 
 #include "world/state/world_state.h"
 
-/* world->next by world->velocity, of bodies that no contact is to be told from. */
-void sadmm_world_integrate(sadmm_world *world, const sadmm_settings *settings);
+/* world->next by world->velocity. label: of bodies' islands. Errors: OUT_OF_MEMORY. */
+sadmm_status sadmm_world_integrate(sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings,
+                                   const int32_t *label);
 
 #endif
