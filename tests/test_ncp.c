@@ -1,5 +1,5 @@
-/* Islands of the dense contact solve (NCP) after the iterations (core/solve/ncp.h): contacts and rows to rounding,
- * whatever the iterations. */
+/* Islands of the dense contact solve (NCP) before and after the iterations (core/solve/ncp.h): contacts and rows to
+ * rounding, whatever the iterations. */
 #include "scene_tools.h"
 #include "solvers.h"
 
@@ -356,6 +356,36 @@ static void join(sadmm_world *world, sadmm_joint_kind kind, sadmm_body_id a, sad
     MUST(world, sadmm_world_add_joint(world, &def, NULL));
 }
 
+/* Two cubes on a joint that fall over, a cube that slides beside them and one in the air: all islands are solved before any
+ * iteration, but those of what begins to touch or leaves. They do what the iterations would make of them, and what flies,
+ * and what slides to its rest, by the formulas. */
+START_TEST(worlds_of_small_islands_need_no_iteration)
+{
+    const double v = 2, g = 9.81, dt = 0.005, mu = 0.5;
+    sadmm_world *world = floor_world(_i);
+    const sadmm_body_id low = add_cube(world, 0, 0.25, 0.25, 1), high = add_cube(world, 0.1, 0.8, 0.25, 1),
+                        slides = add_cube(world, 5, 0.25, 0.25, 3), flies = add_cube(world, 20, 10, 0.1, 0.1);
+    join(world, SADMM_JOINT_SPHERICAL, low, high, 0.1, 0.525);
+    sadmm_body_state state = body_state(world, slides);
+    state.linear_velocity[0] = v;
+    MUST(world, sadmm_world_set_body_state(world, slides, &state));
+    int iterated = 0;
+    for (int step = 1; step <= 200; ++step) {
+        step_world(world, 1);
+        const sadmm_step_report report = world_report(world);
+        iterated += report.iterations > 0;
+        ck_assert(report.certificate.ncp_max < 2e-9 || report.iterations > 0);
+        /* by the mean of velocities: no error but rounding; f32 states are in double between steps */
+        ck_assert_double_lt(fabs(body_state(world, flies).position[2] - (10 - g * dt * dt * step * step / 2)), 1e-6);
+    }
+    ck_assert_int_le(iterated, 20);
+    ck_assert_double_lt(norm3(body_state(world, slides).linear_velocity), 1e-9);
+    /* v^2 / (2 mu g), within what a step at the speed of the start goes, and half as much when it stops */
+    ck_assert_double_lt(fabs(body_state(world, slides).position[0] - 5 - v * v / (2 * mu * g)), 1.5 * v * dt);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 /* Two mechanisms far apart on a floor, one part by a rope that is slack: a constraint without rows. They are left to the
  * iteration, until one is pulled and the rope is taut. */
 START_TEST(a_slack_rope_joins_two_islands)
@@ -489,6 +519,7 @@ int main(void)
     tcase_add_loop_test(tests, mechanisms_in_contact_are_exact, 0, 3 * SOLVERS);
     tcase_add_loop_test(tests, scenes_without_joints_are_as_before, 0, SOLVERS);
     tcase_add_loop_test(tests, momentum_is_kept, 0, SOLVERS);
+    tcase_add_loop_test(tests, worlds_of_small_islands_need_no_iteration, 0, SOLVERS);
     tcase_add_loop_test(tests, a_slack_rope_joins_two_islands, 0, SOLVERS);
     tcase_add_loop_test(tests, constraints_left_out_are_not_forgotten, 0, SOLVERS);
     tcase_add_loop_test(tests, wheels_bear_evenly, 0, SOLVERS);
