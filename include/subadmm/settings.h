@@ -148,7 +148,8 @@ static inline sadmm_settings sadmm_settings_default(void)
     return settings;
 }
 
-/* Residuals of eqs. (16) and (17), infinity norms, at the last iteration they were measured. */
+/* Residuals of eqs. (16) and (17), infinity norms, at the last iteration they were measured; 0 in a step in which every
+ * island was solved directly (ncp_points). */
 typedef struct sadmm_residual {
     double primal; /* m/s, |x - z| */
     double dual;   /* N s (linear) and N m s (angular), |A v - b - J^T lambda| */

@@ -199,8 +199,17 @@ static sadmm_status begin_articulations(struct host_step *step)
     return stiffened ? solve_articulations(step, world->stiffened, false) : SADMM_OK;
 }
 
+/* Nothing is left to iterate: any stop rule is met, and x and z are one (eqs. 16 and 17). */
+static void report_solved(struct host_step *step)
+{
+    const sadmm_settings *settings = &step->settings;
+    const sadmm_residual none = {0};
+    step->report.converged = settings->certificate_tolerance > 0 || settings->residual_tolerance > 0;
+    if (step->world->plan.residuals) step->report.residual = none;
+}
+
 /* The dense contact solve (NCP) of islands with joints (core/solve/ncp.h). Before the iterations no island of a world is
- * solved where some are seen from their supports, or where the iterations themselves are asked for. */
+ * solved where some are seen from their supports. */
 static sadmm_status solve_ncp(struct host_step *step, bool again)
 {
     sadmm_world *world = step->world;
@@ -214,9 +223,9 @@ static sadmm_status solve_ncp(struct host_step *step, bool again)
         step->ncp += solved;
         return SADMM_OK;
     }
-    if (step->system.support_motion || world->plan.residuals || step->pushed > 0) return SADMM_OK;
+    if (step->system.support_motion || step->pushed > 0) return SADMM_OK;
     TRY(sadmm_ncp_solve(world->ncp, &input, &step->stages.solved, &step->ncp, &world->error));
-    step->report.converged = step->stages.solved && step->settings.certificate_tolerance > 0;
+    if (step->stages.solved) report_solved(step);
     return SADMM_OK;
 }
 

@@ -41,7 +41,7 @@ void sadmm_articulation_part_load(struct articulation_part *part, const struct s
     }
     part->speed = articulation_speed(energy, mass);
     part->loaded = false;
-    part->by_tree = part->tree.nodes > 0 && sadmm_articulation_tree_begin(&part->tree, v, slots);
+    part->by_tree = settings->ncp_points > 0 && part->tree.nodes > 0 && sadmm_articulation_tree_begin(&part->tree, v, slots);
 }
 
 void sadmm_articulation_part_put_contacts(const struct articulation_part *part, const double *loads)

@@ -77,8 +77,9 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
     case SADMM_STAGE_PUSH_CHOICE:
     case SADMM_STAGE_PUSH_SOLVE:
     case SADMM_STAGE_PUSH_MOTION: return s->world && plan->points > 0;
-    case SADMM_STAGE_BLOCK_SOLVE:
-    case SADMM_STAGE_NCP_SOLVE: return s->world && plan->row_constraints > 0 && plan->warm_start;
+    case SADMM_STAGE_BLOCK_SOLVE: return s->world && plan->row_constraints > 0 && plan->warm_start;
+    case SADMM_STAGE_NCP_SOLVE:
+        return s->world && plan->row_constraints > 0 && plan->warm_start && s->settings->ncp_points > 0;
     case SADMM_STAGE_BLOCK_SOLVE_AGAIN: return s->world && plan->row_constraints > 0 && !s->solved;
     case SADMM_STAGE_NCP_SOLVE_AGAIN:
         return s->world && plan->row_constraints > 0 && s->settings->ncp_points > 0 && !s->solved;
