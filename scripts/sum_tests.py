@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Add up meson's test logs, and pytest's, and print "N passed, N failed, N skipped".
 
-usage: sum_tests.py [--broken "STEP STEP"] [--left-out "STEP STEP"] [TESTLOG.json | JUNIT.xml]...
+usage: sum_tests.py [--broken "STEP STEP"] [--left-out "STEP STEP"] [--passed "STEP STEP"] [TESTLOG.json | JUNIT.xml]...
 
 A Check program counts with each of its checks, any other program as one. A program that ended without its checks' summary
 (a crash, a time-out) is one failure, and so is a step that did not build or a log that is missing. A step that could not
-run on this machine is one skipped. Exit status 1 when something failed or nothing passed.
+run on this machine is one skipped, one that is a check by itself one passed. Exit status 1 when something failed or nothing passed.
 """
 import argparse
 import json
@@ -51,11 +51,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--broken", default="", help="steps that did not build")
     parser.add_argument("--left-out", default="", help="steps that could not run here")
+    parser.add_argument("--passed", default="", help="steps that passed and have no log")
     parser.add_argument("logs", nargs="*", type=pathlib.Path)
     arguments = parser.parse_args()
 
     broken, left_out = arguments.broken.split(), arguments.left_out.split()
-    total = [0, len(broken), len(left_out)]
+    passed = arguments.passed.split()
+    total = [len(passed), len(broken), len(left_out)]
+    for step in passed:
+        print(f"{step}: passed")
     for step in broken:
         print(f"{step}: did not build")
     for step in left_out:

@@ -62,7 +62,7 @@ static __global__ void __launch_bounds__(GEAR_THREADS)
     const bool acts = gear->enabled && joint_acts(v.joints, gear->joint[0]) && joint_acts(v.joints, gear->joint[1]) &&
                       act(v, gear, &settings, &acting);
     const struct sadmm_row_constraint out = {acts ? gear->body[0] : -1, acts ? gear->body[1] : -1, (int32_t)slot, acts,
-                                             false, 0};
+                                             false, 0, false, {0, 0, 0}};
     const_cast<struct sadmm_row_constraint *>(v.raw.constraints)[constraint] = out;
     v.joints.gear_after[g] = 0; /* the solution says */
     if (!acts) { /* as a joint without rows */
