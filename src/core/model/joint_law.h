@@ -263,7 +263,8 @@ struct joint_laws {
 struct joint_moving {
     const struct sadmm_joint_memory *memory;
     double value, before; /* and its rate, at the step's start */
-    double free;          /* its rate at the end, if nothing but gravity and wrenches acted */
+    double free;          /* its rate at the end, if nothing but gravity and wrenches acted; this, reach and response
+                             not where it is locked */
     double turning;       /* what the row's rate halfway is more, before anything acts: axes, arms and bodies turn */
     double turned;        /* what the rate at the end is more than the row's, so far as the law counts it */
     double prescribed;    /* the rate due to sides of prescribed motion */
@@ -343,6 +344,7 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
 {
     const struct joint_side *a = &acting->side[0], *b = &acting->side[1];
     struct joint_moving m;
+    const bool locked = def->locks >> k & 1; /* its law does not ask how it would move */
     double middle = 0, free = 0, prescribed = 0, start = 0; /* start: of velocities at the start */
     int s;
     m.memory = memory;
@@ -363,6 +365,7 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
         }
         start += joint_row_product(row, acting->side[s].velocity);
         middle += joint_row_product(row, acting->side[s].middle);
+        if (locked) continue;
         free += joint_row_product(row, acting->side[s].free);
         m.response += joint_response(&acting->side[s], row);
     }

@@ -9,7 +9,8 @@
  *     contacts by semismooth Newton steps, where need be from an interior point (ncp_newton.h)
  *     rows again by those impulses; one that changes its state is active from then on: one more number of G
  *
- * until no row changes. What it ends with is taken where it is off by less than what there is; else all stays as it is.
+ * until no row changes. Where that ends without a solution, or with one that throws bodies about, contacts give by a share
+ * of their response, from impulses of 0. What is neither is taken where it is nearer to the laws; else all stays as it is.
  * Islands that are solved before the first iteration need none, and keep their solution through those of others. In
  * double. Islands are independent of each other. */
 #ifndef SADMM_CORE_SOLVE_NCP_H
