@@ -209,7 +209,10 @@ static void archive_report(struct sadmm_archive *archive, sadmm_step_report *r)
     SADMM_ARCHIVE(archive, r->residual);
     SADMM_ARCHIVE(archive, r->certificate);
     if (archive->reading)
-        sadmm_archive_expect(archive, r->step >= 0 && isfinite(r->time) && r->contacts >= 0, "the report of a step");
+        sadmm_archive_expect(archive,
+                             (unsigned)r->backend < SADMM_BACKEND_COUNT && (unsigned)r->precision <= SADMM_F64 &&
+                                 r->step >= 0 && isfinite(r->time) && r->contacts >= 0,
+                             "the report of a step");
 }
 
 /* Times are left out: they are no state, and equal states are to give equal bytes. */
