@@ -6,6 +6,7 @@
 
 #include "core/base/memory.h"
 #include "scene_tools.h"
+#include "world/state/world_state.h"
 
 struct saved {
     unsigned char *bytes;
@@ -355,6 +356,55 @@ START_TEST(what_was_not_saved_is_refused)
 }
 END_TEST
 
+/* Enumerations index lists of names, sizes and functions. */
+START_TEST(values_of_no_name_are_refused)
+{
+    const sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world *world = create_world(&def), *other = empty_world();
+    sadmm_joint_def hinge = sadmm_joint_def_default();
+    add_floor(world, 0.5);
+    hinge.kind = SADMM_JOINT_REVOLUTE;
+    hinge.body_b = add_ball(world, 0, 0.1, "");
+    MUST(world, sadmm_world_add_joint(world, &hinge, NULL));
+    step_world(world, 1);
+    step_world(other, 1);
+    const struct {
+        void *at;
+        int count;
+        const char *message;
+    } values[] = {
+        {&world->def.backend, SADMM_BACKEND_COUNT, "(the definition of a world)"},
+        {&world->def.precision, SADMM_F64 + 1, "(the definition of a world)"},
+        {&world->def.settings.method, SADMM_METHOD_COUNT, "(settings)"},
+        {&world->bodies[1].type, SADMM_BODY_KINEMATIC + 1, "(a body)"},
+        {&world->geometries[1].type, SADMM_SHAPE_TYPE_COUNT, "(a shape)"},
+        {&world->joints[0].def.kind, SADMM_JOINT_KIND_COUNT, "(a joint)"},
+        {&world->joints[0].def.coordinates[5].drive, SADMM_DRIVE_COUNT, "(a joint)"},
+        {&world->report.backend, SADMM_BACKEND_COUNT, "(the report of a step)"},
+        {&world->report.precision, SADMM_F64 + 1, "(the report of a step)"},
+        {&world->step_settings.method, SADMM_METHOD_COUNT, "(settings)"},
+    };
+    for (size_t k = 0; k < sizeof values / sizeof *values; ++k) {
+        const int none[] = {-1, values[k].count, 1025};
+        int kept;
+        memcpy(&kept, values[k].at, sizeof kept);
+        for (size_t i = 0; i < sizeof none / sizeof *none; ++i) {
+            memcpy(values[k].at, &none[i], sizeof none[i]);
+            const struct saved saved = save_world(world);
+            expect_refused(other, saved.bytes, saved.size, values[k].message);
+            free(saved.bytes);
+        }
+        memcpy(values[k].at, &kept, sizeof kept);
+    }
+    const struct saved saved = save_world(world);
+    MUST(other, sadmm_world_restore(other, saved.bytes, saved.size));
+    expect_same(world, other, "restored");
+    free(saved.bytes);
+    sadmm_world_destroy(world);
+    sadmm_world_destroy(other);
+}
+END_TEST
+
 /* Whichever allocation fails. */
 START_TEST(without_memory_nothing_changes)
 {
@@ -397,6 +447,7 @@ int main(int argc, char **argv)
     tcase_add_test(cases, whatever_can_be_reached_is_restored);
     tcase_add_test(cases, another_process_goes_on);
     tcase_add_test(cases, what_was_not_saved_is_refused);
+    tcase_add_test(cases, values_of_no_name_are_refused);
     tcase_add_test(cases, without_memory_nothing_changes);
     suite_add_tcase(suite, cases);
     return run_suite(suite);

@@ -336,7 +336,8 @@ static void archive_shape(struct sadmm_archive *archive, sadmm_world *world, siz
     SADMM_ARCHIVE(archive, kept.body);
     if (!archive->reading || archive->status != SADMM_OK) return;
     const sadmm_status status = put_shape(archive, world, slot, &kept, owners);
-    if (status != SADMM_OK && archive->status == SADMM_OK) archive->status = status;
+    sadmm_archive_expect(archive, status != SADMM_ERROR_INVALID_ARGUMENT, "a shape");
+    if (archive->status == SADMM_OK) archive->status = status;
 }
 
 static void archive_shapes(struct sadmm_archive *archive, sadmm_world *world)
