@@ -65,7 +65,8 @@ SADMM_API int32_t sadmm_world_coupling_count(const sadmm_world *world); /* also 
  * (range). */
 SADMM_API sadmm_status sadmm_world_coupling_at(sadmm_world *world, int32_t index, sadmm_coupling_id *id);
 /* Read back the definition as it is now. Errors: STALE_ID, DEVICE. */
-SADMM_API sadmm_status sadmm_world_coupling_def_sized(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *def, size_t size);
+SADMM_API sadmm_status sadmm_world_coupling_def_sized(sadmm_world *world, sadmm_coupling_id id,
+                                                      sadmm_coupling_def *def, size_t size);
 static inline sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *def)
 {
     return sadmm_world_coupling_def_sized(world, id, def, sizeof *def);

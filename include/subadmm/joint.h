@@ -101,7 +101,7 @@ typedef struct sadmm_joint_def {
     sadmm_joint_coordinate coordinates[6]; /* locked ones: all default but for drive_force, which is ignored */
 } sadmm_joint_def;
 
-/* The defaults named above. Thread-safe. */
+/* The defaults named above. coordinate_size: of a sadmm_joint_coordinate. Thread-safe. */
 SADMM_API void sadmm_joint_def_init(sadmm_joint_def *def, size_t size, size_t coordinate_size);
 static inline sadmm_joint_def sadmm_joint_def_default(void)
 {

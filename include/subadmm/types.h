@@ -54,12 +54,13 @@ typedef struct sadmm_body_def {
     const char *name;            /* UTF-8; copied, as many whole characters as fit into 63 bytes; NULL = "" */
     sadmm_body_type type;        /* default DYNAMIC */
     double mass;                 /* kg, in [1e-9, 1e12]; of dynamic bodies, ignored for others; no default */
-    double inertia[3]; /* principal moments, kg m^2, in [1e-24, 1e24], each <= the sum of the other two (relative
-                                    1e-9), the largest <= 1e6 (F32) or 1e12 (F64) times the smallest */
-    double position[3];          /* centre of mass, m, |x| <= 1e9 */
+    double inertia[3];           /* principal moments, kg m^2, in [1e-24, 1e24], each <= the sum of the other two
+                                    (relative 1e-9), the largest <= 1e6 (F32) or 1e12 (F64) times the smallest; of
+                                    dynamic bodies, ignored for others; no default */
+    double position[3];          /* centre of mass, m, |x| <= 1e9; default 0 */
     double orientation[4];       /* w x y z, | |q| - 1 | <= 1e-6 (then normalised); default identity */
-    double linear_velocity[3];   /* m/s, |v| <= 1e6; 0 for static bodies */
-    double angular_velocity[3];  /* rad/s, |w| <= 1e6; 0 for static bodies */
+    double linear_velocity[3];   /* m/s, |v| <= 1e6; 0 for static bodies; default 0 */
+    double angular_velocity[3];  /* rad/s, |w| <= 1e6; 0 for static bodies; default 0 */
     int32_t environment;         /* bodies of different environments never collide; >= 0, or -1 (not for dynamic
                                     bodies): collides with all; default 0 (static: -1 is the usual choice) */
     /* Of dynamic bodies, ignored for others: */
@@ -107,13 +108,13 @@ typedef enum sadmm_shape_type {
 
 typedef struct sadmm_shape_def {
     size_t struct_size;          /* set by sadmm_shape_def_default() */
-    sadmm_shape_type type;
-    double size[3];              /* m, each used entry in [1e-6, 1e6] */
-    double position[3];          /* of the shape's frame in the body's, m; default 0 */
+    sadmm_shape_type type;       /* default SPHERE */
+    double size[3];              /* m, each used entry in [1e-6, 1e6]; no default */
+    double position[3];          /* of the shape's frame in the body's, m, |x| <= 1e6; default 0 */
     double orientation[4];       /* shape to body, w x y z; default identity */
     double friction;             /* mu >= 0, <= 1e6; a pair uses the geometric mean; default 0.5 */
     double restitution;          /* in [0, 1]; a pair uses the larger; default 0 */
-    uint32_t category, mask; /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1, all */
+    uint32_t category, mask;     /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1, all */
     bool sensor;                 /* has no contacts but reports what overlaps it (events.h); not for a MESH, which has
                                     no inside; default false */
     const sadmm_hull *hull;      /* of HULL; NULL, the default, for all others. The world keeps its own reference while

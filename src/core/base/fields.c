@@ -112,7 +112,8 @@ sadmm_status sadmm_fields_check(const struct sadmm_field *fields, size_t count, 
     for (size_t k = 0; k < count; ++k) {
         const struct sadmm_field *const f = &fields[k];
         /* Most are one number within its range; joints' targets are checked at every step. */
-        if (f->ends == SADMM_ENDS_CLOSED && f->count == 1 && f->kind <= SADMM_FIELD_BOUND) {
+        if (f->ends == SADMM_ENDS_CLOSED && f->count == 1 &&
+            (f->kind == SADMM_FIELD_REALS || f->kind == SADMM_FIELD_BOUND)) {
             const double x = *(const double *)(const void *)((const char *)object + f->offset);
             if (x >= f->lo && x <= f->hi) continue;
         }

@@ -7,8 +7,8 @@
 
 #include "error.h"
 
-/* A struct as this version has it. It may hold others that grow, one after the other, in front of `part_end`: then its
- * own members go on behind them, wherever these end in the program. */
+/* A struct as this version has it. It may hold others that grow, one after the other, from `part_at` on: its own later
+ * members go on behind them, wherever these end in the program. */
 struct sadmm_growing {
     size_t size, least;   /* now; in the first version that had it, with the padding at its end */
     const void *defaults; /* without the sizes */

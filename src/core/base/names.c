@@ -17,7 +17,9 @@ const uint32_t sadmm_joint_locks[SADMM_JOINT_KIND_COUNT] = {SADMM_JOINT_KINDS(LO
 /* All values have names. */
 #define ONE(X, ...) +1
 _Static_assert(0 SADMM_BACKENDS(ONE, ) == SADMM_BACKEND_COUNT, "every backend is listed");
+_Static_assert(0 SADMM_PRECISIONS(ONE, ) == SADMM_PRECISION_COUNT, "every precision is listed");
 _Static_assert(0 SADMM_METHODS(ONE, ) == SADMM_METHOD_COUNT, "every method is listed");
+_Static_assert(0 SADMM_BODY_TYPES(ONE, ) == SADMM_BODY_TYPE_COUNT, "every type of body is listed");
 _Static_assert(0 SADMM_SHAPE_TYPES(ONE, ) == SADMM_SHAPE_TYPE_COUNT, "every type of shape is listed");
 _Static_assert(0 SADMM_JOINT_KINDS(ONE, ) == SADMM_JOINT_KIND_COUNT, "every kind of joint is listed");
 _Static_assert(0 SADMM_DRIVES(ONE, ) == SADMM_DRIVE_COUNT, "every drive is listed");

@@ -8,7 +8,8 @@
 #define SADMM_SETTINGS(F, X)                                                                                            \
     F(X, REAL, NUMBER, dt, 0.005, 1e-6, 1, CLOSED, "Time step, s.")                                                     \
     F(X, WHOLE, PLAN, substeps, 1, 1, 64, CLOSED, "Sub-steps of a step, which share its iterations.")                   \
-    F(X, VECTOR, NUMBER, gravity, SADMM_NUMBERS(0, 0, -9.81), -1e6, 1e6, ANY, "m/s^2, world frame; norm <= 1e6.")                      \
+    F(X, VECTOR, NUMBER, gravity, SADMM_NUMBERS(0, 0, -9.81), -1e6, 1e6, ANY,                                           \
+      "m/s^2, world frame; norm <= 1e6.")                                                                               \
     F(X, METHOD, PLAN, method, SADMM_METHOD_FAST, 0, 1, ANY, "'fast' or 'paper'.")                                      \
     F(X, WHOLE, PLAN, iterations, 20, 1, 1000000, CLOSED, "Iterations a step.")                                         \
     F(X, REAL, NUMBER, relaxation, 1.8, 1, 2, BELOW, "Over-relaxation of 'fast'.")                                      \

@@ -198,15 +198,10 @@ int32_t sadmm_world_body_count(const sadmm_world *world)
 
 sadmm_status sadmm_world_body_at(sadmm_world *world, int32_t index, sadmm_body_id *id)
 {
+    size_t slot;
     TRY(sadmm_check_given(world, "world", NULL));
-    struct sadmm_error *error = &world->error;
-    TRY(sadmm_check_given(id, "id", error));
-    if (index < 0 || index >= world->body_count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
-                          world->body_count);
-    const size_t slot = sadmm_slots_at(&world->bodies_taken, index);
-    id->slot = (uint32_t)slot + 1;
-    id->generation = world->bodies[slot].generation;
+    TRY(sadmm_world_slot_at(&world->bodies_taken, world->body_count, index, id, &slot, &world->error));
+    *id = sadmm_world_body_id(world, (int32_t)slot);
     return SADMM_OK;
 }
 

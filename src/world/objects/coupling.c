@@ -136,13 +136,9 @@ int32_t sadmm_world_coupling_count(const sadmm_world *world) { return world ? wo
 
 sadmm_status sadmm_world_coupling_at(sadmm_world *world, int32_t index, sadmm_coupling_id *id)
 {
+    size_t slot;
     TRY(sadmm_check_given(world, "world", NULL));
-    struct sadmm_error *error = &world->error;
-    TRY(sadmm_check_given(id, "id", error));
-    if (index < 0 || index >= world->coupling_count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
-                          world->coupling_count);
-    const size_t slot = sadmm_slots_at(&world->couplings_taken, index);
+    TRY(sadmm_world_slot_at(&world->couplings_taken, world->coupling_count, index, id, &slot, &world->error));
     *id = (sadmm_coupling_id){(uint32_t)slot + 1, world->couplings[slot].generation};
     return SADMM_OK;
 }

@@ -140,13 +140,9 @@ int32_t sadmm_world_gear_count(const sadmm_world *world) { return world ? world-
 
 sadmm_status sadmm_world_gear_at(sadmm_world *world, int32_t index, sadmm_gear_id *id)
 {
+    size_t slot;
     TRY(sadmm_check_given(world, "world", NULL));
-    struct sadmm_error *error = &world->error;
-    TRY(sadmm_check_given(id, "id", error));
-    if (index < 0 || index >= world->gear_count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
-                          world->gear_count);
-    const size_t slot = sadmm_slots_at(&world->gears_taken, index);
+    TRY(sadmm_world_slot_at(&world->gears_taken, world->gear_count, index, id, &slot, &world->error));
     *id = (sadmm_gear_id){(uint32_t)slot + 1, world->gears[slot].generation};
     return SADMM_OK;
 }

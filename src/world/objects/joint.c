@@ -348,15 +348,10 @@ int32_t sadmm_world_joint_count(const sadmm_world *world)
 
 sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint_id *id)
 {
+    size_t slot;
     TRY(sadmm_check_given(world, "world", NULL));
-    struct sadmm_error *error = &world->error;
-    TRY(sadmm_check_given(id, "id", error));
-    const int32_t count = sadmm_world_joint_count(world);
-    if (index < 0 || index >= count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, count);
-    const size_t slot = sadmm_slots_at(&world->own_joints, index);
-    id->slot = (uint32_t)slot + 1;
-    id->generation = world->joints[slot].generation;
+    TRY(sadmm_world_slot_at(&world->own_joints, sadmm_world_joint_count(world), index, id, &slot, &world->error));
+    *id = (sadmm_joint_id){(uint32_t)slot + 1, world->joints[slot].generation};
     return SADMM_OK;
 }
 

@@ -1,6 +1,8 @@
 /* From an id to the live object it names, and what to call it. */
 #include "ids.h"
 
+#include "core/base/check.h"
+
 sadmm_shape_id sadmm_world_shape_id(const sadmm_world *world, int32_t slot)
 {
     return (sadmm_shape_id){(uint32_t)slot + 1, world->shape_generations[slot]};
@@ -70,4 +72,14 @@ struct sadmm_world_gear *sadmm_world_find_gear(const sadmm_world *world, sadmm_g
     sadmm_fail(error, SADMM_ERROR_STALE_ID, "%s = (slot %u, generation %u): no such gear (any more)", argument, id.slot,
                id.generation);
     return NULL;
+}
+
+sadmm_status sadmm_world_slot_at(const struct sadmm_slot_set *taken, int32_t count, int32_t index, const void *id,
+                                 size_t *slot, struct sadmm_error *error)
+{
+    TRY(sadmm_check_given(id, "id", error));
+    if (index < 0 || index >= count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, count);
+    *slot = sadmm_slots_at(taken, index);
+    return SADMM_OK;
 }

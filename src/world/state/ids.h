@@ -21,4 +21,8 @@ struct sadmm_world_gear *sadmm_world_find_gear(const sadmm_world *world, sadmm_g
 struct sadmm_world_coupling *sadmm_world_find_coupling(const sadmm_world *world, sadmm_coupling_id id,
                                                        const char *argument, struct sadmm_error *error);
 
+/* The slot of the index-th of `count` live objects; `id`, where its id is to go, is not NULL. INVALID_ARGUMENT. */
+sadmm_status sadmm_world_slot_at(const struct sadmm_slot_set *taken, int32_t count, int32_t index, const void *id,
+                                 size_t *slot, struct sadmm_error *error);
+
 #endif
