@@ -7,6 +7,7 @@ scene files, and the table of joint kinds.
 --check writes nothing, and says what is not as it would be. What a list cannot say (rules of a member's own, members of
 files that no definition has) stays in the schema as it is written there.
 """
+import argparse
 import json
 import os
 import re
@@ -173,9 +174,11 @@ def update_joints(texts, page):
 
 
 def main():
-    check = "--check" in sys.argv
-    places = [a for a in sys.argv[1:] if not a.startswith("--")]
-    project = places[0] if places else os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("project", nargs="?", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    given = parser.parse_args()
+    check, project = given.check, given.project
     texts = {}
     for name in ("names.h", "settings_fields.h", "definition_fields.h"):
         with open(os.path.join(project, BASE, name), encoding="utf-8") as file:

@@ -18,6 +18,7 @@ static constexpr const char *array_names[SADMM_ARRAY_COUNT] = {
     "coupling_target",
     "coupling_reaction",
 };
+static_assert(array_names[SADMM_ARRAY_COUNT - 1] != nullptr, "every array has a name");
 NAMES_OF(sadmm_array, array_names, SADMM_ARRAY_COUNT)
 
 using matrix = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
