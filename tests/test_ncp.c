@@ -420,6 +420,31 @@ START_TEST(contacts_that_cannot_be_met_are_borne)
 }
 END_TEST
 
+/* A door on two hinges of one axis, above and below its middle: they bear half of its weight each, and its couple alike, by
+ * whichever was made first. */
+START_TEST(two_hinges_share_their_load)
+{
+    sadmm_world *world = floor_world(_i);
+    const double high = 0.4, reach = 0.5, mass = 20, unit[4] = {1, 0, 0, 0};
+    const sadmm_body_id door = add_cube(world, reach, 2, 0.25, mass);
+    sadmm_joint_id hinges[2];
+    for (int k = 0; k < 2; ++k) {
+        const double place[3] = {0, 0, 2 + (k ? -high : high)};
+        sadmm_joint_def def = sadmm_joint_def_default();
+        def.kind = SADMM_JOINT_REVOLUTE, def.body_b = door;
+        MUST(world, sadmm_world_place_joint(world, &def, place, unit));
+        MUST(world, sadmm_world_add_joint(world, &def, &hinges[k]));
+    }
+    step_world(world, 100);
+    sadmm_joint_state state[2];
+    for (int k = 0; k < 2; ++k) MUST(world, sadmm_world_joint_state(world, hinges[k], &state[k]));
+    /* the regularisation that shares loads is 1e-9 of a row's response */
+    for (int k = 0; k < 2; ++k) ck_assert_double_lt(fabs(state[k].wrench_b[2] - mass * 9.81 / 2), 1e-5);
+    ck_assert_double_lt(fabs(state[0].wrench_b[0] + state[1].wrench_b[0]), 1e-5);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 /* Two mechanisms far apart on a floor, one part by a rope that is slack: a constraint without rows. They are left to the
  * iteration, until one is pulled and the rope is taut. */
 START_TEST(a_slack_rope_joins_two_islands)
@@ -555,6 +580,7 @@ int main(void)
     tcase_add_loop_test(tests, momentum_is_kept, 0, SOLVERS);
     tcase_add_loop_test(tests, worlds_of_small_islands_need_no_iteration, 0, SOLVERS);
     tcase_add_loop_test(tests, contacts_that_cannot_be_met_are_borne, 0, SOLVERS);
+    tcase_add_loop_test(tests, two_hinges_share_their_load, 0, SOLVERS);
     tcase_add_loop_test(tests, a_slack_rope_joins_two_islands, 0, SOLVERS);
     tcase_add_loop_test(tests, constraints_left_out_are_not_forgotten, 0, SOLVERS);
     tcase_add_loop_test(tests, wheels_bear_evenly, 0, SOLVERS);

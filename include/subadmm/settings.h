@@ -100,8 +100,8 @@ typedef struct sadmm_settings {
     int ncp_points;              /* worlds: islands with joints and at most so many contact points are solved directly
                                     before the iterations, and need none then (docs/internals/algorithm.md, "Dense
                                     contact solve (NCP)"), contacts and rows to rounding: robots that stand, walk,
-                                    grasp. In [0, SADMM_MOST_NCP_POINTS = 128]; 0: none; default 0. Some 10 ms on one
-                                    core are lost on an island that nothing solves (links deep in a table). On CUDA such
+                                    grasp. In [0, SADMM_MOST_NCP_POINTS = 128]; 0: none; default 0. Up to 20 ms on
+                                    one core are lost on an island that nothing solves. On CUDA such
                                     steps go through the host */
 
     double residual_tolerance;   /* stop when |r_primal|_inf (m/s) and |r_dual|_inf (N s) are both <= this;

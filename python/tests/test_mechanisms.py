@@ -1,6 +1,11 @@
-"""Random mechanisms that fall on the ground, by the direct solves (ncp_points): trees of joints of every kind with limits,
-drives, friction and dampers, masses over two decades. Bodies begin apart, so that every step has a solution."""
+"""Random mechanisms that fall on the ground, by the direct solves (ncp_points): trees of joints of most kinds with limits,
+drives, friction and dampers, masses over two decades. Bodies begin apart, so that every step has a solution, or wherever
+they overlap, so that many have none.
 
+    python test_mechanisms.py 600       # so many of both sorts: steps, unsolved ones, speeds
+"""
+
+import sys
 import numpy as np
 import pytest
 
@@ -34,7 +39,7 @@ def coordinate(random):
     return subadmm.Coordinate(**options) if options else None
 
 
-def mechanism(seed, precision):
+def mechanism(seed, precision="f64", apart=True):
     random = np.random.default_rng(seed)
     settings = subadmm.Settings(dt=float(random.choice([0.001, 0.002, 0.005])), iterations=60, ncp_points=64)
     settings.certify = True
@@ -45,8 +50,8 @@ def mechanism(seed, precision):
         size, mass = random.uniform(0.04, 0.1), 10 ** random.uniform(-1, 1)
         shape = random.choice(3)
         shape = (subadmm.sphere(size), subadmm.box(size, size, size), subadmm.capsule(size, size / 2))[shape]
-        body = world.add_solid(shape, density=1000, position=(0.4 * i, 0, 0.3 + 0.2 * random.random()),
-                               orientation=direction(random))
+        place = (0.4 * i, 0, 0.3 + 0.2 * random.random()) if apart else random.uniform((0, 0, 0), (0.3, 0.3, 0.3))
+        body = world.add_solid(shape, density=1000, position=place, orientation=direction(random))
         scale = mass / body.mass
         body.set_mass(mass, np.array(body.inertia) * scale)
         bodies.append(body)
@@ -62,18 +67,48 @@ def mechanism(seed, precision):
     return world, bodies
 
 
+def run(seed, precision="f64", apart=True):
+    """Its steps above 1e-6 m/s, those with iterations, largest joint error (m), last speed (m/s)."""
+    world, bodies = mechanism(seed, precision, apart)
+    unsolved = iterated = 0
+    drift = 0.0
+    for _ in range(STEPS):
+        world.step()
+        report = world.report
+        unsolved += report.certificate.ncp_max > 1e-6
+        iterated += report.iterations > 0
+        drift = max(drift, report.joint_drift)
+    return unsolved, iterated, drift, max(np.linalg.norm(body.linear_velocity) for body in bodies)
+
+
 @pytest.mark.parametrize("precision", ["f64", "f32"])
 def test_every_step_is_solved(precision):
-    steps = unsolved = iterated = 0
-    for seed in range(40):
-        world, bodies = mechanism(seed, precision)
-        for _ in range(STEPS):
-            world.step()
-            report = world.report
-            unsolved += report.certificate.ncp_max > 1e-6
-            iterated += report.iterations > 0
-            steps += 1
-            assert report.joint_drift < 5e-3
-        # drives of at most 10 N m on a tenth of a kilogram, for less than a second
-        assert max(np.linalg.norm(body.linear_velocity) for body in bodies) < 50
-    assert unsolved <= steps // 1000 and iterated <= steps // 1000, (unsolved, iterated, steps)
+    runs = [run(seed, precision) for seed in range(40)]
+    steps = len(runs) * STEPS
+    # Of 600 the worst has a joint 3.2 mm off, a light body that turns fast, and is at 3.6 m/s; one step in 15,000 is above
+    # 1e-6 m/s. Here one in 1,000 may be.
+    assert max(drift for _, _, drift, _ in runs) < 5e-3
+    assert max(speed for _, _, _, speed in runs) < 10
+    assert sum(unsolved for unsolved, *_ in runs) <= steps // 1000
+    assert sum(iterated for _, iterated, *_ in runs) == 0
+
+
+def test_overlaps_are_borne():
+    """Contacts that cannot be met throw few mechanisms about: of 600 one in 40. Here one in ten may be."""
+    runs = [run(seed, apart=False) for seed in range(40)]
+    assert sum(unsolved > 0 for unsolved, *_ in runs) > 10, "else this says nothing"
+    assert sum(iterated for _, iterated, *_ in runs) <= len(runs) * STEPS // 1000
+    assert sum(speed > 20 for *_, speed in runs) <= len(runs) // 10
+
+
+def main(count):
+    for apart in (True, False):
+        runs = [run(seed, apart=apart) for seed in range(count)]
+        unsolved, iterated, drift, speed = (np.array(column) for column in zip(*runs))
+        print(f"{'apart' if apart else 'overlapping'}: {count * STEPS} steps, {unsolved.sum()} above 1e-6 m/s, "
+              f"{iterated.sum()} iterated; joints off by {drift.max():.1e} m, fastest {speed.max():.1f} m/s, "
+              f"{(speed > 20).sum()} above 20 m/s")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -36,7 +36,10 @@ enum { ARTICULATION_REFINEMENTS = 8 };
 /* The rows at bounds are found in so many passes at most; one or two do mostly, and 9 in all but of ragdolls that fall
  * on each other. A row that is at a bound against its law by less than the rounding of its numbers and
  * ARTICULATION_SLACK, m/s or rad/s, stays there, or rounding would let rows change for good. */
-enum { ARTICULATION_PASSES = 16, ARTICULATION_TREE_PASSES = 64 };
+enum { ARTICULATION_PASSES = 16 };
+/* In trees a pass costs little, and after 8 one row changes at a time: of the 3,000 random trees of
+ * tests/test_articulation_tree.c 87 need more than 16, 39 more than these. */
+enum { ARTICULATION_TOGETHER = 8, ARTICULATION_TREE_PASSES = 64 };
 #define ARTICULATION_SLACK 1e-9
 
 /* Where a row is: between its bounds, at one of them, or fixed: it does not depend on the motion. Or it is absent: its
@@ -284,12 +287,13 @@ SADMM_INLINE void articulation_put_state(const struct articulation_view *v, int3
 /* What a row's regularisation is a share of: its own response; between two bodies twice that of the one that responds
  * less. Else what light bodies between heavy ones pass on, carriers of joints say, would make locks soft: of 1e-4 of a
  * body's moment by ten thousand times as much. */
+SADMM_INLINE double articulation_scale_of(double a, double b) { return a > 0 && b > 0 ? 2 * (a < b ? a : b) : a + b; }
 SADMM_INLINE double articulation_scale(const struct articulation_view *v, int32_t r)
 {
     const double *response = v->response + 12 * (size_t)r;
     const double a = six_product(v->rows[r].jacobian[0], response),
                  b = six_product(v->rows[r].jacobian[1], response + 6);
-    return a > 0 && b > 0 ? 2 * (a < b ? a : b) : a + b;
+    return articulation_scale_of(a, b);
 }
 
 SADMM_INLINE double articulation_regularisation(const struct articulation_view *v, int32_t r)

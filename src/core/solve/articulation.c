@@ -181,19 +181,13 @@ static void add_impulse(struct articulation_part *part, const struct sadmm_conta
                 articulation_point_load(arm_of(&points[p], side), points[p].impulse, side, (int)k);
 }
 
-/* Is it left to the dense contact solve, if its island is small enough? */
-static bool is_for_ncp(const struct articulation_part *part, const struct sadmm_settings *settings)
-{
-    return part->by_tree && part->points <= settings->ncp_points;
-}
-
 /* C, to A where the part is solved. */
 static void add_weight(struct articulation_part *part, const struct sadmm_contact_point *points, int32_t count,
                        int side, size_t entry)
 {
     double *A = part->view.factor + 36 * entry, load = 0;
     for (int32_t p = 0; p < count; ++p) load += v3_norm(v3_load(points[p].impulse));
-    const double B = articulation_contact_weight(load, count, part->speed);
+    const double B = part->for_ncp ? 0 : articulation_contact_weight(load, count, part->speed);
     for (int32_t p = 0; B > 0 && p < count; ++p)
         for (int k = 0; k < 6; ++k)
             for (int q = 0; q <= k; ++q)
@@ -270,11 +264,12 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
         solves = solves || !is_solved(part);
     }
     if (solves) find_impulses(&s);
-    for (int32_t k = 0; k < articulations->order.parts; ++k)
-        if (!articulations->parts[k].left && !is_solved(&articulations->parts[k]))
-            sadmm_articulation_part_load(&articulations->parts[k], system, settings, slots);
-    for (int32_t k = 0; k < articulations->order.parts; ++k)
-        if (!after && is_for_ncp(&articulations->parts[k], settings)) articulations->parts[k].speed = 0;
+    for (int32_t k = 0; k < articulations->order.parts; ++k) {
+        struct articulation_part *part = &articulations->parts[k];
+        if (part->left || is_solved(part)) continue;
+        sadmm_articulation_part_load(part, system, settings, slots);
+        part->for_ncp = !after && part->by_tree && part->points <= settings->ncp_points;
+    }
     if (solves) each_contact(&s, add_weight);
     for (int32_t k = 0; k < articulations->order.parts; ++k) {
         struct articulation_part *part = &articulations->parts[k];
@@ -289,7 +284,7 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
         /* Rows that are not solved are left as they are: velocities that go with multipliers beyond their bounds have
          * energy from nowhere. */
         if (solved) sadmm_articulation_part_store(&part->view, system, slots);
-        part->loaded = solved && !after && is_for_ncp(part, settings);
+        part->loaded = solved && part->for_ncp;
         if (!after) keep_part(&s, part, solved);
     }
     articulations->kept = !after;

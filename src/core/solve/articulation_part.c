@@ -41,7 +41,8 @@ void sadmm_articulation_part_load(struct articulation_part *part, const struct s
     }
     part->speed = articulation_speed(energy, mass);
     part->loaded = false;
-    part->by_tree = settings->ncp_points > 0 && part->tree.nodes > 0 && sadmm_articulation_tree_begin(&part->tree, v, slots);
+    part->by_tree = settings->ncp_points > 0 && part->tree.nodes > 0 &&
+                    sadmm_articulation_tree_begin(&part->tree, v, slots);
 }
 
 void sadmm_articulation_part_put_contacts(const struct articulation_part *part, const double *loads)
@@ -87,7 +88,7 @@ double sadmm_articulation_part_scale(const struct articulation_part *part, int32
         ldl6_solve(L, v->rows[r].jacobian[side], response);
         own[side] = six_product(v->rows[r].jacobian[side], response);
     }
-    return own[0] > 0 && own[1] > 0 ? 2 * fmin(own[0], own[1]) : own[0] + own[1];
+    return articulation_scale_of(own[0], own[1]);
 }
 
 /* Rows that left their bounds, or are at them against their law: did any change its state? one: the first of them alone,
@@ -229,7 +230,7 @@ bool sadmm_articulation_part_solve(struct articulation_part *part, const uint8_t
         sadmm_articulation_part_factorize(part);
         sadmm_articulation_part_solve_rows(part, false);
         if (yield_rows(part)) sadmm_articulation_part_solve_rows(part, false);
-        if (change_rows(v, part->by_tree && pass >= ARTICULATION_PASSES / 2)) continue;
+        if (change_rows(v, part->by_tree && pass >= ARTICULATION_TOGETHER)) continue;
         solved = true;
         if (exact) {
             solved = refine(part);

@@ -25,7 +25,8 @@ struct articulation_part {
     bool left;               /* it is not this call's */
     bool touched;            /* by a contact; */
     int32_t points;          /* by so many points */
-    bool loaded;             /* and solved for the contacts' impulses as they are, without their weight */
+    bool for_ncp;            /* its contacts are left to the dense contact solve: no C */
+    bool loaded;             /* by its tree, without C */
     bool kept;               /* solved before the iterations: */
     uint8_t *kept_state;     /* rows; in `kept_states` */
 };

@@ -64,12 +64,12 @@ struct articulation_tree {
 void sadmm_articulation_tree_make(const struct articulation_structure *s, int32_t *queue, int32_t *parent,
                                   struct articulation_tree *tree);
 
-/* Of this call's rows, inertias in v->factor. slots: as of sadmm_articulations_solve. False: rows are no wrenches at
- * points of space (gears). */
+/* Of this call's rows. slots: as of sadmm_articulations_solve. False: the tree cannot solve them. Rows are no wrenches at
+ * points of space (gears), or locks are not those of one joint. */
 bool sadmm_articulation_tree_begin(struct articulation_tree *tree, const struct articulation_view *v,
                                    const struct sadmm_row_constraint *slots);
 
-/* With rows in their states; nothing where it is known for these. */
+/* With rows in their states, inertias in v->factor; nothing where it is known for these. */
 void sadmm_articulation_tree_factorize(struct articulation_tree *tree, const struct articulation_view *v);
 
 /* Is row r inside its bounds, but without a multiplier of its own, since others say what it says? */
@@ -89,15 +89,10 @@ int32_t sadmm_articulation_tree_node(const struct articulation_tree *tree, const
 /* The largest residual of a row inside its bounds after that, m/s or rad/s. */
 double sadmm_articulation_tree_residual(const struct articulation_tree *tree, const struct articulation_view *v);
 
-/* How a node responds to a load along its joint, and what it hands on to its parent. */
-struct articulation_step {
-    double along[6], response[6]; /* S^T p, and H S^T p */
-};
-
-/* The path of loads to the root, a node: `load` (6) on its body, in: what its children have handed on, too; out: what it
- * hands on to its parent. along: what acts along S besides; NULL: nothing does. */
-struct articulation_step sadmm_articulation_tree_pass(const struct articulation_node *node, double load[6],
-                                                      const double *along);
+/* A load on its way to the root, at a node. load (6): on its body, with what its child has handed on; then what it hands on
+ * to its parent. along: what acts along S besides, NULL: nothing does. z, response: S^T p, and H S^T p. */
+void sadmm_articulation_tree_pass(const struct articulation_node *node, double load[6], const double *along,
+                                  double z[6], double response[6]);
 
 #ifdef __cplusplus
 }

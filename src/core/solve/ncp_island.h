@@ -1,0 +1,112 @@
+/* What the files of the dense contact solve (ncp.h) share: its memory, and the island that is solved. */
+#ifndef SADMM_CORE_SOLVE_NCP_ISLAND_H
+#define SADMM_CORE_SOLVE_NCP_ISLAND_H
+
+#include "articulation_part.h"
+#include "ncp.h"
+#include "ncp_dense.h"
+
+/* Active rows at most: solved for together with the contacts, since they changed their states. */
+enum { MOST_ACTIVE = 96 };
+
+struct ncp_contact {
+    int32_t pair, point;
+    int32_t body[2];           /* of the island; -1: not one that is solved for */
+    double e;
+    double row[2][3][6], response[2][3][6]; /* J, A^-1 J^T of either side: normal, tangents */
+    double given[3];           /* velocity of what is not solved for */
+};
+
+/* An active row, solved for with the contacts: r of a part of the island. */
+struct ncp_active {
+    int32_t part, r;
+};
+
+struct ncp_body {
+    int32_t body;              /* of the system */
+    double factor[36], b[6];
+    double velocity[6], dv[6]; /* by the impulses so far; by one of them */
+};
+
+struct sadmm_ncp {
+    /* bodies of the system: island, number in it, the next one of it; islands, by their first body: */
+    int32_t *label, *number, *next_body;
+    int32_t *points, *first_pair; /* how many points; its pairs */
+    uint8_t *kind;             /* bits of enum island_kind */
+    int32_t *next_pair;
+    /* one island: */
+    struct ncp_body *bodies;
+    struct ncp_contact *contacts;
+    struct ncp_law *laws;
+    int32_t *parts;            /* of the articulations */
+    double *numbers;           /* lambda, u, G, Newton's work; the best */
+    double *rows;              /* multipliers of the system's rows, the best */
+    int32_t *first_node;       /* (parts + 1) of trees (below); the last: of bodies without joints */
+    struct ncp_passed *passed; /* of each number (ncp_response.c) */
+    const struct ncp_passed **passed_at; /* by node: of one number */
+    int32_t *passed_counts;
+    bool known;                /* the lists are of this (sub-)step, from before its iterations; then */
+    double *kept;              /* velocities, multipliers of rows, impulses at that time */
+    size_t kept_capacity, first_node_capacity, passed_capacity, passed_at_capacity, passed_count_capacity;
+    uint8_t *states;           /* SADMM_MAX_ROWS a column, of the parts one after the other: those that G is for */
+    size_t label_capacity, number_capacity, body_list_capacity, points_capacity, first_capacity, kind_capacity,
+        pair_list_capacity, body_capacity, contact_capacity, law_capacity, part_capacity, numbers_capacity, row_capacity,
+        state_capacity;
+};
+
+/* Of islands: they have rows; are the iterations'; are solved. */
+enum island_kind { ISLAND_ARTICULATED = 1, ISLAND_LEFT = 2, ISLAND_SOLVED = 4 };
+
+/* The island that is solved. */
+struct island {
+    struct sadmm_ncp *d;
+    struct sadmm_articulations *articulations;
+    const struct sadmm_system *system;
+    const struct sadmm_row_constraint *slots;
+    const struct sadmm_settings *settings;
+    int32_t bodies, contacts, parts, active;
+    struct ncp_active active_row[MOST_ACTIVE];
+    struct ncp_dense dense;
+    double *best_lambda, *best_velocity; /* contacts x 3; bodies x 6 */
+    double best, best_hard;              /* natural map, m/s, of what is solved; of contacts that do not give */
+    bool gives;
+    bool again;                          /* after the iterations */
+    double regularisation;               /* of contacts, a share of their response */
+};
+
+static inline struct articulation_part *part_of(const struct island *s, int32_t k)
+{
+    return &s->articulations->parts[s->d->parts[k]];
+}
+
+/* A column of G as its load goes to the roots: with a load's shares z along the joints on its way, and H z of each,
+ *
+ *     G_rc = sum z_r H z_c over the nodes that both have passed
+ *
+ * Nodes have numbers of their own in the island: those of its parts' trees one after the other, then bodies without
+ * joints, which are roots. */
+struct ncp_passed {
+    int32_t node, free;
+    double along[6], response[6];
+};
+
+/* ncp_response.c: numbers of nodes, once the island's bodies are there; G, with rows in the states that they have. */
+void sadmm_ncp_number_nodes(struct island *s);
+void sadmm_ncp_find_responses(struct island *s, double *G);
+
+/* ncp_lists.c: the islands of a (sub-)step. False: no memory. */
+bool sadmm_ncp_make_lists(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, const struct sadmm_system *system);
+/* Is it one that the dense contact solve takes, and not solved yet? */
+bool sadmm_ncp_takes(const struct sadmm_ncp *d, int32_t label, const struct sadmm_settings *settings);
+bool sadmm_ncp_is_solved(const struct sadmm_ncp *d, int32_t body_a, int32_t body_b);
+/* Before the iterations: islands without contacts whose rows the block solve has solved, and bodies without either, which
+ * are given A^-1 b; whether every other one may be solved, too, else those without joints are left to the iterations, which
+ * would not be spared. */
+void sadmm_ncp_choose_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input);
+/* Backends move bodies without joints by what their iterations end with. */
+void sadmm_ncp_leave_to_iterations(struct sadmm_ncp *d, const struct sadmm_system *system);
+/* What solved islands are is kept while the iterations go on with others, and taken back. False: no memory. */
+bool sadmm_ncp_keep(struct sadmm_ncp *d, const struct sadmm_system *system);
+void sadmm_ncp_take_kept(const struct sadmm_ncp *d, const struct sadmm_system *system);
+
+#endif
