@@ -15,7 +15,7 @@
 #include "world/state/ids.h"
 #include "world/step/gear_rows.h"
 
-static const double OFFSET_LIMIT = 1e9, RATIO_LEAST = 1e-9, RATIO_MOST = 1e9;
+static const double RATIO_LEAST = 1e-9, RATIO_MOST = 1e9;
 enum { MOST_GEARS = 1 << 24 };
 
 static const sadmm_gear_def defaults = {SADMM_GEAR_FIELDS(SADMM_FIELD_DEFAULT, )};
@@ -33,6 +33,12 @@ static sadmm_status check_coordinate(const sadmm_joint_def *joint, const char *n
     return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                       "def->%s = %d: must be in [0, 6), free (locked: mask %u), and no rotation of three that are free",
                       name, k, joint->locks);
+}
+
+static sadmm_status check_offset(const char *name, double offset, struct sadmm_error *error)
+{
+    const struct sadmm_field *const range = SADMM_GEAR_FIELD(offset);
+    return sadmm_check_range(name, offset, range->lo, range->hi, error);
 }
 
 /* Dynamic bodies that the two joints are between; *shared: how many of them are of both. */
@@ -66,8 +72,7 @@ sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_d
     if (!(fabs(def->ratio) >= RATIO_LEAST && fabs(def->ratio) <= RATIO_MOST))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->ratio = %g: its size must be in [%g, %g]",
                           def->ratio, RATIO_LEAST, RATIO_MOST);
-    if (!isnan(def->offset))
-        TRY(sadmm_check_range("def->offset (or NaN: as it is)", def->offset, -OFFSET_LIMIT, OFFSET_LIMIT, error));
+    if (!isnan(def->offset)) TRY(check_offset("def->offset (or NaN: as it is)", def->offset, error));
     int shared;
     const int bodies = count_bodies(world, joints, &shared);
     if (bodies > 3 || (bodies == 3 && shared == 0))
@@ -110,7 +115,7 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *give
             "between the other two bodies moves both (a wheel in between, with two gears, does)");
     if (isnan(def->offset)) {
         TRY(measure(world, def, &made.def.offset));
-        TRY(sadmm_check_range("def->offset (NaN: as it is)", made.def.offset, -OFFSET_LIMIT, OFFSET_LIMIT, error));
+        TRY(check_offset("def->offset (NaN: as it is)", made.def.offset, error));
     }
     const size_t slot = sadmm_slots_free(&world->gears_taken);
     if (slot >= MOST_GEARS)

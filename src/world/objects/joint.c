@@ -125,6 +125,12 @@ static sadmm_status check_frames(const sadmm_joint_def *def, struct joint_frame 
     return SADMM_OK;
 }
 
+static sadmm_status check_length(const char *name, double length, struct sadmm_error *error)
+{
+    const struct sadmm_field *const range = SADMM_JOINT_FIELD(length);
+    return sadmm_check_range(name, length, range->lo, range->hi, error);
+}
+
 static sadmm_status check_def(const sadmm_joint_def *def, uint32_t *locks, struct sadmm_error *error)
 {
     TRY(sadmm_fields_check(sadmm_joint_table, SADMM_JOINT_FIELDS_COUNT, def, "def->", error));
@@ -132,7 +138,7 @@ static sadmm_status check_def(const sadmm_joint_def *def, uint32_t *locks, struc
     if (*locks > JOINT_ALL_LOCKED)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->locks = %u: must be in [0, %d]", def->locks,
                           JOINT_ALL_LOCKED);
-    if (def->length != -1) TRY(sadmm_check_range("def->length (or -1: as it is)", def->length, 0, FRAME_LIMIT, error));
+    if (def->length != -1) TRY(check_length("def->length (or -1: as it is)", def->length, error));
     return check_coordinates(def, *locks, error);
 }
 
@@ -268,7 +274,7 @@ sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *gi
     q_store(made.frame[1].orientation, made.def.orientation_b);
     if (def->length == -1 && joint_is_radial(def->kind)) {
         made.def.length = geometry_now(world, &made).value[0];
-        TRY(sadmm_check_range("def->length (-1: as it is)", made.def.length, 0, FRAME_LIMIT, error));
+        TRY(check_length("def->length (-1: as it is)", made.def.length, error));
     }
     TRY(sadmm_world_insert_joint(world, &made, &slot));
     if (id) {
