@@ -405,6 +405,45 @@ START_TEST(values_of_no_name_are_refused)
 }
 END_TEST
 
+/* Steps are counted from what was saved; errors of contacts are those that this world has measured. */
+START_TEST(counts_of_steps_go_on)
+{
+    const sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world *world = create_world(&def), *other = empty_world();
+    add_floor(world, 0.5);
+    add_ball(world, 0, 0.1, "");
+    step_world(world, 1);
+    step_world(other, 1);
+    const struct {
+        int64_t *count, value;
+        bool fine;
+    } counts[] = {
+        {&world->report.step, -1, false},           {&world->report.step, INT64_MAX, false},
+        {&world->report.step, INT64_MAX / 2, true}, {&world->report.repeated, -1, false},
+        {&world->report.repeated, INT64_MAX, false}, {&world->report.step, 0, true},
+    };
+    for (size_t k = 0; k < sizeof counts / sizeof *counts; ++k) {
+        const int64_t kept = *counts[k].count;
+        double error;
+        *counts[k].count = counts[k].value;
+        const struct saved saved = save_world(world);
+        *counts[k].count = kept;
+        if (counts[k].fine) {
+            MUST(other, sadmm_world_restore(other, saved.bytes, saved.size));
+            ck_assert_int_eq(sadmm_world_contact_count(other), 1);
+            ck_assert_int_eq(sadmm_world_contact_errors(other, 0, 1, &error), SADMM_ERROR_UNAVAILABLE);
+            step_world(other, 1);
+            ck_assert(world_report(other).step == counts[k].value + 1);
+        } else {
+            expect_refused(other, saved.bytes, saved.size, "(the report of a step)");
+        }
+        free(saved.bytes);
+    }
+    sadmm_world_destroy(world);
+    sadmm_world_destroy(other);
+}
+END_TEST
+
 /* Whichever allocation fails. */
 START_TEST(without_memory_nothing_changes)
 {
@@ -448,6 +487,7 @@ int main(int argc, char **argv)
     tcase_add_test(cases, another_process_goes_on);
     tcase_add_test(cases, what_was_not_saved_is_refused);
     tcase_add_test(cases, values_of_no_name_are_refused);
+    tcase_add_test(cases, counts_of_steps_go_on);
     tcase_add_test(cases, without_memory_nothing_changes);
     suite_add_tcase(suite, cases);
     return run_suite(suite);

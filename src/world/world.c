@@ -58,6 +58,7 @@ sadmm_status sadmm_world_create(const sadmm_world_def *given, sadmm_world **out)
     if (!world) return sadmm_fail_memory(NULL, "the world");
     world->def = def;
     world->team = team;
+    world->certified_step = -1;
     const sadmm_status status = sadmm_collision_create(&world->collision, NULL);
     if (status != SADMM_OK) {
         sadmm_free(world);

@@ -171,10 +171,26 @@ static void change(struct bytes *in, unsigned char *bytes, size_t size)
     }
 }
 
+/* All that arrays have of it. */
+static void read_arrays(sadmm_world *world)
+{
+    for (int k = 0; k < SADMM_ARRAY_COUNT; ++k) {
+        const sadmm_array array = (sadmm_array)k;
+        const int32_t rows = sadmm_world_array_rows(world, array);
+        double *values = malloc(((size_t)rows * (size_t)sadmm_array_columns(array) + 1) * sizeof *values);
+        MUST(values, "memory");
+        const sadmm_status status = sadmm_world_get_array(world, array, 0, rows, values);
+        MUST(status == SADMM_OK || (status == SADMM_ERROR_UNAVAILABLE && array == SADMM_ARRAY_BODY_CONTACT_WRENCH),
+             "array %d: %s", k, sadmm_world_message(world));
+        free(values);
+    }
+}
+
 /* Whatever was restored is a world. */
 static void use(sadmm_world *world)
 {
     sadmm_contact contacts[16];
+    double errors[16];
     sadmm_joint_id joint;
     sadmm_joint_state joint_state;
     sadmm_body_id body;
@@ -185,6 +201,7 @@ static void use(sadmm_world *world)
     char text[4096];
     const int32_t count = sadmm_world_contact_count(world);
     (void)sadmm_world_contacts(world, 0, count < 16 ? count : 16, contacts);
+    (void)sadmm_world_contact_errors(world, 0, count < 16 ? count : 16, errors);
     for (int32_t k = 0; k < sadmm_world_body_count(world); ++k) {
         MUST(sadmm_world_body_at(world, k, &body) == SADMM_OK, "body_at");
         MUST(sadmm_world_body_def(world, body, &def) == SADMM_OK, "body_def");
@@ -197,6 +214,7 @@ static void use(sadmm_world *world)
     (void)sadmm_world_freeze(world, problem);
     sadmm_problem_destroy(problem);
     (void)sadmm_world_explain(world, text, sizeof text);
+    read_arrays(world);
     save(world, &bytes, &size);
     sadmm_world *other = create();
     MUST(sadmm_world_restore(other, bytes, size) == SADMM_OK, "restored again: %s", sadmm_world_message(other));

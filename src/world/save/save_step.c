@@ -187,6 +187,9 @@ static void archive_plan(struct sadmm_archive *archive, struct sadmm_plan *plan)
     for (size_t k = 0; k < sizeof flags / sizeof *flags; ++k) sadmm_archive_flag(archive, flags[k]);
 }
 
+/* A number of steps that more can be added to. */
+static bool counts_on(int64_t steps) { return steps >= 0 && steps <= INT64_MAX / 2; }
+
 static void archive_report(struct sadmm_archive *archive, sadmm_step_report *r)
 {
     SADMM_ARCHIVE(archive, r->backend);
@@ -211,7 +214,7 @@ static void archive_report(struct sadmm_archive *archive, sadmm_step_report *r)
     if (archive->reading)
         sadmm_archive_expect(archive,
                              (unsigned)r->backend < SADMM_BACKEND_COUNT && (unsigned)r->precision <= SADMM_F64 &&
-                                 r->step >= 0 && isfinite(r->time) && r->contacts >= 0,
+                                 counts_on(r->step) && counts_on(r->repeated) && isfinite(r->time) && r->contacts >= 0,
                              "the report of a step");
 }
 
