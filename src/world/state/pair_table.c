@@ -60,8 +60,8 @@ void sadmm_pair_table_forget(struct sadmm_pair_table *table, uint32_t slot)
 
 static void list_below(struct sadmm_pair_table *table, uint32_t at, size_t first)
 {
-    const struct sadmm_key_node *nodes = table->pairs.nodes, *node = &nodes[at];
     if (!at) return;
+    const struct sadmm_key_node *nodes = table->pairs.nodes, *node = &nodes[at];
     const size_t place = first + nodes[node->below[0]].size;
     table->keys[place] = node->key;
     table->values[place] = node->value;
