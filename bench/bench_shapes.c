@@ -9,6 +9,7 @@
 #include "bench.h"
 #include "bench_options.h"
 #include "cli/interrupt.h"
+#include "collision/collision.h"
 #include "collision/convex/polytope.h"
 #include "collision/find/find_candidates.h"
 #include "collision/find/variants.h"

@@ -314,8 +314,7 @@ START_TEST(friction_and_restitution_of_a_pair)
 }
 END_TEST
 
-/* ---- geometries and their subshapes
- * ------------------------------------------------------------------------------- */
+/* ---- geometries and their subshapes ------------------------------------------------------------------------------ */
 
 /* A shape is what its handle says: the same contacts, bit for bit, whether equal boxes have a geometry each or share
  * one. */

@@ -3,9 +3,11 @@
 
     test_layers.py PROJECT [ARCHIVE | FOLDER OF OBJECTS]...
 
-Of every source below PROJECT/src: folders include those they may, and no file includes itself, directly or through others.
-Of the objects in the archives and folders (by nm): no two of them call each other, directly or through others, and folders
-call those they may include. What is there several times over (precisions, instruction sets) counts as one object.
+Of every source below PROJECT/src: folders include those they may, and no file includes itself, directly or through
+others.
+Of the objects in the archives and folders (by nm): no two of them call each other, directly or through others; folders
+call those they may include, and define what their own headers declare. What is there several times over (precisions,
+instruction sets) counts as one object.
 What stands below the world does not see its header.
 Of both together: a source and the header of its name are one part, and no part uses itself through others.
 Of the modules below PROJECT/python/subadmm: none imports itself through others, also where a function imports. What the
@@ -98,8 +100,20 @@ def above_the_world(root, files):
                     yield f"{file} includes subadmm/{name}, and with it world.h: it stands below the world"
 
 
+def declared_names(root, files):
+    """Symbol -> folders of the headers that declare it."""
+    folders = {}
+    for file in files:
+        if file.endswith(".h"):
+            with open(os.path.join(root, file), encoding="utf-8") as text:
+                for name in re.findall(r"^(?!static|#|\s).*\b(sadmm_\w+)\(", text.read(), re.M):
+                    folders.setdefault(name, set()).add(os.path.dirname(file))
+    return folders
+
+
 def calls(archives, files, public):
-    """Object -> objects that define what it uses; objects by their source below src, where one is known."""
+    """Object -> objects that define what it uses, and symbol -> object that defines it; objects by their source below
+    src, where one is known."""
     source = {re.sub(r"[/.]", "_", os.path.splitext(file)[0]): file for file in files if not file.endswith(".h")}
 
     def source_of(member):
@@ -123,7 +137,7 @@ def calls(archives, files, public):
             elif fields[1] == "U":
                 used.setdefault(member, set()).add(fields[0])
     return {file: {defined[symbol] for symbol in symbols - (public if os.path.dirname(file) in TOOLS else set())
-                   if symbol in defined} - {file} for file, symbols in used.items()}
+                   if symbol in defined} - {file} for file, symbols in used.items()}, defined
 
 
 def parts(*graphs):
@@ -195,12 +209,24 @@ def wrong_edges(graph, verb):
             yield f"{file} {verb} {other}: src/{folder} may use {', '.join(MAY_USE[folder]) or 'nothing'}"
 
 
+def wrong_places(defined, declared):
+    """What a header declares is defined in its folder; what finds a backend, in the backend's."""
+    for symbol in sorted(set(defined) & set(declared)):
+        folder = os.path.dirname(defined[symbol])
+        finds_backend = folder.startswith("backend_") and os.path.dirname(BACKEND_LIST) in declared[symbol]
+        if folder not in declared[symbol] and not finds_backend:
+            yield f"{defined[symbol]} defines {symbol}, which is declared in src/{', src/'.join(declared[symbol])}"
+
+
 def main():
     root, archives = os.path.join(sys.argv[1], "src"), sys.argv[2:]
     files = set(files_below(root))
     graphs = [("includes", includes(root, files))]
+    misplaced = []
     if archives and shutil.which("nm"):
-        graphs.append(("calls", calls(archives, files, public_names(os.path.join(sys.argv[1], "include", "subadmm")))))
+        graph, defined = calls(archives, files, public_names(os.path.join(sys.argv[1], "include", "subadmm")))
+        graphs.append(("calls", graph))
+        misplaced = list(wrong_places(defined, declared_names(root, files)))
         if len(graphs[-1][1]) < 20:
             sys.exit(f"only {len(graphs[-1][1])} objects of src found in {' '.join(archives)}")
     graphs.append(("uses", parts(*(graph for _, graph in graphs))))
@@ -208,6 +234,8 @@ def main():
     failed = False
     for verb, graph in graphs:
         errors = list(wrong_edges(graph, verb)) if verb in ("includes", "calls") else []
+        if verb == "calls":
+            errors += misplaced
         if verb == "includes":
             errors += above_the_world(os.path.join(sys.argv[1], "include", "subadmm"), files)
         found = circle(graph)

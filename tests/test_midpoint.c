@@ -37,8 +37,7 @@ static sadmm_body_id add(sadmm_world *world, sadmm_shape_type type, const double
     return id;
 }
 
-/* ---- separations
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- separations ------------------------------------------------------------------------------------------------- */
 
 /* A box that spins about y over a floor, alone in the air: by separation and velocity the lowest corner ends up where
  * it does, but for its centripetal acceleration w^2 z over a quarter of the time twice, dt^2/8; taken at the start of

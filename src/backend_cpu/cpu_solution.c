@@ -65,10 +65,10 @@ static void add_bits(_Atomic int32_t *to, int bits, bool alone)
     else atomic_fetch_or_explicit(to, bits, memory_order_relaxed);
 }
 
-/* Bits of a body so far; what becomes of the static world is of no interest. */
+/* Bits of a body so far. */
 static int bits_of_body(const struct sadmm_context *c, int32_t body)
 {
-    return body >= 0 ? atomic_load_explicit(&c->touch[body], memory_order_relaxed) : TOUCH_SUPPORTED | TOUCH_MOVED;
+    return body >= 0 ? atomic_load_explicit(&c->touch[body], memory_order_relaxed) : TOUCH_OF_STATIC;
 }
 
 /* What a pair's points touch, and what other pairs have found of that so far: bits that are known are not looked for

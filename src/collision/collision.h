@@ -7,15 +7,21 @@
 #ifndef SADMM_COLLISION_COLLISION_H
 #define SADMM_COLLISION_COLLISION_H
 
-#include "core/base/contact_set.h"
+#include "collision/find/check_shape.h"
 #include "collision/shapes/input.h"
+#include "core/base/contact_set.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
+struct sadmm_broad_phase_kind;
 struct sadmm_collision;
 sadmm_status sadmm_collision_create(struct sadmm_collision **out, struct sadmm_error *error);
+/* The same with a broad phase of choice (broad/broad_phase.h), and the one that it has otherwise. */
+sadmm_status sadmm_collision_create_with(const struct sadmm_broad_phase_kind *kind, struct sadmm_collision **out,
+                                         struct sadmm_error *error);
+const struct sadmm_broad_phase_kind *sadmm_broad_phase_default(void);
 void sadmm_collision_destroy(struct sadmm_collision *collision);
 
 /* Find all contacts. On entry `contacts` holds the previous step's set (with its impulses and caches; points of a new

@@ -25,6 +25,7 @@
 #include "world/step/joint_stiffen.h"
 #include "world/step/kinematic.h"
 #include "world/step/rolling.h"
+#include "world/step/wrenches.h"
 
 /* Settled boxes have about ten contacts each; AUTO needs an order of magnitude before the first contact is known. */
 enum { EXPECTED_CONTACTS_PER_BODY = 8 };

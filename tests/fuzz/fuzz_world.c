@@ -277,7 +277,10 @@ static const sadmm_hull *hull_at(int k)
             points[3 * i + 1] = 0.5 * sin(2.4 * i);
             points[3 * i + 2] = (i % 2 ? 0.4 : -0.4) / (k % HULLS + 1);
         }
-        const sadmm_hull_def def = {.struct_size = sizeof def, .points = points, .point_count = (size_t)count, .convex_radius = k % 2 ? 0.05 : 0};
+        const sadmm_hull_def def = {.struct_size = sizeof def,
+                                    .points = points,
+                                    .point_count = (size_t)count,
+                                    .convex_radius = k % 2 ? 0.05 : 0};
         if (sadmm_hull_create(&def, hull) != SADMM_OK) return NULL;
     }
     return *hull;

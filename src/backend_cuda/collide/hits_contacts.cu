@@ -1,5 +1,5 @@
-/* Contacts after hits (hits_view.h): shapes of what was hit, where they are now; their manifolds and points; and what hits
- * gave bodies. */
+/* Contacts after hits (hits_view.h): shapes of what was hit, where they are now; their manifolds and points; and what
+ * hits gave bodies. */
 #include "hits_view.h"
 #include "narrow.h"
 

@@ -275,8 +275,8 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
                                    struct sadmm_cuda_contact_counts *counts, struct sadmm_error *error);
 sadmm_status COLLISION(reserve_set)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
                                       struct sadmm_error *error);
-/* Hits (hits_view.h): from candidates to where what was hit is, before they are searched for again; after the narrow phase;
- * and after `emit`. */
+/* Hits (hits_view.h): from candidates to where what was hit is, before they are searched for again; after the narrow
+ * phase; and after `emit`. */
 void COLLISION(free_hits)(struct sadmm_cuda_collision *c);
 sadmm_status COLLISION(take_hits)(struct sadmm_cuda_collision *c, const struct sadmm_cuda_hits *step,
                                   struct sadmm_error *error);

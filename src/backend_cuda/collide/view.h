@@ -6,10 +6,12 @@
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
  *            (a pair with a mesh is listed; a warp of `expand` finds its triangles: meshes.cu)
  *   sort     candidates by (slot of a, slot of b, subshape), the host's order
- *   hits     where they are planned: swept bodies hit each other, and the candidates are searched for again: hits_view.h
+ *   hits     where they are planned (hits_view.h): swept bodies hit each other, and the candidates are searched for
+ *            again
  *   narrow   the last step's pair (a hint or a search), manifold by candidate     a thread a candidate
  *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
- *   seams    where shapes have neighbours: manifolds that their union does not have  the same (plain: by narrow itself)
+ *   seams    where shapes have neighbours: manifolds that their union does not have  the same, then eight lanes
+ *            (plain: by narrow itself)
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *            (few candidates: with all that some need; many: kernels after it for points that roll, and for

@@ -29,8 +29,8 @@
  * what overlaps is made without its push, and behind `finish`, if there is one, the second problem is gathered and
  * solved, in a context of its own, and bodies are moved by it (step/push.cu): a part with a condition (condition.h).
  *
- * Hits of bodies in flight (collide/hits_view.h) come between the candidates and the narrow phase of steps that are planned to
- * have some: the narrow phase of others says whether any pair is fast.
+ * Hits of bodies in flight (collide/hits_view.h) come between the candidates and the narrow phase of steps that are
+ * planned to have some: the narrow phase of others says whether any pair is fast.
  *
  * fast, small islands (c->prologue): `iterate` does penalties and limit too, and the last two check the plan.
  *

@@ -52,9 +52,6 @@ struct sadmm_broad_phase_kind {
 extern const struct sadmm_broad_phase_kind sadmm_broad_phase_sweep;
 extern const struct sadmm_broad_phase_kind sadmm_broad_phase_fcl; /* only in builds with FCL */
 
-/* The one used by default. */
-const struct sadmm_broad_phase_kind *sadmm_broad_phase_default(void);
-
 /* Append one pair; false when out of memory. */
 bool sadmm_pair_list_add(struct sadmm_pair_list *list, uint32_t a, uint32_t b);
 

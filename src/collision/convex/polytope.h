@@ -98,8 +98,7 @@ SADMM_INLINE real polytope_offset(const struct polytope *p, int face)
                      : (real)p->offset[face];
 }
 
-/* ---- of many x, y, z, their number a multiple of HULL_LANES: is one of them within all of four planes?
- * --------------- */
+/* ---- of many x, y, z, their number a multiple of HULL_LANES: is one of them within all of four planes? ----------- */
 
 struct four_planes {
     vec3 n[4]; /* n . (x, y, z) is at least this: */

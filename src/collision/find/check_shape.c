@@ -1,4 +1,4 @@
-#include "collision/shapes/input.h"
+#include "check_shape.h"
 
 #include <stdio.h>
 

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "check_shape.h"
 #include "collision/base/keys.h"
 #include "collision/base/radix_sort.h"
 #include "collision/shapes/geometry.h"

@@ -1,4 +1,4 @@
-/* Candidates, found. */
+/* Finds the candidates of a step. */
 #ifndef SADMM_COLLISION_FIND_FIND_CANDIDATES_H
 #define SADMM_COLLISION_FIND_FIND_CANDIDATES_H
 

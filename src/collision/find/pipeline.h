@@ -18,8 +18,4 @@ struct sadmm_collision {
     size_t part_count, part_capacity;
 };
 
-/* sadmm_collision_create with a broad phase of choice. */
-sadmm_status sadmm_collision_create_with(const struct sadmm_broad_phase_kind *kind, struct sadmm_collision **out,
-                                         struct sadmm_error *error);
-
 #endif

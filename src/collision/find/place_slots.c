@@ -1,4 +1,5 @@
 /* A step's pose and box of every shape. */
+#include "check_shape.h"
 #include "kernels.h"
 
 /* The larger box: this share of the shape's radius on every side, and the way it goes in some steps, up to its radius.

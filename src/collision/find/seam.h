@@ -85,8 +85,7 @@ SADMM_INLINE vec3 seam_between(const struct sadmm_proxy *p, const struct sadmm_p
     return v3((real)(q->x[0] - p->x[0]), (real)(q->x[1] - p->x[1]), (real)(q->x[2] - p->x[2]));
 }
 
-/* ---- what a shape has, and how far it reaches: own frame
- * ---------------------------------------------------------- */
+/* ---- what a shape has, and how far it reaches: own frame --------------------------------------------------------- */
 
 /* How far x is outside of a hull's faces at least. */
 SADMM_INLINE real seam_hull_outside(const struct sadmm_geometry *g, const double *hulls, vec3 x)
@@ -165,8 +164,7 @@ SADMM_INLINE bool seam_shape_hides(const struct sadmm_geometry *g, const double 
     return v3_dot(u, v3_sub(geometry_farthest(g, hulls, u), x)) > 2 * flush;
 }
 
-/* ---- a contact
- * ---------------------------------------------------------------------------------------------------- */
+/* ---- a contact --------------------------------------------------------------------------------------------------- */
 
 /* Is x, on the piece's surface, hidden by a neighbour, seen along u? Own frame. */
 SADMM_RARE bool seam_hides_point(const struct seam_piece *piece, vec3 x, vec3 u)

@@ -139,8 +139,7 @@ SADMM_INLINE double touch_closing(const struct sadmm_swept_pair *p, const struct
            touch_turning(&at->b, p->b.flight, n);
 }
 
-/* ---- how long nothing comes through the plane between them
- * --------------------------------------------------------- */
+/* ---- how long nothing comes through the plane between them ------------------------------------------------------- */
 
 /* What of a shape's points is round about others that it has, which are tested in its place. */
 SADMM_INLINE double touch_round_of(const struct sadmm_geometry *g)
@@ -204,8 +203,7 @@ SADMM_CALLED double touch_free_for(const struct sadmm_swept_pair *p, const struc
     return then >= 0 ? trial : trial * now / (now - then);
 }
 
-/* ---- the touch
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- the touch --------------------------------------------------------------------------------------------------- */
 
 SADMM_INLINE double touch_thinner(const struct sadmm_swept_pair *p)
 {

@@ -44,8 +44,7 @@ SADMM_INLINE bool advance_needed(const struct sadmm_proxy *a, const struct sadmm
            surface_spin(a) + surface_spin(b) > ADVANCE_SPIN * (a->thin < b->thin ? a->thin : b->thin);
 }
 
-/* ---- how far two shapes are apart at least
- * ------------------------------------------------------------------------ */
+/* ---- how far two shapes are apart at least ----------------------------------------------------------------------- */
 
 /* The largest distance that an axis parts two boxes by; normal: from 2 to 1, frame of 1. */
 SADMM_INLINE real boxes_apart(const struct box_pair *boxes, vec3 *normal)

@@ -245,8 +245,7 @@ SADMM_HOST_INLINE void find_manifold(const struct sadmm_proxy *a, const struct s
         inner_balls_add(a, b, hulls, subshape, cache != 0, start.touch, gravity, dt, m);
 }
 
-/* ---- meshes: their triangles have one pose in common
- * -------------------------------------------------------------- */
+/* ---- meshes: their triangles have one pose in common ------------------------------------------------------------- */
 
 /* When a pair that moves on first touches the triangle, s; HUGE_VAL: not within the step. */
 SADMM_INLINE double mesh_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *blocks,

@@ -4,10 +4,6 @@
 
 #include "shape.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 struct sadmm_collision_input {
     const struct sadmm_shape *shapes;
     size_t shape_count;               /* slots, dead ones included */
@@ -33,12 +29,4 @@ struct sadmm_collision_input {
     double gravity; /* its size, m/s^2: a body at rest just outside the margin falls gravity x dt^2 in its first step */
 };
 
-/* Is the shape in this slot one that collision can work on? Else INVALID_ARGUMENT that names it. Asked for every shape
- * that is new or changed, by whoever takes the input over. */
-sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot,
-                                         struct sadmm_error *error);
-
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -8,13 +8,8 @@
 #include <stdbool.h>
 
 #include "core/base/contact_set.h"
-#include "core/base/error.h"
 #include "core/base/inline.h"
 #include "subadmm/types.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 enum { SADMM_MOST_SUBSHAPES = 65535 }; /* the subshapes of a pair are counted in 32 bits */
 
@@ -34,11 +29,6 @@ struct sadmm_geometry {
 
 /* How a body moves: not at all, as the caller says, by its dynamics. */
 enum sadmm_motion { SADMM_MOTION_NONE, SADMM_MOTION_KINEMATIC, SADMM_MOTION_DYNAMIC };
-
-/* May a shape be of this geometry, on such a body? Else INVALID_ARGUMENT; `name`: what the message calls the geometry,
- * as "def->". Sizes are not checked. */
-sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, enum sadmm_motion motion, const char *name,
-                                  struct sadmm_error *error);
 
 struct sadmm_shape {
     uint32_t geometry; /* handle: its index in the input's geometries */
@@ -64,7 +54,4 @@ struct sadmm_collision_body {
     int32_t mean;         /* what touches it may roll (contact_migrate.h); not 0 of what is not dynamic */
 };
 
-#ifdef __cplusplus
-}
-#endif
 #endif

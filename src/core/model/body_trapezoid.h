@@ -1,5 +1,5 @@
-/* The trapezoid correction of bodies (math/trapezoid.h) where a step ends: which one a body takes, and what a contact point
- * says of its two bodies. One text for every backend, host and device, and for islands with joints; in double. */
+/* The trapezoid correction of bodies (math/trapezoid.h) where a step ends: which one a body takes, and what a contact
+ * point says of its two bodies. One text for every backend, host and device, and for islands with joints; in double. */
 #ifndef SADMM_CORE_MODEL_BODY_TRAPEZOID_H
 #define SADMM_CORE_MODEL_BODY_TRAPEZOID_H
 

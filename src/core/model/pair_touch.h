@@ -1,5 +1,5 @@
-/* What contacts say of the trapezoid corrections of bodies without joints (math/trapezoid.h), pair by pair, on the host: the
- * CPU backend's threads, and steps without a solve. In double. */
+/* What contacts say of the trapezoid corrections of bodies without joints (math/trapezoid.h), pair by pair, on the
+ * host: the CPU backend's threads, and steps without a solve. In double. */
 #ifndef SADMM_CORE_MODEL_PAIR_TOUCH_H
 #define SADMM_CORE_MODEL_PAIR_TOUCH_H
 

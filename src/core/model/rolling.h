@@ -12,11 +12,11 @@
  * by itself, to first order, is in b, and taken off again before the body turns on. Not in islands with joints, whose
  * rows are of the spin halfway, nor where it turns about edges and corners.
  *
- * Stiffness. A body that rocks on a radius of curvature r, its centre of mass h above the contact, has the stiffness N
- * (r - h), N the load, against turning across the normal. Its torque is that of the pose halfway, explicit, and stable
- * for omega dt < 2; beyond, and without friction from less, rocking would grow out of rounding. So where (omega dt)^2
- * is more than ROLLING_STIFF the body gets half of dt^2 times the stiffness added to its inertia, and moves by the
- * velocity after the step: with that any dt is stable, and rocking dies away. In double. */
+ * Stiffness. A body that rocks on a radius of curvature r, its centre of mass h above the contact, has the stiffness
+ * N (r - h), N the load, against turning across the normal. Its torque is that of the pose halfway, explicit, and
+ * stable for omega dt < 2; beyond, and without friction from less, rocking would grow out of rounding. So where
+ * (omega dt)^2 is more than ROLLING_STIFF the body gets half of dt^2 times the stiffness added to its inertia, and
+ * moves by the velocity after the step: with that any dt is stable, and rocking dies away. In double. */
 #ifndef SADMM_CORE_MODEL_ROLLING_H
 #define SADMM_CORE_MODEL_ROLLING_H
 

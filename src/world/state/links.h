@@ -5,6 +5,8 @@
 
 #include <stdint.h>
 
+#include "subadmm/types.h"
+
 struct sadmm_link {
     uint32_t previous, next;
 };

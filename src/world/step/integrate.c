@@ -10,7 +10,8 @@
 #include "core/model/spin.h"
 
 /* Of bodies by themselves; the last is what does not move. */
-static void find_trapezoids(const sadmm_world *world, const sadmm_settings *settings, struct sadmm_trapezoid *trapezoids)
+static void find_trapezoids(const sadmm_world *world, const sadmm_settings *settings,
+                            struct sadmm_trapezoid *trapezoids)
 {
     const size_t n = (size_t)world->dynamic_count;
     for (size_t i = 0; i < n; ++i) {
@@ -36,8 +37,8 @@ static void touch_pair(const struct sadmm_system *system, const sadmm_settings *
     if (b >= 0) touch[b] |= found.body[1];
 }
 
-sadmm_status sadmm_world_integrate(sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings,
-                                   const int32_t *label)
+sadmm_status sadmm_world_integrate(sadmm_world *world, const struct sadmm_system *system,
+                                   const sadmm_settings *settings, const int32_t *label)
 {
     const size_t n = (size_t)world->dynamic_count;
     if (!sadmm_grow_empty(&world->trapezoids, &world->trapezoid_capacity, n + 1, sizeof *world->trapezoids) ||

@@ -21,8 +21,6 @@ void sadmm_world_leave_support_frame(sadmm_world *world, const struct sadmm_syst
 sadmm_status sadmm_world_move_kinematic(sadmm_world *world, const sadmm_settings *settings);
 /* The next sub-step begins there. */
 void sadmm_world_turn_kinematic(sadmm_world *world);
-/* Contact wrenches of dynamic bodies, eq. (12), by the points' impulses as they are. */
-void sadmm_world_find_wrenches(sadmm_world *world, const sadmm_settings *settings);
 /* What the (sub-)step's contacts give kinematic bodies. */
 void sadmm_world_add_kinematic_wrenches(sadmm_world *world, const sadmm_settings *settings);
 /* The step is done. */
