@@ -1,6 +1,6 @@
-/* subadmm-bench shapes: what the manifold of a pair costs one core, by types; what a large mesh costs to make. Pairs rest
- * face on face (round shapes: on a face), each turned in its own way, with the memory of the step before (warm) and
- * without (cold); what is timed is the narrow phase of contact finding as steps run it, matching and all. */
+/* subadmm-bench shapes: what the manifold of a pair costs one core, by types; what a large mesh costs to make. Pairs
+ * rest face on face (round shapes: on a face), each turned in its own way, with the memory of the step before (warm)
+ * and without (cold); what is timed is the narrow phase of contact finding as steps run it, matching and all. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -79,7 +79,11 @@ static sadmm_status append_block(struct bench *b, struct form *form, const doubl
 static sadmm_status add_hull(struct bench *b, const char *name, const double *points, size_t count,
                              double convex_radius, struct sadmm_error *error)
 {
-    const sadmm_hull_def def = {.struct_size = sizeof def, .points = points, .point_count = count, .merge = 1e-6, .convex_radius = convex_radius};
+    const sadmm_hull_def def = {.struct_size = sizeof def,
+                                .points = points,
+                                .point_count = count,
+                                .merge = 1e-6,
+                                .convex_radius = convex_radius};
     sadmm_hull *hull;
     sadmm_status status = sadmm_hull_create(&def, &hull);
     if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_last_message());
@@ -266,7 +270,8 @@ static sadmm_status run(struct bench *b, struct sadmm_error *error)
             printf("%-12s %-12s %8.1f %10.3f %10.3f\n", b->forms[lower].name, b->forms[upper].name, points, warm, cold);
             fflush(stdout);
         }
-    for (int in_triangles = 0; in_triangles < 2 && !interrupted(); ++in_triangles) TRY(measure_making(in_triangles, error));
+    for (int in_triangles = 0; in_triangles < 2 && !interrupted(); ++in_triangles)
+        TRY(measure_making(in_triangles, error));
     return SADMM_OK;
 }
 

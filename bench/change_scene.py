@@ -4,8 +4,8 @@
     subadmm scenes pile:300 --json | bench/change_scene.py hulls > hulls.json
     subadmm scenes pile:200 --json | bench/change_scene.py floor > floor.json
 
-hulls: every box becomes the hull of its eight corners. floor: the first body becomes a kinematic slab of 50 by 50 by 1 m
-(half extents), 1 m lower, that moves at 0.2 m/s along x.
+hulls: every box becomes the hull of its eight corners. floor: the first body becomes a kinematic slab of 50 by 50 by 1
+m (half extents), 1 m lower, that moves at 0.2 m/s along x.
 """
 import itertools
 import json

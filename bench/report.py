@@ -6,8 +6,8 @@
     bench/report.py --check                                 are the tables those of the CSV files? (part of the tests)
 
 A table stands in a document between the lines `<!-- report: NAME -->` and `<!-- end -->`. A CSV file says in its first
-lines on which machine, when, by which version and by which command its figures were measured. Times are medians over the
-repeats of the median step; errors are measured in runs of their own, since the certificate takes time.
+lines on which machine, when, by which version and by which command its figures were measured. Times are medians over
+the repeats of the median step; errors are measured in runs of their own, since the certificate takes time.
 """
 import argparse
 import csv
@@ -57,7 +57,8 @@ def scene_row(tools, scene, *options):
         "threads": first["threads"], "device": first["device"], "bodies": first["bodies"],
         "contacts": round(first["contacts"]["mean"]), "iterations": first["iterations"], "substeps": first["substeps"],
         **{f"{name}_ms": f"{value:.4g}" for name, value in phases.items()},
-        "ncp_end": f"{certified['certificate']['ncp_max']:.2g}", "ncp_most": f"{certified['certificate']['ncp_max_run']:.2g}",
+        "ncp_end": f"{certified['certificate']['ncp_max']:.2g}",
+        "ncp_most": f"{certified['certificate']['ncp_max_run']:.2g}",
         "hash": first["state_hash"],
     }
 
@@ -106,7 +107,8 @@ def rows_convergence(tools):
         if row["kind"] != "count":
             continue
         problem = cold.setdefault((row["name"], row["tolerance"]), {
-            "problem": row["name"], "bodies": row["bodies"], "contacts": row["contacts"], "tolerance": row["tolerance"]})
+            "problem": row["name"], "bodies": row["bodies"], "contacts": row["contacts"],
+            "tolerance": row["tolerance"]})
         problem[row["method"] + "_iterations"] = row["iterations"] or "> " + row["limit"]
         problem[row["method"] + "_ms"] = row["ms"]
     yield from cold.values()
@@ -130,7 +132,8 @@ REPORTS = {
     "readme": (rows_readme, SCENE_COLUMNS),
     "speed": (rows_speed, SCENE_COLUMNS[:1] + HOW_COLUMNS + SCENE_COLUMNS[2:]),
     "gpu": (rows_gpu, SCENE_COLUMNS[:1] + [HOW_COLUMNS[2]] + SCENE_COLUMNS[1:]),
-    "scenes": (rows_scenes, [("name", "name"), ("seconds", "s"), ("iterations", "iterations"), ("description", "what")]),
+    "scenes": (rows_scenes, [("name", "name"), ("seconds", "s"), ("iterations", "iterations"),
+                             ("description", "what")]),
     "motion": (rows_motion, None),
     "convergence": (rows_convergence, [("problem", "problem"), ("contacts", "contacts"), ("tolerance", "to, m/s"),
                                        ("paper_iterations", "paper: iterations"), ("fast_iterations", "fast"),
@@ -196,7 +199,8 @@ def table_of(name):
 
 
 def documents():
-    return [os.path.join(PROJECT, "README.md")] + sorted(glob.glob(os.path.join(PROJECT, "docs", "**", "*.md"), recursive=True))
+    pages = glob.glob(os.path.join(PROJECT, "docs", "**", "*.md"), recursive=True)
+    return [os.path.join(PROJECT, "README.md")] + sorted(pages)
 
 
 def with_tables(text):

@@ -6,9 +6,9 @@
     bench/robots.py FILE.xml ... --steps 2000
 
 Each model is stepped with contacts, from its first pose, with random controls within their ranges that change every 50
-steps, on one thread: MuJoCo by its Euler integrator and defaults, subadmm by what load() chooses, in f64 and in f32. A line
-has the median of the times of blocks of 50 steps, us a step; their ratio; and of subadmm's f64 the natural map, m/s,
-largest of all steps and in how many it is above 1e-6, and steps that made iterations. Run it on a quiet machine.
+steps, on one thread: MuJoCo by its Euler integrator and defaults, subadmm by what load() chooses, in f64 and in f32. A
+line has the median of the times of blocks of 50 steps, us a step; their ratio; and of subadmm's f64 the natural map,
+m/s, largest of all steps and in how many it is above 1e-6, and steps that made iterations. Run it on a quiet machine.
 """
 import argparse
 import importlib.util

@@ -1,5 +1,5 @@
-/* A body of two shapes: a hammer of a steel head and a wooden handle. Mass, centre of mass and principal axes are those of
- * both together. */
+/* A body of two shapes: a hammer of a steel head and a wooden handle. Mass, centre of mass and principal axes are those
+ * of both together. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,7 +7,8 @@
 
 enum { PARTS = 2 };
 
-/* Both shapes are placed in one frame, the layout. It starts at `position` in the world, with its axes along the world's. */
+/* Both shapes are placed in one frame, the layout. It starts at `position` in the world, with its axes along the
+ * world's. */
 static sadmm_status add_body_of(sadmm_world *world, sadmm_shape_def shapes[PARTS], const double densities[PARTS],
                                 const double position[3], sadmm_body_id *id)
 {

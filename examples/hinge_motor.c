@@ -1,4 +1,5 @@
-/* A motor in a hinge opens a door until the hinge's limit stops it; the motor's torque and the limit's are read back. */
+/* A motor in a hinge opens a door until the hinge's limit stops it; the motor's torque and the limit's are read
+ * back. */
 #include <stdio.h>
 
 #include <subadmm/subadmm.h>

@@ -29,7 +29,8 @@ LISTS = {  # of the schema's "$defs"
 NAMES = {"METHOD": "SADMM_METHODS", "BODY_TYPE": "SADMM_BODY_TYPES", "SHAPE_TYPE": "SADMM_SHAPE_TYPES",
          "JOINT_KIND": "SADMM_JOINT_KINDS", "DRIVE": "SADMM_DRIVES"}
 NUMBERS = {"VECTOR": 3, "TURN": 4, "TWIST": 6}
-# Left out, these have another value in files than in a definition, which their descriptions say; those of "type" must be there.
+# Left out, these have another value in files than in a definition, which their descriptions say; those of "type" must
+# be there.
 NO_DEFAULT = {("settings", "substeps"), ("settings", "iterations"), ("shape", "type")}
 
 

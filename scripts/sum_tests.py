@@ -3,9 +3,10 @@
 
 usage: sum_tests.py [--broken "STEP STEP"] [--left-out "STEP STEP"] [--passed "STEP STEP"] [TESTLOG.json | JUNIT.xml]...
 
-A Check program counts with each of its checks, any other program as one. A program that ended without its checks' summary
-(a crash, a time-out) is one failure, and so is a step that did not build or a log that is missing. A step that could not
-run on this machine is one skipped, one that is a check by itself one passed. Exit status 1 when something failed or nothing passed.
+A Check program counts with each of its checks, any other program as one. A program that ended without its checks'
+summary (a crash, a time-out) is one failure, and so is a step that did not build or a log that is missing. A step that
+could not run on this machine is one skipped, one that is a check by itself one passed. Exit status 1 when something
+failed or nothing passed.
 """
 import argparse
 import json

@@ -111,8 +111,8 @@ step_python() {
     rm -rf "$folder/environment" "$folder/meson-logs"
     mkdir -p "$folder/meson-logs" # where every step has its log
     python3 -m venv "$folder/environment" || return 1
-    # One instruction set, no CUDA: the steps beside this one have the others. The command is built to compare with: another
-    # instruction set rounds otherwise.
+    # One instruction set, no CUDA: the steps beside this one have the others. The command is built to compare with:
+    # another instruction set rounds otherwise.
     "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "$project[test,import,usd,decompose,view]" \
         -Csetup-args=-Dcuda=disabled -Csetup-args=-Dcpu_isas=avx2 -Csetup-args=-Dwerror=true \
         -Csetup-args=-Dcli=enabled \

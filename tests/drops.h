@@ -302,9 +302,9 @@ static inline void drop_worlds(int form, uint64_t first, int worlds)
     static const double steps[] = {0.001, 0.005, 0.01, 0.02};
     if (!drop_form_is_there(form)) return;
     for (int ground = 0; ground < DROP_GROUNDS; ++ground) {
-        /* What is left to the solve (meshes, what rests on something): iterations leave a share of the speed of an impact
-         * of two dynamic bodies, or of coupled contacts, which may be more than a compound of several shapes, a needle or
-         * a leaf is thick: of these those that are through are counted, at most two in a thousand. */
+        /* What is left to the solve (meshes, what rests on something): iterations leave a share of the speed of an
+         * impact of two dynamic bodies, or of coupled contacts, which may be more than a compound of several shapes, a
+         * needle or a leaf is thick: of these those that are through are counted, at most two in a thousand. */
         const bool counted = ground == DROP_FLOATING || form >= DROP_COMPOUND;
         int through = 0;
         for (int k = 0; k < worlds; ++k) {

@@ -1,5 +1,5 @@
-/* The structs that may grow (subadmm/status.h), as they were in their first version, 0.1.0: programs compiled then go on
- * using them. Nothing here changes; a struct that a later version begins with is added.
+/* The structs that may grow (subadmm/status.h), as they were in their first version, 0.1.0: programs compiled then go
+ * on using them. Nothing here changes; a struct that a later version begins with is added.
  *
  * FIRST_x(M): M(type, name, dimensions) of every member of sadmm_x. */
 #ifndef SADMM_TESTS_FIRST_VERSION_H
@@ -21,8 +21,8 @@
     M(double, contact_margin, ) M(sadmm_tasks, tasks, ) M(struct first_settings, settings, )
 
 #define FIRST_body_def(M) \
-    M(size_t, struct_size, ) M(const char *, name, ) M(sadmm_body_type, type, ) M(double, mass, ) M(double, inertia, [3]) \
-    M(double, position, [3]) M(double, orientation, [4]) M(double, linear_velocity, [3]) \
+    M(size_t, struct_size, ) M(const char *, name, ) M(sadmm_body_type, type, ) M(double, mass, ) \
+    M(double, inertia, [3]) M(double, position, [3]) M(double, orientation, [4]) M(double, linear_velocity, [3]) \
     M(double, angular_velocity, [3]) M(int32_t, environment, ) M(double, gravity_scale, ) \
     M(double, linear_damping, ) M(double, angular_damping, )
 

@@ -50,10 +50,11 @@ int main(int argc, char **argv)
     MUST(sadmm_world_report(world, &report));
     MUST(sadmm_world_body_def(world, hinge.body_b, &body));
     MUST(sadmm_world_joint_def(world, joint, &hinge));
-    if (report.step != 10 || report.joints != 1 || body.mass != 1 || !(body.linear_velocity[2] * body.linear_velocity[2] > 1e-4) ||
-        hinge.coordinates[5].armature != 0.5 || sadmm_world_settings(world).dt != 0.002) {
-        fprintf(stderr, "%s: step %d, %d joints, %g kg, %g m/s, armature %g\n", argv[0], (int)report.step, report.joints, body.mass,
-                body.linear_velocity[2], hinge.coordinates[5].armature);
+    if (report.step != 10 || report.joints != 1 || body.mass != 1 ||
+        !(body.linear_velocity[2] * body.linear_velocity[2] > 1e-4) || hinge.coordinates[5].armature != 0.5 ||
+        sadmm_world_settings(world).dt != 0.002) {
+        fprintf(stderr, "%s: step %d, %d joints, %g kg, %g m/s, armature %g\n", argv[0], (int)report.step,
+                report.joints, body.mass, body.linear_velocity[2], hinge.coordinates[5].armature);
         return 1;
     }
     sadmm_world_destroy(world);

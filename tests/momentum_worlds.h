@@ -109,8 +109,8 @@ static inline unsigned mechanism_keeps(enum mechanism_place place, bool space)
 
 /* A chain of boxes with three different moments, on hinges in a row or (space) on ball joints and universal ones by
  * turns, that is hit by two balls; with a motor, a spring and a limit. Not in space all of it turns about z. At the
- * default step rows turn by more than a step resolves (core/model/joint_law.h): what is not in the air keeps its momentum
- * by shorter ones. */
+ * default step rows turn by more than a step resolves (core/model/joint_law.h): what is not in the air keeps its
+ * momentum by shorter ones. */
 static inline void add_mechanism(sadmm_world *world, enum mechanism_place place, bool space, double friction)
 {
     static const double half[3] = {0.1, 0.05, 0.03}, ball[3] = {0.1, 0, 0}, identity[4] = {1, 0, 0, 0};
@@ -188,8 +188,8 @@ static inline void centre_of_mass(sadmm_world *world, const sadmm_body_state *st
     for (int k = 0; k < 3; ++k) centre[k] = sum[k] / mass;
 }
 
-/* Of the bodies that move, at the places of `before`, about `centre`: after the step; without `after`, what the free motion
- * has. */
+/* Of the bodies that move, at the places of `before`, about `centre`: after the step; without `after`, what the free
+ * motion has. */
 static inline struct total_momentum momentum_of(sadmm_world *world, const sadmm_body_state *before,
                                                 const sadmm_body_state *after, const double centre[3])
 {
@@ -239,7 +239,8 @@ static inline void expect_momentum_kept(sadmm_world *world, unsigned kept, doubl
     free(after);
 }
 
-/* Of all bodies about the world's origin, where and as fast as they are; before: and what the step's forces will give. */
+/* Of all bodies about the world's origin, where and as fast as they are; before: and what the step's forces will
+ * give. */
 static inline struct total_momentum whole_momentum(sadmm_world *world, bool before)
 {
     const sadmm_settings settings = sadmm_world_settings(world);

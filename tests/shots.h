@@ -1,6 +1,7 @@
 /* Bodies of any shape, 0.5 mm to 1 m large, shot at one another: two to an environment, both dynamic, at 0.1 to 1,000
  * m/s, with or without spin, friction and restitution. They must not pass through each other: the balls about their
- * centres of mass that the two hold never come closer than half the sum of their radii, on the straight way of a step. */
+ * centres of mass that the two hold never come closer than half the sum of their radii, on the straight way of a
+ * step. */
 #ifndef TESTS_SHOTS_H
 #define TESTS_SHOTS_H
 

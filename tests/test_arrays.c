@@ -91,13 +91,16 @@ static void get(const struct machine *m, sadmm_array array, double *values)
     MUST(m->world, sadmm_world_get_array(m->world, array, 0, rows, values));
 }
 
-static void expect_row(const double *row, const double *wanted, int count) { ck_assert_mem_eq(row, wanted, (size_t)count * sizeof *row); }
+static void expect_row(const double *row, const double *wanted, int count)
+{
+    ck_assert_mem_eq(row, wanted, (size_t)count * sizeof *row);
+}
 
 START_TEST(arrays_read_what_single_calls_read)
 {
     const struct machine m = build_machine();
-    double state[MOST], wrench[MOST], contact[MOST], inertia[MOST], position[MOST], speed[MOST], drive[MOST], load[MOST],
-        target[MOST], target_speed[MOST], aim[MOST], reaction[MOST];
+    double state[MOST], wrench[MOST], contact[MOST], inertia[MOST], position[MOST], speed[MOST], drive[MOST],
+        load[MOST], target[MOST], target_speed[MOST], aim[MOST], reaction[MOST];
     const double push[3] = {1, 2, 3}, turn[3] = {0.1, 0.2, 0.3};
     sadmm_body_id second;
     MUST(m.world, sadmm_world_body_at(m.world, 1, &second));
@@ -242,7 +245,8 @@ START_TEST(bad_rows_are_refused_with_all_others)
     } cases[] = {
         {SADMM_ARRAY_BODY_STATE, 7, 1, NAN, "values, row 7: state->position[1] = nan"},
         {SADMM_ARRAY_BODY_STATE, 3, 3, 2, "values, row 3: state->orientation"},
-        {SADMM_ARRAY_BODY_STATE, 0, 7, 1, "values, row 0: state->linear_velocity[0] = 1: must be 0, for the body is static"},
+        {SADMM_ARRAY_BODY_STATE, 0, 7, 1,
+         "values, row 0: state->linear_velocity[0] = 1: must be 0, for the body is static"},
         {SADMM_ARRAY_BODY_WRENCH, 0, 2, 1, "values, row 0: column 2 = 1: must be 0, for the body is static"},
         {SADMM_ARRAY_BODY_WRENCH, 2, 5, INFINITY, "values, row 2: torque[2] = inf"},
         {SADMM_ARRAY_BODY_INERTIA, 2, 0, -1, "values, row 2: mass = -1"},
@@ -253,7 +257,8 @@ START_TEST(bad_rows_are_refused_with_all_others)
         {SADMM_ARRAY_COUPLING_TARGET, 1, 2, 1e10, "values, row 1: position[2] = 1e+10"},
     };
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
-        const int32_t rows = sadmm_world_array_rows(m.world, cases[k].array), columns = sadmm_array_columns(cases[k].array);
+        const int32_t rows = sadmm_world_array_rows(m.world, cases[k].array),
+                      columns = sadmm_array_columns(cases[k].array);
         double old[MOST];
         get(&m, cases[k].array, old);
         memcpy(values, old, sizeof values);

@@ -305,8 +305,8 @@ START_TEST(trees_and_the_sparse_factor_agree)
             all = all && t.articulations->parts[k].kept;
         }
         for (int k = 0; all && k < 6 * t.bodies; ++k)
-            ck_assert_msg(fabs(t.velocity[k] - by_tree[k]) < 1e-6 * (1 + fabs(by_tree[k])), "seed %d: %g and %g", (int)seed,
-                          t.velocity[k], by_tree[k]);
+            ck_assert_msg(fabs(t.velocity[k] - by_tree[k]) < 1e-6 * (1 + fabs(by_tree[k])), "seed %d: %g and %g",
+                          (int)seed, t.velocity[k], by_tree[k]);
         compared += all;
         free_tree(&t);
     }

@@ -1,5 +1,5 @@
-/* Scale of gravity and damping of bodies against formulas: on every CPU backend here, on CUDA in test_cuda_body_forces.c
- * (BODIES_ON_CUDA), which includes this file.
+/* Scale of gravity and damping of bodies against formulas: on every CPU backend here, on CUDA in
+ * test_cuda_body_forces.c (BODIES_ON_CUDA), which includes this file.
  *
  * Velocities of what moves under constant forces, gravity by any scale, and damping are exact at the end of every step,
  * v = e^(-c t) v_0 + (1 - e^(-c t)) a / c (core/model/forces.h): only rounding remains, of as many steps as there are.
@@ -160,8 +160,8 @@ START_TEST(a_damped_block_slides_as_coulomb_says)
 END_TEST
 
 /* Two cubes that touch in the air, weightless the lower one, twice its weight the upper one: they fall as one, at g,
- * and the upper one presses by 2 m g - m g = m g. So do two of different damping, m a_i = m g - c_i m v + - N, ever more
- * slowly, at v' = g - (c_1 + c_2) v / 2, and N = m (c_1 - c_2) v / 2. */
+ * and the upper one presses by 2 m g - m g = m g. So do two of different damping, m a_i = m g - c_i m v + - N, ever
+ * more slowly, at v' = g - (c_1 + c_2) v / 2, and N = m (c_1 - c_2) v / 2. */
 START_TEST(bodies_of_different_forces_stay_together)
 {
     enum { STEPS = 40 };

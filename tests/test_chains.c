@@ -1,5 +1,5 @@
-/* Chains whose links a step does not resolve: geometric stiffness by the midpoint rule (core/model/stiffening.h), joints
- * closed at the end of a step (core/model/joint_close.h). */
+/* Chains whose links a step does not resolve: geometric stiffness by the midpoint rule (core/model/stiffening.h),
+ * joints closed at the end of a step (core/model/joint_close.h). */
 #include "core/math/rigid.h"
 #include "fewer.h"
 #include "scene_tools.h"
@@ -140,7 +140,8 @@ START_TEST(ropes_stay_whole)
 {
     static const double steps[] = {0.002, 0.005, 0.01, 1. / 60};
     static const int links[] = {10, 20, 40, 60};
-    /* of a link; at 5 ms rows turn by nearly what a step resolves: joints open by the order of the step, and are left */
+    /* of a link; at 5 ms rows turn by nearly what a step resolves: joints open by the order of the step, and are
+     * left */
     static const double open[] = {1e-3, 1e-2, 1e-3, 1e-3};
     const double dt = steps[_i % 4];
     const int n = links[_i % 4];
@@ -159,8 +160,8 @@ START_TEST(ropes_stay_whole)
 }
 END_TEST
 
-/* How far it may be open is a matter of its links, not of where in the world it is held: a link that goes round by a radian
- * a step. */
+/* How far it may be open is a matter of its links, not of where in the world it is held: a link that goes round by a
+ * radian a step. */
 START_TEST(far_links_stay_where_they_are_held)
 {
     const double dt = 1. / 60, spin = 1 / dt;

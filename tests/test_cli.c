@@ -266,7 +266,8 @@ START_TEST(run_reports_null)
     json_decref(r);
     r = run_json("run pyramid:2 --steps 0 --certify --json=-");
     static const char *const unknown[] = {"contacts.mean", "contacts.max", "ms_per_step.total",
-                                          "residual",      "certificate",  "penetration_max", "limited_steps", "joint_drift",
+                                          "residual",      "certificate",  "penetration_max", "limited_steps",
+                                          "joint_drift",
                                           "backend",       "threads",      "device"};
     for (size_t k = 0; k < sizeof unknown / sizeof *unknown; ++k)
         ck_assert_msg(json_is_null(at(r, unknown[k])), "%s is not null", unknown[k]);

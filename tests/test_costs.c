@@ -1,6 +1,6 @@
-/* Costs that grow no faster than the work: so many calls on a world of so many objects, in the orders that are worst for
- * lists, are counted in operations, not in time. The library's sources are compiled once more for this program with a call at
- * every branch (-fsanitize-coverage=trace-pc), and what it copies and clears counts by the cache line. */
+/* Costs that grow no faster than the work: so many calls on a world of so many objects, in the orders that are worst
+ * for lists, are counted in operations, not in time. The library's sources are compiled once more for this program with
+ * a call at every branch (-fsanitize-coverage=trace-pc), and what it copies and clears counts by the cache line. */
 #include <stdint.h>
 
 #include "scene_tools.h"
@@ -357,8 +357,8 @@ static double cost(int which, int n)
     return count;
 }
 
-/* Four times the objects: 4 times the cost where it is linear, 4 log(4 n) / log(n) = 5.0 where it is n log n at n = 512, 8
- * where it is n^1.5, 16 where it is quadratic. */
+/* Four times the objects: 4 times the cost where it is linear, 4 log(4 n) / log(n) = 5.0 where it is n log n at n =
+ * 512, 8 where it is n^1.5, 16 where it is quadratic. */
 START_TEST(costs_grow_as_the_work)
 {
     const double few = cost(_i, 512), many = cost(_i, 2048);

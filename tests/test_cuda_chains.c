@@ -1,5 +1,6 @@
-/* Chains whose links a step does not resolve, on the device (core/model/stiffening.h, joint_close.h): steps that it makes
- * alone against the same kernels driven by the host, to the last bit on the emulated device; and against the CPU. */
+/* Chains whose links a step does not resolve, on the device (core/model/stiffening.h, joint_close.h): steps that it
+ * makes alone against the same kernels driven by the host, to the last bit on the emulated device; and against the
+ * CPU. */
 #include "core/model/joint_trapezoid.h"
 #include "cuda_worlds.h"
 #include "fewer.h"
@@ -62,8 +63,8 @@ static void throw_body(sadmm_world *world, sadmm_body_id id, double x, double y)
 }
 
 /* Four links under 40 kg, kicked; a rope that is let go from the level; two blocks in the air that are thrown apart on
- * links; a block on the floor, thrown so that it goes round on links; one at the end of others, which is hit by a box and by
- * a block that goes round beside it. */
+ * links; a block on the floor, thrown so that it goes round on links; one at the end of others, which is hit by a box
+ * and by a block that goes round beside it. */
 static sadmm_world *chains(int precision, sadmm_method method, int substeps, double dt)
 {
     sadmm_world *world = new_world(precision, method, substeps, dt);
@@ -163,8 +164,9 @@ START_TEST(resident_chains_equal_those_by_host)
         ck_assert(!worlds[0]->resident.loaded && worlds[1]->resident.loaded == (step > 0 || way == 1));
         if (EMULATED) {
             expect_same_world(worlds[0], worlds[1], what);
-            ck_assert_msg(world_report(worlds[0]).joint_drift == world_report(worlds[1]).joint_drift, "%s: off by %g, %g",
-                          what, world_report(worlds[0]).joint_drift, world_report(worlds[1]).joint_drift);
+            ck_assert_msg(world_report(worlds[0]).joint_drift == world_report(worlds[1]).joint_drift,
+                          "%s: off by %g, %g", what, world_report(worlds[0]).joint_drift,
+                          world_report(worlds[1]).joint_drift);
         }
         count(worlds[0], &counts);
     }
@@ -212,8 +214,8 @@ START_TEST(chains_move_as_on_the_cpu)
         apart = fmax(apart, fabs(drift - fmax(drift, world_report(worlds[0]).joint_drift)));
     }
     ck_assert_double_lt(apart, EMULATED ? 1e-12 : 1e-6); /* a GPU has sines of its own */
-    ck_assert_double_lt(most, 0.01); /* 0.2 m/s over omega = (3 T / (m l))^1/2 = 380 /s, and what its joints are opened by
-                                        at first; by forces along old directions links would go round */
+    ck_assert_double_lt(most, 0.01); /* 0.2 m/s over omega = (3 T / (m l))^1/2 = 380 /s, and what its joints are opened
+                                        by at first; by forces along old directions links would go round */
     ck_assert_double_lt(drift, 1e-3 * LENGTH);
     for (int k = 0; k < 2; ++k) sadmm_world_destroy(worlds[k]);
 }
@@ -222,8 +224,8 @@ END_TEST
 /* ---- windows that fold ------------------------------------------------------------------------------------------- */
 
 /* A rod of 1 kg along (x, z) of length 1 about its middle, which moves with `velocity` and turns at `rate` about y. */
-static sadmm_body_id add_rod(sadmm_world *world, double middle_x, double middle_z, double angle, const double velocity[3],
-                             double rate)
+static sadmm_body_id add_rod(sadmm_world *world, double middle_x, double middle_z, double angle,
+                             const double velocity[3], double rate)
 {
     sadmm_body_def def = sadmm_body_def_default();
     sadmm_body_id id;

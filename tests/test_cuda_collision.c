@@ -45,7 +45,8 @@ static const struct soup_kind soups[] = {
      .size_high = 1, .static_share = 0.1, .dead_share = 0.1, .steps = 4, .tree_from = 1, .hulls = 6},
     {.name = "hulls among others, all pairs", .bodies = 60, .shapes_a_body = 2, .planes = 1, .density = 3,
      .size_low = 0.3, .size_high = 1, .static_share = 0.1, .friction_share = 1, .steps = 4, .hulls = 6},
-    {.name = "on meshes, tree", .bodies = 100, .shapes_a_body = 1, .groups = 3, .planes = 2, .density = 3, .size_low = 0.3,
+    {.name = "on meshes, tree", .bodies = 100, .shapes_a_body = 1, .groups = 3, .planes = 2, .density = 3,
+     .size_low = 0.3,
      .size_high = 1, .static_share = 0.1, .dead_share = 0.1, .steps = 4, .tree_from = 1, .hulls = 5, .meshes = 4},
     {.name = "on meshes, all pairs", .bodies = 60, .shapes_a_body = 1, .planes = 1, .density = 3, .size_low = 0.3,
      .size_high = 1, .static_share = 0.1, .friction_share = 1, .steps = 4, .hulls = 5, .meshes = 4},
@@ -316,7 +317,8 @@ END_TEST
 
 static double waves(double x, double y) { return 0.2 * sin(1.3 * x) + 0.1 * cos(2.1 * y); }
 
-/* One ball that all of a large mesh is near: more of its tree waits than lanes of a warp may go through side by side. */
+/* One ball that all of a large mesh is near: more of its tree waits than lanes of a warp may go through side by
+ * side. */
 START_TEST(a_ball_near_a_whole_mesh)
 {
     struct soup *ground = soup_ground(100, 100, 0.5, 0.2, 7, waves);

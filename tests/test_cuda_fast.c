@@ -259,7 +259,8 @@ static struct contact_problem *boxes(int count, int held)
     for (int i = 0; i < count; ++i) {
         contact_problem_box(p, 1 + i % 3, 0.1, 0.1, 0.1, i, 0, 0.1);
         for (int k = 0; i < held && k < 4; ++k)
-            contact_problem_touch(p, -1, i, (double[3]){i + (k & 1 ? 0.1 : -0.1), k & 2 ? 0.1 : -0.1, 0}, up, 0, 0.5, 0);
+            contact_problem_touch(p, -1, i, (double[3]){i + (k & 1 ? 0.1 : -0.1), k & 2 ? 0.1 : -0.1, 0}, up, 0, 0.5,
+                                  0);
     }
     return p;
 }
@@ -267,8 +268,8 @@ static struct contact_problem *resting(void) { return boxes(2000, 2000); }
 static struct contact_problem *few_in_flight(void) { return boxes(1200, 10); }
 static struct contact_problem *many_in_flight(void) { return boxes(1600, 10); }
 
-/* 2,000 islands of a side and a body: a block of 1,024 threads (f32; f64: 512) takes 256 sides (128), and by cost a part
- * may be all sides. So there are 4 (8) rounds of one block on each of the emulated device's 4 multiprocessors. */
+/* 2,000 islands of a side and a body: a block of 1,024 threads (f32; f64: 512) takes 256 sides (128), and by cost a
+ * part may be all sides. So there are 4 (8) rounds of one block on each of the emulated device's 4 multiprocessors. */
 START_TEST(islands_in_rounds)
 {
     static const struct scene scene = {"resting boxes", resting, RIGID, true, 0};

@@ -397,8 +397,8 @@ static void add_gear(sadmm_world *world, sadmm_joint_id one, int first, sadmm_jo
     MUST(world, sadmm_world_add_gear(world, &def, NULL));
 }
 
-/* A weight that swings on a spring as stiff as a stop beyond its slack, a slide that snaps through, and a spring between
- * two bodies that pulls ever more. */
+/* A weight that swings on a spring as stiff as a stop beyond its slack, a slide that snaps through, and a spring
+ * between two bodies that pulls ever more. */
 static void add_tables(sadmm_world *world)
 {
     static const double stop[2][4] = {{-0.1, -0.02, 0.02, 0.03}, {-5, 0, 0, 4000}},
@@ -688,8 +688,8 @@ START_TEST(parts_of_any_size_are_solved)
         for (int k = 0; k < 2; ++k) step_world(worlds[k], 1);
         expect_same_joints(worlds[0], worlds[1], _i < 2 ? "chain" : "plate");
     }
-    ck_assert_int_gt(world_report(worlds[1]).contacts, _i < 2 ? 120 : 1000); /* a link's one; four of 289 boxes, or it is
-                                                                                no test of many */
+    ck_assert_int_gt(world_report(worlds[1]).contacts, _i < 2 ? 120 : 1000); /* a link's one; four of 289 boxes, or it
+                                                                                is no test of many */
     for (int k = 0; k < 2; ++k) sadmm_world_destroy(worlds[k]);
 }
 END_TEST

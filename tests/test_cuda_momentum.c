@@ -78,8 +78,8 @@ START_TEST(bodies_on_ice)
 }
 END_TEST
 
-/* To the last bit by the emulated device; a GPU's sines are rounded otherwise, and what is solved in single precision, and
- * where a contact begins, follows. */
+/* To the last bit by the emulated device; a GPU's sines are rounded otherwise, and what is solved in single precision,
+ * and where a contact begins, follows. */
 static void expect_close_worlds(sadmm_world *a, sadmm_world *b, const char *what)
 {
     if (EMULATED) ck_assert_msg(state_hash(a) == state_hash(b), "%s", what);

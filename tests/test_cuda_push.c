@@ -46,12 +46,12 @@ static void add_lift(sadmm_world *world)
     set_velocity(world, add_box(world, -3, 0, 0.19, 0.1, 2, 0.5), 2, 0.7, 0);
 }
 
-/* With all of it the second problem is a cold one; what is sunk alone, a stack, makes it a warm one from the second step
- * on; with a lift, which is kinematic, pushes stay in velocities. */
+/* With all of it the second problem is a cold one; what is sunk alone, a stack, makes it a warm one from the second
+ * step on; with a lift, which is kinematic, pushes stay in velocities. */
 enum mixture { ALL, SUNK, LIFT, MIXTURES };
 
-/* Islands that are pushed and such that are not: in the air, where some turn, sunk into the ground and into each other, at
- * rest, on ice, in a lift. */
+/* Islands that are pushed and such that are not: in the air, where some turn, sunk into the ground and into each other,
+ * at rest, on ice, in a lift. */
 static void add_mixture(sadmm_world *world, enum mixture mixture)
 {
     add_floor(world, 0.5);
@@ -69,7 +69,8 @@ static void add_mixture(sadmm_world *world, enum mixture mixture)
 }
 
 /* In the queue and step by step by the host, to the same bits in every tier; in double as on the cpu, but for rounding:
- * of 1e-16, by a factor of ten or so a step where bodies run into each other. Left in velocities, pushes differ by 1 m/s. */
+ * of 1e-16, by a factor of ten or so a step where bodies run into each other. Left in velocities, pushes differ by 1
+ * m/s. */
 START_TEST(mixtures_agree)
 {
     const int precision = _i / 4, substeps = 1 + _i % 2;
@@ -101,7 +102,8 @@ START_TEST(mixtures_agree)
                 ck_assert_double_le(distance(a.linear_velocity, b.linear_velocity), 1e-9);
                 ck_assert_double_le(distance(a.angular_velocity, b.angular_velocity), 1e-8);
             }
-            if (mixture == LIFT) ck_assert_double_gt(apart, 0.5); /* its pushes are in velocities, of up to 1 m/s each */
+            if (mixture == LIFT) ck_assert_double_gt(apart, 0.5); /* its pushes are in velocities, of up to 1 m/s
+                                                                     each */
             sadmm_world_destroy(world);
         }
         sadmm_world_destroy(cpu);

@@ -3,13 +3,13 @@
 
     test_docs.py PROJECT
 
-In README.md, CONTRIBUTING.md, CHANGELOG.md, docs/*.md, docs/guide/*.md and docs/internals/*.md: links lead to files, and
-to headings where they name one; in back quotes, files and folders exist, and so do functions, structs, macros and
+In README.md, CONTRIBUTING.md, CHANGELOG.md, docs/*.md, docs/guide/*.md and docs/internals/*.md: links lead to files,
+and to headings where they name one; in back quotes, files and folders exist, and so do functions, structs, macros and
 options; a block of C or Python that names a program of examples in its first line is part of that program, which is
 compiled and run; places of generated figures have an end, and a name that no other place has.
-docs/internals/architecture.md names every folder of src. README.md leads to every page of docs/internals. The user's guide,
-docs/guide, has no other block of C; its other blocks of Python compile (python/tests/test_guide.py runs them); its index
-leads to every page.
+docs/internals/architecture.md names every folder of src. README.md leads to every page of docs/internals. The user's
+guide, docs/guide, has no other block of C; its other blocks of Python compile (python/tests/test_guide.py runs them);
+its index leads to every page.
 """
 import os
 import re
@@ -53,7 +53,7 @@ def wrong_links(project, document, text):
 def wrong_names(text, paths, sources):
     # What stands in back quotes, outside of blocks and of file lists' indentation.
     for name in sorted(set(re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)))):
-        if re.fullmatch(r"[\w./\-]+\.(c|h|cu|cpp|py|sh|md|ini|csv|png|build|txt|map)", name) or re.fullmatch(r"[\w\-]+(/[\w\-]+)*/", name):
+        if re.fullmatch(r"[\w./\-]+\.(c|h|cu|cpp|py|sh|md|ini|csv|png|build|txt|map)|[\w\-]+(/[\w\-]+)*/", name):
             if not any(path == name or path.endswith("/" + name) for path in paths):
                 yield f"`{name}`: no such file or folder"
         elif re.fullmatch(r"(sadmm|SADMM|CUDA|CPU)_\w+(\(.*\))?|struct \w+", name):
@@ -96,7 +96,8 @@ def wrong_examples(project, text):
 
 
 def wrong_reports(text, seen):
-    """Places of generated figures: <!-- report: NAME -->, what a generator writes, <!-- end -->. `seen`: their names."""
+    """Places of generated figures: <!-- report: NAME -->, what a generator writes, <!-- end -->. `seen`: their
+    names."""
     name = None
     for begin, end in re.findall(r"^<!-- (?:report: ([\w-]+)|(end)) -->$", text, re.M):
         if end:
@@ -160,7 +161,8 @@ def main():
     for document in documents:
         text = read(os.path.join(project, document))
         errors = list(wrong_links(project, document, text)) + list(wrong_names(text, paths, sources)) + \
-            list(wrong_commands(text, sources)) + list(wrong_examples(project, text)) + list(wrong_reports(text, reports))
+            list(wrong_commands(text, sources)) + list(wrong_examples(project, text)) + \
+            list(wrong_reports(text, reports))
         if document == "README.md":
             errors += missing_links(text, documents, "docs/internals/")
         if document == "docs/internals/architecture.md":

@@ -203,7 +203,11 @@ static sadmm_world *heap(int solver, int threads, bool sensors)
         sadmm_body_def cube = cube_def(0.13 * (n % 3), 0.11 * (n / 3 % 2), 0.3 + 0.23 * (n / 2));
         cube.angular_velocity[n % 3] = 3;
         const sadmm_body_id body = add_defined(world, &cube);
-        give(world, body, n % 4 == 1 ? SADMM_SHAPE_CYLINDER : n % 4 == 3 ? SADMM_SHAPE_SPHERE : SADMM_SHAPE_BOX, 0.1, false);
+        give(world, body,
+             n % 4 == 1   ? SADMM_SHAPE_CYLINDER
+             : n % 4 == 3 ? SADMM_SHAPE_SPHERE
+                          : SADMM_SHAPE_BOX,
+             0.1, false);
     }
     if (!sensors) return world;
     for (int n = 0; n < HEAP; n += 3) give(world, body_at(world, n + 1), SADMM_SHAPE_SPHERE, 0.16, true);
@@ -318,7 +322,8 @@ START_TEST(who_is_seen)
     const sadmm_body_id still = add_still(world, SADMM_BODY_STATIC, 0, 0, 0),
                         wall = add_still(world, SADMM_BODY_STATIC, 0, 0, 0),
                         kinematic = add_still(world, SADMM_BODY_KINEMATIC, 0, 0, 0),
-                        a = add_still(world, SADMM_BODY_DYNAMIC, 0, 0, 0), b = add_still(world, SADMM_BODY_DYNAMIC, 0, 0, 0);
+                        a = add_still(world, SADMM_BODY_DYNAMIC, 0, 0, 0),
+                        b = add_still(world, SADMM_BODY_DYNAMIC, 0, 0, 0);
     const sadmm_shape_id eye = give(world, still, SADMM_SHAPE_SPHERE, 1, true),
                          moving_eye = give(world, a, SADMM_SHAPE_BOX, 1, true);
     const sadmm_shape_id of_still = give(world, still, SADMM_SHAPE_SPHERE, 1, false),
@@ -522,13 +527,16 @@ START_TEST(bad_input)
     refused(world, sadmm_world_add_shape(world, body, &shape, NULL), SADMM_ERROR_INVALID_ARGUMENT, "def->sensor");
     refused(world, sadmm_world_record_events(world, -1), SADMM_ERROR_INVALID_ARGUMENT, "capacity = -1");
     refused(world, sadmm_world_record_events(world, (1 << 24) + 1), SADMM_ERROR_INVALID_ARGUMENT, "16777216");
-    refused(world, sadmm_world_take_events(world, -1, events, &count, NULL), SADMM_ERROR_INVALID_ARGUMENT, "capacity = -1");
+    refused(world, sadmm_world_take_events(world, -1, events, &count, NULL), SADMM_ERROR_INVALID_ARGUMENT,
+            "capacity = -1");
     refused(world, sadmm_world_take_events(world, 1, NULL, &count, NULL), SADMM_ERROR_INVALID_ARGUMENT, "events");
     refused(world, sadmm_world_take_events(world, 1, events, NULL, NULL), SADMM_ERROR_INVALID_ARGUMENT, "count");
-    refused(world, sadmm_world_sensor_overlaps(world, solid, 1, shapes, &count), SADMM_ERROR_INVALID_ARGUMENT, "sensor");
+    refused(world, sadmm_world_sensor_overlaps(world, solid, 1, shapes, &count), SADMM_ERROR_INVALID_ARGUMENT,
+            "sensor");
     refused(world, sadmm_world_sensor_overlaps(world, stale, 1, shapes, &count), SADMM_ERROR_STALE_ID, "sensor");
     const sadmm_shape_id sensor = give(world, body, SADMM_SHAPE_SPHERE, 1, true);
-    refused(world, sadmm_world_sensor_overlaps(world, sensor, -1, shapes, &count), SADMM_ERROR_INVALID_ARGUMENT, "capacity");
+    refused(world, sadmm_world_sensor_overlaps(world, sensor, -1, shapes, &count), SADMM_ERROR_INVALID_ARGUMENT,
+            "capacity");
     refused(world, sadmm_world_sensor_overlaps(world, sensor, 1, NULL, &count), SADMM_ERROR_INVALID_ARGUMENT, "shapes");
     ck_assert_int_eq(count, 77);
     sadmm_mesh_destroy(mesh);

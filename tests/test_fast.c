@@ -301,8 +301,8 @@ START_TEST(rebounds_are_taken_out)
 }
 END_TEST
 
-/* Work lets an island have more energy, by the share of the impulses that solves the dual problem best. What is rounding
- * of the motions left alone is no energy. */
+/* Work lets an island have more energy, by the share of the impulses that solves the dual problem best. What is
+ * rounding of the motions left alone is no energy. */
 START_TEST(work_counts_by_its_share)
 {
     const struct island_energies none = {.now = 8, .free = 2, .work = 6, .drive = -1, .response = 1},

@@ -328,7 +328,7 @@ START_TEST(a_wheel_on_an_arm_is_geared_to_it)
 }
 END_TEST
 
-/* ---- on a carrier that moves -------------------------------------------------------------------------------------- */
+/* ---- on a carrier that moves ------------------------------------------------------------------------------------- */
 
 /* A constant force along a coordinate, as a motor that never gets to its speed. */
 static void drive(sadmm_world *world, sadmm_joint_id joint, int k, double force)
@@ -359,7 +359,8 @@ START_TEST(wheels_on_a_floating_carrier)
         const double x = (0.1 * mc + 0.5 * m1 - 0.4 * m2) / (mc + m1 + m2);
         const double J = 0.3 + mc * (0.1 - x) * (0.1 - x) + m1 * (0.5 - x) * (0.5 - x) + m2 * (0.4 + x) * (0.4 + x);
         const sadmm_joint_id first = join(world, SADMM_JOINT_REVOLUTE, carrier, one, 0.5),
-                             second = join(world, SADMM_JOINT_REVOLUTE, two, carrier, -0.4); /* b carries: q_2 turns back */
+                             second =
+                                 join(world, SADMM_JOINT_REVOLUTE, two, carrier, -0.4); /* b carries: q_2 turns back */
         const sadmm_gear_def def = gear_def(first, 5, second, 5, -ratios[n]);
         sadmm_gear_id gear;
         MUST(world, sadmm_world_add_gear(world, &def, &gear));
@@ -371,7 +372,8 @@ START_TEST(wheels_on_a_floating_carrier)
         ck_assert_double_eq_tol(joint_state(world, second).speed[5], -a * rate, close * rate);
         ck_assert_double_eq_tol(body_state(world, carrier).angular_velocity[2], -sum / all * rate, close * rate);
         ck_assert_double_lt(fabs(gear_state(world, gear).error), _i == 2 ? 1e-5 : 1e-9);
-        const double force = torque - (I1 * (1 - sum / all)) * rate; /* what the motor gives and wheel 1 does not take */
+        const double force = torque - (I1 * (1 - sum / all)) * rate; /* what the motor gives and wheel 1 does not
+                                                                        take */
         ck_assert_double_eq_tol(gear_state(world, gear).force_1, -force, (_i == 2 ? 5e-2 : 1e-5) * torque);
         sadmm_world_destroy(world);
     }
@@ -388,9 +390,12 @@ static void momentum(sadmm_world *world, const sadmm_body_id *bodies, int count,
         double w[3] = {0}, R[3][3];
         const double *q = s.orientation;
         for (int k = 0; k < 3; ++k) linear[k] += def.mass * s.linear_velocity[k];
-        R[0][0] = 1 - 2 * (q[2] * q[2] + q[3] * q[3]), R[0][1] = 2 * (q[1] * q[2] - q[0] * q[3]), R[0][2] = 2 * (q[1] * q[3] + q[0] * q[2]);
-        R[1][0] = 2 * (q[1] * q[2] + q[0] * q[3]), R[1][1] = 1 - 2 * (q[1] * q[1] + q[3] * q[3]), R[1][2] = 2 * (q[2] * q[3] - q[0] * q[1]);
-        R[2][0] = 2 * (q[1] * q[3] - q[0] * q[2]), R[2][1] = 2 * (q[2] * q[3] + q[0] * q[1]), R[2][2] = 1 - 2 * (q[1] * q[1] + q[2] * q[2]);
+        R[0][0] = 1 - 2 * (q[2] * q[2] + q[3] * q[3]), R[0][1] = 2 * (q[1] * q[2] - q[0] * q[3]),
+        R[0][2] = 2 * (q[1] * q[3] + q[0] * q[2]);
+        R[1][0] = 2 * (q[1] * q[2] + q[0] * q[3]), R[1][1] = 1 - 2 * (q[1] * q[1] + q[3] * q[3]),
+        R[1][2] = 2 * (q[2] * q[3] - q[0] * q[1]);
+        R[2][0] = 2 * (q[1] * q[3] - q[0] * q[2]), R[2][1] = 2 * (q[2] * q[3] + q[0] * q[1]),
+        R[2][2] = 1 - 2 * (q[1] * q[1] + q[2] * q[2]);
         for (int j = 0; j < 3; ++j) /* in the body's frame, times its moments */
             for (int k = 0; k < 3; ++k) w[j] += R[k][j] * s.angular_velocity[k];
         for (int k = 0; k < 3; ++k) {
@@ -401,8 +406,9 @@ static void momentum(sadmm_world *world, const sadmm_body_id *bodies, int count,
     }
 }
 
-/* A finger of three links that turns and tumbles in space, its outer joint geared to the inner one, about axes that are at
- * an angle: the middle link is of both joints. Nothing from outside: momentum stays, and energy to the error of the step. */
+/* A finger of three links that turns and tumbles in space, its outer joint geared to the inner one, about axes that are
+ * at an angle: the middle link is of both joints. Nothing from outside: momentum stays, and energy to the error of the
+ * step. */
 START_TEST(a_finger_in_space)
 {
     sadmm_world *world = new_world(_i, 0.001);

@@ -315,12 +315,12 @@ START_TEST(what_slides_and_rolls_does_not_notice)
             end[w] = body_state(world, id);
             sadmm_world_destroy(world);
         }
-        /* The same contact problem with other points, and names of points, solved in 200 iterations; a ball that rolls over
-         * a seam may be tilted by what is flush, 1e-4 of its width, over the length of a piece. */
+        /* The same contact problem with other points, and names of points, solved in 200 iterations; a ball that rolls
+         * over a seam may be tilted by what is flush, 1e-4 of its width, over the length of a piece. */
         const double most = friction > 0 ? 1e-4 : 1e-5;
-        /* a line that slides and turns: its friction goes by where along it the load is, which more than two points leave
-         * open. An ellipsoid that rolls: what is known of how its point goes on (core/model/rolling.h) begins anew with
-         * every triangle and piece. Both stay level, or as high as on a plane to 1e-3. */
+        /* a line that slides and turns: its friction goes by where along it the load is, which more than two points
+         * leave open. An ellipsoid that rolls: what is known of how its point goes on (core/model/rolling.h) begins
+         * anew with every triangle and piece. Both stay level, or as high as on a plane to 1e-3. */
         const bool loose = (form == CAPSULE || form == ELLIPSOID) && friction > 0;
         for (int k = loose ? 2 : 0; k < 3; ++k) {
             if (loose) {

@@ -1,6 +1,6 @@
-/* Hits of bodies in flight, each at its moment within a step: against the laws of Newton and Coulomb in closed form, and
- * against an event-driven simulation of balls in a box. On CUDA in test_cuda_hits.c (HITS_ON_CUDA), which includes this
- * file. */
+/* Hits of bodies in flight, each at its moment within a step: against the laws of Newton and Coulomb in closed form,
+ * and against an event-driven simulation of balls in a box. On CUDA in test_cuda_hits.c (HITS_ON_CUDA), which includes
+ * this file. */
 #ifdef HITS_ON_CUDA
 #include "cuda_worlds.h"
 #else
@@ -25,7 +25,8 @@ static const struct {
 } backends[] = {
 #ifdef HITS_ON_CUDA
     {SADMM_BACKEND_CUDA, SADMM_F64, 1e-9},
-    {SADMM_BACKEND_CUDA, SADMM_F32, 2e-5}, /* iterations in float, with masses of 1 to 10,000, beside contacts to come */
+    {SADMM_BACKEND_CUDA, SADMM_F32, 2e-5}, /* iterations in float, with masses of 1 to 10,000, beside contacts to
+                                              come */
 #else
     {SADMM_BACKEND_CPU, SADMM_F64, 1e-9},
     {SADMM_BACKEND_CPU, SADMM_F32, 1e-6},
@@ -225,8 +226,8 @@ START_TEST(two_balls_meet)
 }
 END_TEST
 
-/* Off centre, the plane laid through where two balls are nearest halfway through a step is crossed before they touch: what
- * touches in the next step hits then. */
+/* Off centre, the plane laid through where two balls are nearest halfway through a step is crossed before they touch:
+ * what touches in the next step hits then. */
 START_TEST(a_hit_is_not_taken_too_soon)
 {
     for (int c = 0; c < 20; c += EMULATED ? 7 : 1) {
@@ -317,7 +318,8 @@ START_TEST(a_ball_falls_and_bounces)
                                         energy, g * backends[_i].tolerance * 10);
             }
 #ifdef HITS_ON_CUDA
-            ck_assert_int_gt(world_report(world).repeated, 0); /* no bounce was planned, and some steps have them twice */
+            ck_assert_int_gt(world_report(world).repeated, 0); /* no bounce was planned, and some steps have them
+                                                                  twice */
 #endif
             sadmm_world_destroy(world);
         }
@@ -338,8 +340,9 @@ static void lowest_edge(const double half[3], double angle, double edge[2])
     }
 }
 
-/* A box that turns about y, one of its axes, comes down on a plane with an edge along y, without friction: its edge leaves
- * with epsilon times its speed, by an impulse of that over 1/m + x^2 / I. The moment is chosen, the height follows. */
+/* A box that turns about y, one of its axes, comes down on a plane with an edge along y, without friction: its edge
+ * leaves with epsilon times its speed, by an impulse of that over 1/m + x^2 / I. The moment is chosen, the height
+ * follows. */
 START_TEST(a_turning_box_hits_a_plane)
 {
     const double half[3] = {0.1, 0.15, 0.2}, dt = 0.01, mass = 1.5;
@@ -397,7 +400,8 @@ static vec3 tumbling_sums(sadmm_world *world, sadmm_body_id id, double g, double
     return L;
 }
 
-/* A box with three moments that tumbles and bounces on ice: nothing turns it about the vertical, and it keeps its energy. */
+/* A box with three moments that tumbles and bounces on ice: nothing turns it about the vertical, and it keeps its
+ * energy. */
 START_TEST(a_tumbling_box_keeps_its_turning)
 {
     const double half[3] = {0.1, 0.06, 0.03}, g = 9.81;
@@ -423,8 +427,8 @@ START_TEST(a_tumbling_box_keeps_its_turning)
 }
 END_TEST
 
-/* A hit through the centre of mass, without friction, turns nothing: a ball with three moments that tumbles, with a torque
- * or damped, turns as it does beside the wall, whenever it hits. */
+/* A hit through the centre of mass, without friction, turns nothing: a ball with three moments that tumbles, with a
+ * torque or damped, turns as it does beside the wall, whenever it hits. */
 START_TEST(a_hit_leaves_turning_alone)
 {
     const double dt = 0.01, torque[3] = {0.02, -0.03, 0.05}, none[3] = {0, 0, 0};
@@ -532,7 +536,8 @@ START_TEST(any_two_shapes_hit)
             }
             const double lost = 1 - left / energy;
             for (int k = 0; k < 3; ++k) ck_assert_double_eq_tol(now[k], momentum[k], 40 * backends[_i].tolerance);
-            /* what is slower than the threshold, or hits too often, is the solve's: it pushes what it finds overlapped */
+            /* what is slower than the threshold, or hits too often, is the solve's: it pushes what it finds
+             * overlapped */
             ck_assert_msg(lost > -1e-4, "case %d: %g of the energy is made", c, -lost);
             if (c % 3 == 0) ck_assert_msg(lost < 1e-4, "case %d: %g is lost", c, lost);
         }
@@ -543,7 +548,7 @@ START_TEST(any_two_shapes_hit)
 }
 END_TEST
 
-/* ---- balls in a box, against an event-driven simulation ----------------------------------------------------------- */
+/* ---- balls in a box, against an event-driven simulation ---------------------------------------------------------- */
 
 enum { BALLS = 24, WALLS = 6 };
 static const double BOX = 0.6; /* its walls are planes this far from the middle */
@@ -708,7 +713,7 @@ START_TEST(an_elastic_gas_keeps_its_energy)
 END_TEST
 #endif
 
-/* ---- what is read ------------------------------------------------------------------------------------------------- */
+/* ---- what is read ------------------------------------------------------------------------------------------------ */
 
 /* A bounce that begins and ends within a step is in the contacts, the wrench and the events of that step. */
 START_TEST(a_bounce_can_be_read)
@@ -771,14 +776,15 @@ START_TEST(hits_can_be_left_to_the_solve)
         const sadmm_body_id last = add_ball(world, &c, SADMM_BODY_DYNAMIC, 0, 1);
         step_world(world, 1);
         /* with one hit a body, the middle one's second one is the solve's, which takes it in the same step */
-        if (hits == 2) ck_assert_double_eq_tol(body_state(world, last).linear_velocity[0], 4, 4 * backends[_i].tolerance);
+        if (hits == 2)
+            ck_assert_double_eq_tol(body_state(world, last).linear_velocity[0], 4, 4 * backends[_i].tolerance);
         if (hits == 0) ck_assert_double_lt(body_state(world, last).linear_velocity[0], 3.9);
         sadmm_world_destroy(world);
     }
 }
 END_TEST
 
-/* ---- what does not show in a result ------------------------------------------------------------------------------- */
+/* ---- what does not show in a result ------------------------------------------------------------------------------ */
 
 /* Boxes and balls in a box of walls. */
 static void throw_all(sadmm_world *world, double restitution)
@@ -1082,8 +1088,8 @@ static void aim(sadmm_world *world, const sadmm_body_id id[2])
     }
 }
 
-/* Hits are planned once some pair is fast, and that step is made again: to the host's bits, also at the next meeting, after
- * so many calm steps that the plan has ended. */
+/* Hits are planned once some pair is fast, and that step is made again: to the host's bits, also at the next meeting,
+ * after so many calm steps that the plan has ended. */
 START_TEST(hits_are_planned)
 {
     enum { MEETING = 5 };

@@ -160,7 +160,8 @@ static void add_prism(sadmm_world *world, const double (*corner)[2], double dens
 START_TEST(a_wedge_does_not_creep)
 {
     static const double left[3][2] = {{0, 0}, {-0.1, 0.4}, {-0.3, 0}}, right[3][2] = {{0, 0}, {0.1, 0.4}, {0.3, 0}},
-                        wedge[3][2] = {{0, 0}, {-0.1, 0.4}, {0.1, 0.4}}, cap[3][2] = {{-0.1, 0.4}, {0.1, 0.4}, {0, 0.5}};
+                        wedge[3][2] = {{0, 0}, {-0.1, 0.4}, {0.1, 0.4}},
+                        cap[3][2] = {{-0.1, 0.4}, {0.1, 0.4}, {0, 0.5}};
     struct sadmm_scene scene = open_result_scene("dry_stone", SADMM_METHOD_FAST, SADMM_F64);
     sadmm_world *world = create_world(&scene.def);
     add_prism(world, left, 0);

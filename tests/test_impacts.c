@@ -1,5 +1,6 @@
-/* Impacts that are left to the solve: what restitution gives, and that it never gives energy; masses and levers that are
- * far apart. Hits at their moment: test_hits.c. By both methods, on every CPU backend here, on CUDA in test_cuda_impacts.c (IMPACTS_ON_CUDA), which includes this file.
+/* Impacts that are left to the solve: what restitution gives, and that it never gives energy; masses and levers that
+ * are far apart. Hits at their moment: test_hits.c. By both methods, on every CPU backend here, on CUDA in
+ * test_cuda_impacts.c (IMPACTS_ON_CUDA), which includes this file.
  */
 #ifdef IMPACTS_ON_CUDA
 #include "cuda_worlds.h"
@@ -243,9 +244,9 @@ START_TEST(a_gram_carries_any_mass)
 }
 END_TEST
 
-/* A ball of 1 kg falls by 0.25 m (2.2 m/s) on a plate that lies on the floor, or meets at 9 m/s one that is free: without
- * restitution it stays. What 20 iterations leave of its speed: a thousandth, 0.17 where the ball has the weight of the
- * plate (math/weight.h). */
+/* A ball of 1 kg falls by 0.25 m (2.2 m/s) on a plate that lies on the floor, or meets at 9 m/s one that is free:
+ * without restitution it stays. What 20 iterations leave of its speed: a thousandth, 0.17 where the ball has the weight
+ * of the plate (math/weight.h). */
 START_TEST(a_light_ball_does_not_rebound_from_a_heavy_plate)
 {
     static const double half[3] = {1, 1, 0.05}, radius[3] = {0.05}, ratios[] = {1e2, 1e3, 1e4, 1e5};

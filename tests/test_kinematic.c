@@ -1,5 +1,5 @@
-/* Kinematic bodies: what they do to others against formulas, on every CPU backend here, on CUDA in test_cuda_kinematic.c
- * (BODIES_ON_CUDA), which includes this file. */
+/* Kinematic bodies: what they do to others against formulas, on every CPU backend here, on CUDA in
+ * test_cuda_kinematic.c (BODIES_ON_CUDA), which includes this file. */
 #include "body_worlds.h"
 
 #include "core/base/memory.h"
@@ -214,8 +214,9 @@ START_TEST(a_wall_pushes_a_row)
 }
 END_TEST
 
-/* A stack in a lift, or on a belt, stands as well as one on the ground with the iterations of the default: what it rides
- * on is at rest for it. (Solved as what moves, it has sunk by 1e-4 m after that time, and with 5 iterations it falls.) */
+/* A stack in a lift, or on a belt, stands as well as one on the ground with the iterations of the default: what it
+ * rides on is at rest for it. (Solved as what moves, it has sunk by 1e-4 m after that time, and with 5 iterations it
+ * falls.) */
 START_TEST(what_rides_stands_as_on_the_ground)
 {
     enum { COUNT = 10, STEPS = 120 };

@@ -163,8 +163,10 @@ def python_imports(root):
         with open(path, encoding="utf-8") as text:
             for node in ast.walk(ast.parse(text.read())):
                 if isinstance(node, ast.ImportFrom) and node.level > 0:
-                    start = package[:len(package) - node.level + 1] + tuple((node.module or "").split(".") * bool(node.module))
-                    used.update(start + (name.name,) if start + (name.name,) in modules else start for name in node.names)
+                    within = tuple(node.module.split(".")) if node.module else ()
+                    start = package[:len(package) - node.level + 1] + within
+                    used.update(start + (name.name,) if start + (name.name,) in modules else start
+                                for name in node.names)
         graph["/".join(module) or "subadmm"] = {"/".join(name) for name in used if name and name != module}
     return graph
 

@@ -1,4 +1,5 @@
-/* Lists that stay quick wherever things come and go: key trees, sets of slots, tables of pairs, against plain arrays. */
+/* Lists that stay quick wherever things come and go: key trees, sets of slots, tables of pairs, against plain
+ * arrays. */
 #include <check.h>
 #include <stdint.h>
 #include <stdlib.h>

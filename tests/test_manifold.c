@@ -952,8 +952,8 @@ START_TEST(float_gives_the_same_contacts)
 }
 END_TEST
 
-/* The table is complete but for planes and meshes, which meet neither each other nor themselves; what is not listed has no
- * contacts. */
+/* The table is complete but for planes and meshes, which meet neither each other nor themselves; what is not listed has
+ * no contacts. */
 START_TEST(every_pair_of_types_is_listed)
 {
     const double size[3] = {0.5, 0.5, 0.5};
@@ -974,7 +974,8 @@ START_TEST(every_pair_of_types_is_listed)
             const bool listed = known && a != SADMM_SHAPE_MESH &&
                                 !(a == SADMM_SHAPE_PLANE && (b == SADMM_SHAPE_PLANE || b == SADMM_SHAPE_MESH));
             struct sadmm_geometry a_is = geometry_of(a, size), b_is = geometry_of(b, size);
-            const struct pair_pose pose = {.R = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .t = {0.1, 0.1, 0.1}}; /* one in the other */
+            const struct pair_pose pose = {.R = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                                           .t = {0.1, 0.1, 0.1}}; /* one in the other */
             struct manifold m;
             memset(&m, 0x55, sizeof m);
             a_is.hull = a == SADMM_SHAPE_MESH ? ground : hull;

@@ -84,7 +84,8 @@ START_TEST(points_are_on_both_surfaces)
                 for (int k = 0; k < 3; ++k) p[k] += m.position[j][k] / m.count;
             for (int k = 0; k < 3; ++k) p[k] = m.position[i][k] + SNAP * (p[k] - m.position[i][k]);
             if (!line_in_box(&a, p, m.normal, &a0, &a1) || !line_in_box(&b, p, m.normal, &b0, &b1)) continue;
-            if (!by_a_face_along(&a, p, m.normal, a1) || !by_a_face_along(&b, p, m.normal, b0)) continue; /* by a side */
+            if (!by_a_face_along(&a, p, m.normal, a1) || !by_a_face_along(&b, p, m.normal, b0))
+                continue; /* by a side */
             ck_assert_double_eq_tol(b0 - a1, m.separation[i], SNAPPED);
         }
         for (int i = 0; i < m.count; ++i) {

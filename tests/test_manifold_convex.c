@@ -405,8 +405,8 @@ START_TEST(inclined_ones_have_points_of_both)
         for (int i = 0; i < m.count; ++i) {
             const double out = points_outside(t, m.normal, m.points[i].position, m.points[i].separation);
             crossings += m.points[i].feature >> AXIS_KIND_SHIFT == FEATURE_CROSSING;
-            /* what is beside a side by half of MANIFOLD_SNAP counts as over it; 1e-9 m: rounding, which where rims cross
-             * at a flat angle is that of a root */
+            /* what is beside a side by half of MANIFOLD_SNAP counts as over it; 1e-9 m: rounding, which where rims
+             * cross at a flat angle is that of a root */
             ck_assert_msg(out <= MANIFOLD_SNAP * pair_thin(t) + 1e-9, "%s-%s, pose %d: outside by %g, feature %x",
                           names[type[0]], names[type[1]], pose, out, m.points[i].feature);
         }

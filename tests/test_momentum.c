@@ -239,8 +239,8 @@ START_TEST(bodies_on_ice)
 }
 END_TEST
 
-/* Mechanisms that balls run into: whatever the iterations, in flight all of it, in space, too; on ice along the floor and
- * turning on it; on a joint with the world what turns about that. */
+/* Mechanisms that balls run into: whatever the iterations, in flight all of it, in space, too; on ice along the floor
+ * and turning on it; on a joint with the world what turns about that. */
 START_TEST(mechanisms)
 {
     const int engine = _i % ENGINES, budget = _i / ENGINES % BUDGETS, space = _i / ENGINES / BUDGETS;

@@ -6,7 +6,7 @@
 #include "core/solve/ncp_interior.h"
 #include "core/solve/ncp_newton.h"
 
-/* ---- Newton's steps on dense problems ----------------------------------------------------------------------------- */
+/* ---- Newton's steps on dense problems ---------------------------------------------------------------------------- */
 
 enum { MOST_CONTACTS = 12, MOST_ROWS = 4, SIZE = 3 * MOST_CONTACTS + MOST_ROWS };
 
@@ -49,8 +49,11 @@ static void make_dense(struct dense_problem *p, int contacts, int rows, int free
     }
     for (int i = 0; i < rows; ++i) {
         const int at = 3 * contacts + i;
-        p->law[contacts + i] = (struct ncp_law){
-            .first = at, .count = 1, .response = p->G[at * (n + 1)], .lo = i % 2 ? 0 : -0.1, .hi = i % 2 ? INFINITY : 0.1};
+        p->law[contacts + i] = (struct ncp_law){.first = at,
+                                                .count = 1,
+                                                .response = p->G[at * (n + 1)],
+                                                .lo = i % 2 ? 0 : -0.1,
+                                                .hi = i % 2 ? INFINITY : 0.1};
     }
     p->dense = (struct ncp_dense){contacts + rows, n, p->law, p->G, p->lambda, p->u, p->work, 1e9};
 }
@@ -120,8 +123,9 @@ START_TEST(dense_problems_are_solved)
 }
 END_TEST
 
-/* A body with six degrees of freedom and twelve contacts in a corner, nearly at rest: most impulses do what others do, and
- * what is left of its motion slips by 1e-9 to 1e-1 m/s. From an interior point, the pieces of all laws are plain to see. */
+/* A body with six degrees of freedom and twelve contacts in a corner, nearly at rest: most impulses do what others do,
+ * and what is left of its motion slips by 1e-9 to 1e-1 m/s. From an interior point, the pieces of all laws are plain to
+ * see. */
 START_TEST(redundant_contacts_near_rest_are_solved)
 {
     enum { SEEDS = 100 };
@@ -164,7 +168,7 @@ START_TEST(one_contact_by_hand)
 }
 END_TEST
 
-/* ---- worlds ------------------------------------------------------------------------------------------------------- */
+/* ---- worlds ------------------------------------------------------------------------------------------------------ */
 
 static sadmm_world *scene_world(const char *spec, int solver, int iterations, int ncp_points)
 {
@@ -209,9 +213,9 @@ static void nudge(sadmm_world *world, uint32_t seed)
 }
 
 /* What falls, limps and grips, on its way through hundreds of steps that differ from build to build in the last digits.
- * Islands are solved where they are off by more than 1e-9 m/s; a run may have one step in which that does not come to its
- * end. With SADMM_TEST_ALL each runs twenty times, from slightly different velocities (a minute): 11 of 64,000 steps, one
- * in a run. */
+ * Islands are solved where they are off by more than 1e-9 m/s; a run may have one step in which that does not come to
+ * its end. With SADMM_TEST_ALL each runs twenty times, from slightly different velocities (a minute): 11 of 64,000
+ * steps, one in a run. */
 START_TEST(mechanisms_in_contact_are_exact)
 {
     static const struct {
@@ -356,9 +360,9 @@ static void join(sadmm_world *world, sadmm_joint_kind kind, sadmm_body_id a, sad
     MUST(world, sadmm_world_add_joint(world, &def, NULL));
 }
 
-/* Two cubes on a joint that fall over, a cube that slides beside them and one in the air: all islands are solved before any
- * iteration, but those of what begins to touch or leaves. They do what the iterations would make of them, and what flies,
- * and what slides to its rest, by the formulas. */
+/* Two cubes on a joint that fall over, a cube that slides beside them and one in the air: all islands are solved before
+ * any iteration, but those of what begins to touch or leaves. They do what the iterations would make of them, and what
+ * flies, and what slides to its rest, by the formulas. */
 START_TEST(worlds_of_small_islands_need_no_iteration)
 {
     const double v = 2, g = 9.81, dt = 0.005, mu = 0.5;
@@ -386,9 +390,9 @@ START_TEST(worlds_of_small_islands_need_no_iteration)
 }
 END_TEST
 
-/* A cube is held by a weld 5 cm deep in the floor: nothing meets its contacts. Their impulses are those of contacts that give
- * by a hundredth of their response, in every step the same, the cube stays, and once the weld is gone it leaves no faster
- * than errors are corrected. */
+/* A cube is held by a weld 5 cm deep in the floor: nothing meets its contacts. Their impulses are those of contacts
+ * that give by a hundredth of their response, in every step the same, the cube stays, and once the weld is gone it
+ * leaves no faster than errors are corrected. */
 START_TEST(contacts_that_cannot_be_met_are_borne)
 {
     sadmm_world *world = floor_world(_i);
@@ -420,8 +424,8 @@ START_TEST(contacts_that_cannot_be_met_are_borne)
 }
 END_TEST
 
-/* A door on two hinges of one axis, above and below its middle: they bear half of its weight each, and its couple alike, by
- * whichever was made first. */
+/* A door on two hinges of one axis, above and below its middle: they bear half of its weight each, and its couple
+ * alike, by whichever was made first. */
 START_TEST(two_hinges_share_their_load)
 {
     sadmm_world *world = floor_world(_i);
@@ -445,8 +449,8 @@ START_TEST(two_hinges_share_their_load)
 }
 END_TEST
 
-/* Two mechanisms far apart on a floor, one part by a rope that is slack: a constraint without rows. They are left to the
- * iteration, until one is pulled and the rope is taut. */
+/* Two mechanisms far apart on a floor, one part by a rope that is slack: a constraint without rows. They are left to
+ * the iteration, until one is pulled and the rope is taut. */
 START_TEST(a_slack_rope_joins_two_islands)
 {
     sadmm_world *world = floor_world(_i);
@@ -513,9 +517,10 @@ START_TEST(constraints_left_out_are_not_forgotten)
 }
 END_TEST
 
-/* A car on four wheels, whose loads are not unique: as much as two wheels across bear more, the others bear less. Of all
- * that solve, the least is that where the two are even. Without searching for it they are 0.8 N apart in the end, one
- * way with f64 and the other way with f32, and in the paper's hand scene a wheel bears nothing and ceases to roll. */
+/* A car on four wheels, whose loads are not unique: as much as two wheels across bear more, the others bear less. Of
+ * all that solve, the least is that where the two are even. Without searching for it they are 0.8 N apart in the end,
+ * one way with f64 and the other way with f32, and in the paper's hand scene a wheel bears nothing and ceases to
+ * roll. */
 START_TEST(wheels_bear_evenly)
 {
     static const double radius = 0.02, about_y[4] = {0.70710678118654752, -0.70710678118654752, 0, 0};
@@ -543,7 +548,8 @@ START_TEST(wheels_bear_evenly)
     }
     for (int step = 0; step < 250; ++step) {
         /* Pushed ahead, and to and fro across, which the axles do not give way to. */
-        const double push[3] = {step < 200 ? 0.3 : 0, 2 * sin(0.3 * step), 0}, torque[3] = {0, 0, 0.002 * sin(0.7 * step)};
+        const double push[3] = {step < 200 ? 0.3 : 0, 2 * sin(0.3 * step), 0},
+                     torque[3] = {0, 0, 0.002 * sin(0.7 * step)};
         MUST(world, sadmm_world_set_body_wrench(world, car, push, torque));
         step_world(world, 1);
     }
@@ -559,8 +565,8 @@ START_TEST(wheels_bear_evenly)
         /* They slip when it is pushed across. */
         ck_assert_double_lt(fabs(radius * state.position[5] - way), 0.02 * way);
     }
-    /* It does not leave the ground: 1e-6 N is 1e-8 m/s of 0.36 kg in a step. 0.04 N stay between the pairs: a solve goes
-     * a small part of the way to the least. */
+    /* It does not leave the ground: 1e-6 N is 1e-8 m/s of 0.36 kg in a step. 0.04 N stay between the pairs: a solve
+     * goes a small part of the way to the least. */
     ck_assert_double_lt(fabs(weight - 0.36 * 9.81), 1e-6);
     ck_assert_double_lt(fabs(across), 0.1);
     sadmm_world_destroy(world);

@@ -137,8 +137,9 @@ static void angular_momentum(const struct two *t, double sum[3])
         const sadmm_body_state state = body_state(t->world, t->id[s]);
         const sadmm_body_def def = body_def(t->world, t->id[s]);
         double own[3];
-        v3_store(rigid_angular_momentum(q_load(state.orientation), v3_load(def.inertia), v3_load(state.angular_velocity)),
-                 own);
+        v3_store(
+            rigid_angular_momentum(q_load(state.orientation), v3_load(def.inertia), v3_load(state.angular_velocity)),
+            own);
         for (int k = 0; k < 3; ++k) {
             const int u = (k + 1) % 3, w = (k + 2) % 3;
             sum[k] += own[k] + def.mass * (state.position[u] * state.linear_velocity[w] -
@@ -267,7 +268,8 @@ START_TEST(small_pushes_stay_in_velocities)
         add_floor(world, 0.5);
         const sadmm_body_id id = add_solid(world, SADMM_SHAPE_BOX, 0.1, 8, 0, 0, 0.1 - depth);
         step_world(world, 1);
-        expect_near(body_state(world, id).linear_velocity[2], large ? 0 : push, 0.01 * push, "velocity"); /* iterations */
+        expect_near(body_state(world, id).linear_velocity[2], large ? 0 : push, 0.01 * push,
+                    "velocity"); /* iterations */
         sadmm_world_destroy(world);
     }
 }

@@ -575,8 +575,8 @@ START_TEST(first_is_first_of_all)
                 ck_assert_int_eq((int)first.shape.slot, 0);
                 continue;
             }
-            ck_assert_msg(same_hit(&first, &all[0]), "world %d, ray %d: slot %u at %.17g, of all slot %u at %.17g", w, k,
-                          first.shape.slot, first.distance, all[0].shape.slot, all[0].distance);
+            ck_assert_msg(same_hit(&first, &all[0]), "world %d, ray %d: slot %u at %.17g, of all slot %u at %.17g", w,
+                          k, first.shape.slot, first.distance, all[0].shape.slot, all[0].distance);
             ck_assert_int_eq(of_some, count);
             ck_assert(same_hits(some, all, count < 2 ? count : 2));
             ties += count > 1 && all[1].distance - all[0].distance < 1e-12;

@@ -120,8 +120,8 @@ START_TEST(a_body_on_a_round_table)
             const double radius = radii[k % 2], share = out ? 1 + INSIDE : 1 - INSIDE,
                          down = falls_from_table(table, kind, radius, share, k % 4 == 3 ? SADMM_F32 : SADMM_F64);
             /* what stays does not move, but for what iterations leave; what tips has done so in 3 s */
-            ck_assert_msg(out ? down > 1e-3 : fabs(down) < 1e-5, "radius %g, draw %d, %s: comes down by %g m", radius, k,
-                          out ? "outside" : "inside", down);
+            ck_assert_msg(out ? down > 1e-3 : fabs(down) < 1e-5, "radius %g, draw %d, %s: comes down by %g m", radius,
+                          k, out ? "outside" : "inside", down);
         }
 }
 END_TEST
@@ -177,8 +177,8 @@ START_TEST(a_body_on_a_round_foot)
         for (int out = 0; out < 2; ++out) {
             const double radius = radii[k % 2], share = out ? 1 + INSIDE : 1 - INSIDE,
                          down = falls_on_foot(ground, _i % 2, radius, share, k % 4 == 3 ? SADMM_F32 : SADMM_F64);
-            ck_assert_msg(out ? down > 1e-3 : fabs(down) < 1e-5, "radius %g, draw %d, %s: comes down by %g m", radius, k,
-                          out ? "outside" : "inside", down);
+            ck_assert_msg(out ? down > 1e-3 : fabs(down) < 1e-5, "radius %g, draw %d, %s: comes down by %g m", radius,
+                          k, out ? "outside" : "inside", down);
         }
 }
 END_TEST

@@ -236,8 +236,8 @@ START_TEST(what_was_changed_is_kept)
 }
 END_TEST
 
-/* A body that no step has seen; a target that its velocity has carried beyond where one may be set; bodies beyond where a
- * length may be taken from them. (Any calls: test_save_calls.c.) */
+/* A body that no step has seen; a target that its velocity has carried beyond where one may be set; bodies beyond where
+ * a length may be taken from them. (Any calls: test_save_calls.c.) */
 START_TEST(whatever_can_be_reached_is_restored)
 {
     sadmm_world_def def = sadmm_world_def_default();
@@ -256,7 +256,8 @@ START_TEST(whatever_can_be_reached_is_restored)
     distance.kind = SADMM_JOINT_DISTANCE;
     distance.body_a = first, distance.body_b = far;
     ck_assert_int_eq(sadmm_world_add_joint(world, &distance, NULL), SADMM_ERROR_INVALID_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), "def->length (-1: as it is) = 3e+09: must be in [0, 1e+09]"));
+    ck_assert_ptr_nonnull(
+        strstr(sadmm_world_message(world), "def->length (-1: as it is) = 3e+09: must be in [0, 1e+09]"));
     struct saved saved = save_world(world);
     sadmm_world *other = restored(&saved);
     step_world(world, 3);

@@ -1,7 +1,7 @@
 /* Saved worlds after any sequence of calls. Two worlds get the same calls with the same arguments, drawn at random, and
- * the second one is replaced again and again by what was saved of the first: every call ends alike in both, and all that
- * is kept of them is the same to the bit. Calls that fail are among them: wrong arguments, ids of what is gone, steps
- * that end without finite numbers or without memory. */
+ * the second one is replaced again and again by what was saved of the first: every call ends alike in both, and all
+ * that is kept of them is the same to the bit. Calls that fail are among them: wrong arguments, ids of what is gone,
+ * steps that end without finite numbers or without memory. */
 #include <stdint.h>
 
 #include "core/base/memory.h"

@@ -223,8 +223,8 @@ START_TEST(bricards_linkage_moves_and_stays_closed)
 }
 END_TEST
 
-/* Windows of a row fold as they go round: all of their rods lie in one line, and could go on the other way. 1 %: the order
- * of the step leaves 0.1 to 0.2 %; solved as elsewhere they lose 6 and 11 % there. */
+/* Windows of a row fold as they go round: all of their rods lie in one line, and could go on the other way. 1 %: the
+ * order of the step leaves 0.1 to 0.2 %; solved as elsewhere they lose 6 and 11 % there. */
 START_TEST(folding_windows_keep_their_energy)
 {
     struct sadmm_scene scene;

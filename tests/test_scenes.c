@@ -270,7 +270,8 @@ START_TEST(runs_repeat_bit_for_bit)
     if (lacks_hulls(&scene)) return;
     const uint64_t once = hash_after(spec, method, 1, steps, &before);
 
-    ck_assert_msg(once == hash_after(spec, method, threads, steps, &unused), "%s: one and %d threads differ", spec, threads);
+    ck_assert_msg(once == hash_after(spec, method, threads, steps, &unused), "%s: one and %d threads differ", spec,
+                  threads);
     ck_assert_msg(once != before, "%s: the hash does not see the last step", spec);
 }
 END_TEST

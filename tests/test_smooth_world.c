@@ -143,7 +143,8 @@ START_TEST(standing_still)
                     egg = shape_of(SADMM_SHAPE_ELLIPSOID, 0.4, 0.3, 0.2);
     const double corners[24] = {-.2, -.2, -.1, .2, -.2, -.1, -.2, .2, -.1, .2, .2, -.1,
                                 -.2, -.2, .1,  .2, -.2, .1,  -.2, .2, .1,  .2, .2, .1};
-    const sadmm_hull_def points = {.struct_size = sizeof points, .points = corners, .point_count = 8, .convex_radius = 0.05};
+    const sadmm_hull_def points = {
+        .struct_size = sizeof points, .points = corners, .point_count = 8, .convex_radius = 0.05};
     sadmm_body_id ids[6];
     double position[6][3], start[6][3];
     sadmm_mass mass;

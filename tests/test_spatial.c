@@ -1,5 +1,5 @@
-/* Motion in space of bodies whose principal moments differ: alone, under torques, on springs and on joints. What is known
- * of it in closed form, what it keeps, and its order against the same motion by short steps. */
+/* Motion in space of bodies whose principal moments differ: alone, under torques, on springs and on joints. What is
+ * known of it in closed form, what it keeps, and its order against the same motion by short steps. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -261,8 +261,8 @@ static const struct {
 };
 enum { MOTIONS = sizeof motions / sizeof *motions };
 
-/* Second order: a quarter of the step, a sixteenth of the error; 10 leaves room for higher terms. What energy and L_z are
- * off by is of higher order. */
+/* Second order: a quarter of the step, a sixteenth of the error; 10 leaves room for higher terms. What energy and L_z
+ * are off by is of higher order. */
 START_TEST(steady_motions_on_joints)
 {
     const int solver = _i / MOTIONS, k = _i % MOTIONS;
@@ -306,8 +306,8 @@ START_TEST(a_damped_spring_whirls)
     MUST(world, sadmm_world_add_joint(world, &def, &id));
     step_world(world, 400);
     const sadmm_body_state state = body_state(world, ball);
-    /* stretched by 0.1 mm to 1 cm, right to second order: (w dt)^2 of it. A damper that sees a rate of w^2 L dt / 2 gives
-     * 2.5 mm to 25 mm. */
+    /* stretched by 0.1 mm to 1 cm, right to second order: (w dt)^2 of it. A damper that sees a rate of w^2 L dt / 2
+     * gives 2.5 mm to 25 mm. */
     ck_assert_double_eq_tol(norm3(state.position), length, (length - 1) * rate * rate * 0.005 * 0.005);
     sadmm_world_destroy(world);
 }
@@ -315,8 +315,8 @@ END_TEST
 
 /* ---- trees ------------------------------------------------------------------------------------------------------- */
 
-/* Bodies with random moments, each on a ball joint or hinge to one before it, that spin by up to `fast` rad/s an axis; the
- * first one on the world or in the air. */
+/* Bodies with random moments, each on a ball joint or hinge to one before it, that spin by up to `fast` rad/s an axis;
+ * the first one on the world or in the air. */
 enum { TREE = 6 };
 
 static sadmm_world *random_tree(int solver, uint64_t seed, double dt, bool floats, double gravity,
@@ -387,8 +387,9 @@ START_TEST(trees_are_of_second_order)
 }
 END_TEST
 
-/* Momentum to rounding, in space, whatever solves; energy to what the step's length leaves, of third order a step. Those
- * that turn by more than a step resolves (core/model/joint_law.h) lose energy, and never have more than at the start. */
+/* Momentum to rounding, in space, whatever solves; energy to what the step's length leaves, of third order a step.
+ * Those that turn by more than a step resolves (core/model/joint_law.h) lose energy, and never have more than at the
+ * start. */
 START_TEST(floating_trees_keep_momentum)
 {
     const double rounding = solvers[_i].precision == SADMM_F64 ? 1e-12 : 1e-6;
@@ -402,7 +403,8 @@ START_TEST(floating_trees_keep_momentum)
                      angular = off(after.angular, before.angular) / v3_norm(before.angular),
                      energy = after.energy / before.energy;
         ck_assert_msg(linear < rounding && angular < rounding, "%g %g", linear, angular);
-        ck_assert_msg(energy < (fast ? 1 + rounding : 1.001) && energy > (fast ? 0.1 : 0.999), "%g of the energy", energy);
+        ck_assert_msg(energy < (fast ? 1 + rounding : 1.001) && energy > (fast ? 0.1 : 0.999), "%g of the energy",
+                      energy);
         sadmm_world_destroy(world);
     }
 }

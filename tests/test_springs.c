@@ -409,8 +409,8 @@ START_TEST(stops_of_tables_hold)
         step_world(c.world, 1);
         most = fmax(most, body_state(c.world, c.body[0]).position[2]);
     }
-    /* m: an undamped spring of that stiffness would give v (m / k)^1/2 = 3e-6. At rest it is 0.1 N / 1e9 N/m deep, where
-     * a stop of 1e7 N/m would be 1e-8; and the force is the weight, to single precision */
+    /* m: an undamped spring of that stiffness would give v (m / k)^1/2 = 3e-6. At rest it is 0.1 N / 1e9 N/m deep,
+     * where a stop of 1e7 N/m would be 1e-8; and the force is the weight, to single precision */
     ck_assert_double_lt(most, 0.05 + 1e-6);
     ck_assert_double_eq_tol(body_state(c.world, c.body[0]).position[2], 0.05 + 1e-10, 1e-8);
     sadmm_joint_state state;

@@ -129,7 +129,8 @@ static sadmm_settings random_settings(uint32_t *state)
     return s;
 }
 
-/* Is `done` one of the iterations after which weights are renewed? Each time twice as late, from 40 on half as late again. */
+/* Is `done` one of the iterations after which weights are renewed? Each time twice as late, from 40 on half as late
+ * again. */
 static bool renews(int done)
 {
     static const int all[] = {5, 10, 20, 40, 60, 90, 135, 202};

@@ -10,7 +10,8 @@ static const int forms[] = {
 START_TEST(a_million_drops_stay_on_their_side) { drop_worlds(forms[_i], 1000, WORLDS); }
 END_TEST
 
-/* Of 100,000 at most one in a thousand: those that turn by radians within the step once they are hit, and touch again. */
+/* Of 100,000 at most one in a thousand: those that turn by radians within the step once they are hit, and touch
+ * again. */
 enum { SHOT_WORLDS = 2500 };
 START_TEST(shots_do_not_go_through)
 {

@@ -1,5 +1,6 @@
-/* Joints whose axes and arms turn by more in a step than a step resolves: long steps, fast bodies, distances of next to no
- * length. No mechanism gains energy, whatever its bodies begin with, and none comes to numbers that are not finite. */
+/* Joints whose axes and arms turn by more in a step than a step resolves: long steps, fast bodies, distances of next to
+ * no length. No mechanism gains energy, whatever its bodies begin with, and none comes to numbers that are not
+ * finite. */
 #include <float.h>
 
 #include "core/math/rigid.h"
@@ -154,10 +155,10 @@ static double gain(int which, double dt, bool heavy, int beginning)
     return (most - first) / size;
 }
 
-/* What there is left: at 5 ms rows turn by less than a step resolves, and the error of the step may be either way; a fall in
- * long steps is off by half a step's, m g^2 dt^2 / 8 a body, once; with steps of 1 s, in which a link falls by five of its
- * lengths, by twice as much where its joint's stiffness is of account. Steps of 0.2 s and more resolve nothing of such a
- * motion: with SADMM_TEST_ALL, of 400 beginnings of a double pendulum 2, 2 and 12 gain more. */
+/* What there is left: at 5 ms rows turn by less than a step resolves, and the error of the step may be either way; a
+ * fall in long steps is off by half a step's, m g^2 dt^2 / 8 a body, once; with steps of 1 s, in which a link falls by
+ * five of its lengths, by twice as much where its joint's stiffness is of account. Steps of 0.2 s and more resolve
+ * nothing of such a motion: with SADMM_TEST_ALL, of 400 beginnings of a double pendulum 2, 2 and 12 gain more. */
 START_TEST(no_mechanism_gains_energy)
 {
     const int beginnings = getenv("SADMM_TEST_ALL") ? 400 : 10;
@@ -170,7 +171,8 @@ START_TEST(no_mechanism_gains_energy)
             if (getenv("SADMM_TEST_ALL"))
                 printf("mechanism %d, dt %g, gravity %d: %d of %d gain energy\n", _i, dts[d], heavy, gains, beginnings);
             ck_assert_msg(gains <= (dts[d] < 0.2 ? 0 : beginnings / 10),
-                          "mechanism %d, dt %g, gravity %d: %d of %d gain energy", _i, dts[d], heavy, gains, beginnings);
+                          "mechanism %d, dt %g, gravity %d: %d of %d gain energy", _i, dts[d], heavy, gains,
+                          beginnings);
         }
 }
 END_TEST
@@ -196,7 +198,7 @@ START_TEST(a_balanced_wheel_goes_on)
 }
 END_TEST
 
-/* ---- tops --------------------------------------------------------------------------------------------------------- */
+/* ---- tops -------------------------------------------------------------------------------------------------------- */
 
 /* A symmetric top on a ball joint, by its Lagrangian: where its axis has gone after a second. */
 enum { SPIN_STEPS = 20000 };
@@ -215,7 +217,8 @@ static void top_rates(const double x[3], double spin, double around, double rate
 static double top_precession(double spin, double turns)
 {
     const double moment = TOP_ACROSS + TOP_ARM * TOP_ARM, c = cos(TOP_TILT), s = sin(TOP_TILT),
-                 along = TOP_ALONG * (spin + turns * c), around = moment * turns * s * s + along * c, h = 1.0 / SPIN_STEPS;
+                 along = TOP_ALONG * (spin + turns * c), around = moment * turns * s * s + along * c,
+                 h = 1.0 / SPIN_STEPS;
     double x[3] = {TOP_TILT, 0, 0};
     for (int i = 0; i < SPIN_STEPS; ++i) { /* Runge-Kutta of fourth order: its error is that of doubles */
         static const double share[] = {0, 0.5, 0.5, 1}, weight[] = {1, 2, 2, 1};
@@ -231,8 +234,8 @@ static double top_precession(double spin, double turns)
     return x[2];
 }
 
-/* The point of a top hardly turns, however fast the top does, so its rows are resolved, and the error is of second order:
- * 0.015 rad at 5 ms. With the law of rows that are not resolved it is 0.6. */
+/* The point of a top hardly turns, however fast the top does, so its rows are resolved, and the error is of second
+ * order: 0.015 rad at 5 ms. With the law of rows that are not resolved it is 0.6. */
 START_TEST(a_fast_top_precesses)
 {
     static const double spins[] = {100, 200}, steps[] = {0.001, 0.002, 0.005};
@@ -263,8 +266,8 @@ START_TEST(a_fast_top_precesses)
 }
 END_TEST
 
-/* The exponential of a rotation against the library's sines, from next to nothing to a hundred turns; what is longer than
- * its series is doubled up, each time with one more rounding of the angle. */
+/* The exponential of a rotation against the library's sines, from next to nothing to a hundred turns; what is longer
+ * than its series is doubled up, each time with one more rounding of the angle. */
 START_TEST(turns_are_exact)
 {
     state = 1;
@@ -281,8 +284,8 @@ START_TEST(turns_are_exact)
 }
 END_TEST
 
-/* The mean angular velocity of a piece of a tumbling body's motion solves its equation, to rounding: at rates up to 1/3,
- * the most that a piece has. */
+/* The mean angular velocity of a piece of a tumbling body's motion solves its equation, to rounding: at rates up to
+ * 1/3, the most that a piece has. */
 START_TEST(the_mean_spin_solves_its_equation)
 {
     state = 2;

@@ -28,7 +28,8 @@ static void begin(void)
 
 static void end(void) { sadmm_world_destroy(world); }
 
-#define SAYS(text) ck_assert_msg(strstr(sadmm_last_message(), text) != NULL, "\"%s\" in \"%s\"", text, sadmm_last_message())
+#define SAYS(text) \
+    ck_assert_msg(strstr(sadmm_last_message(), text) != NULL, "\"%s\" in \"%s\"", text, sadmm_last_message())
 #define REFUSED(call, text)                                      \
     do {                                                         \
         ck_assert_int_eq((call), SADMM_ERROR_INVALID_ARGUMENT);  \
@@ -96,7 +97,8 @@ START_TEST(members_are_where_they_were)
 }
 END_TEST
 
-/* A member that came later does not begin in the padding of the first version, which an older program leaves as it is. */
+/* A member that came later does not begin in the padding of the first version, which an older program leaves as it
+ * is. */
 static void all_were_there(const struct sadmm_field *fields, size_t count, size_t first_size, const char *const *names,
                            size_t name_count)
 {
@@ -186,7 +188,8 @@ START_TEST(programs_of_the_first_version_go_on)
     sadmm_shape_def_init((sadmm_shape_def *)&shape.of, sizeof shape.of);
     shape.of.size[0] = 0.1;
     ck_assert_int_eq(sadmm_world_add_shape(made, a, (const sadmm_shape_def *)&shape.of, &form), SADMM_OK);
-    ck_assert_int_eq(sadmm_world_shape_def_sized(made, form, (sadmm_shape_def *)&shape.of, sizeof shape.of, NULL), SADMM_OK);
+    ck_assert_int_eq(sadmm_world_shape_def_sized(made, form, (sadmm_shape_def *)&shape.of, sizeof shape.of, NULL),
+                     SADMM_OK);
     UNTOUCHED(shape);
     ck_assert(shape.of.friction == 0.5 && shape.of.mask == UINT32_MAX);
 
@@ -288,7 +291,8 @@ START_TEST(parts_may_be_larger_than_the_library_knows)
 
     sadmm_joint_def_init(j, sizeof joint, sizeof *joint.coordinates);
     ck_assert(j->coordinate_size == sizeof *joint.coordinates && joint.more == 0);
-    for (int k = 0; k < 6; ++k) ck_assert(isinf(joint.coordinates[k].known.drive_force) && joint.coordinates[k].more == 0);
+    for (int k = 0; k < 6; ++k)
+        ck_assert(isinf(joint.coordinates[k].known.drive_force) && joint.coordinates[k].more == 0);
     j->kind = SADMM_JOINT_REVOLUTE;
     j->body_b = ball;
     joint.coordinates[5].known.armature = 4;
@@ -302,8 +306,9 @@ START_TEST(parts_may_be_larger_than_the_library_knows)
     joint.coordinates[3].more = 1;
     REFUSED(sadmm_world_add_joint(world, j, &hinge), "def: a member at byte ");
     joint.coordinates[5].more = 1;
-    REFUSED(sadmm_world_set_joint_coordinate_sized(world, hinge, 5, &joint.coordinates[5].known, sizeof *joint.coordinates),
-            "coordinate: a member at byte ");
+    REFUSED(
+        sadmm_world_set_joint_coordinate_sized(world, hinge, 5, &joint.coordinates[5].known, sizeof *joint.coordinates),
+        "coordinate: a member at byte ");
 }
 END_TEST
 
@@ -342,7 +347,8 @@ START_TEST(structs_that_were_not_begun_are_refused)
     REFUSED(sadmm_world_add_joint(world, &joint, NULL), "with def->coordinate_size");
     REFUSED(sadmm_world_body_def_sized(world, ball, (sadmm_body_def *)small, sizeof small), "size = 8: must be in [");
     REFUSED(sadmm_world_report_sized(world, (sadmm_step_report *)small, sizeof small), "size = 8: must be in [");
-    REFUSED(sadmm_backend_query_sized(SADMM_BACKEND_CPU, (sadmm_backend_info *)small, sizeof small), "size = 8: must be in [");
+    REFUSED(sadmm_backend_query_sized(SADMM_BACKEND_CPU, (sadmm_backend_info *)small, sizeof small),
+            "size = 8: must be in [");
     sadmm_body_def_init((sadmm_body_def *)small, 0); /* nothing is written */
 }
 END_TEST
@@ -382,7 +388,8 @@ START_TEST(a_later_library_takes_and_gives_older_structs)
     ck_assert(taken.parts[0].more == 3 && taken.parts[1].more == 5 && taken.z == 6); /* defaults */
     ck_assert(taken.struct_size == sizeof taken && taken.part_size == sizeof *taken.parts);
     GUARD(old);
-    ck_assert_int_eq(sadmm_growing_give(&later, &old.of, sizeof old.of, sizeof *old.of.parts, &taken, "def", NULL), SADMM_OK);
+    ck_assert_int_eq(sadmm_growing_give(&later, &old.of, sizeof old.of, sizeof *old.of.parts, &taken, "def", NULL),
+                     SADMM_OK);
     UNTOUCHED(old);
     ck_assert(old.of.struct_size == sizeof old.of && old.of.part_size == sizeof *old.of.parts);
     ck_assert(old.of.y == 10 && old.of.parts[0].x == 20 && old.of.parts[1].x == 40);

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""The sources speak the field's words (CONTRIBUTING.md, "Words").
+"""The sources speak the field's words (CONTRIBUTING.md, "Words"), in lines of 120 columns at most.
 
     test_words.py PROJECT
 
-Names and files of include and src are split at underscores and at capitals; a part that has another word in this table is
-an error.
+Names and files of include and src are split at underscores and at capitals; a part that has another word in this table
+is an error. So is a longer line of C, C++ or CUDA, tests and examples included.
 """
+import glob
 import os
 import re
 import sys
@@ -15,7 +16,8 @@ WORDS = {
     "flyer": "swept body", "flyers": "swept bodies", "driven": "kinematic", "steered": "prescribed",
     "joined": "articulation", "loose": "floating, active", "suspect": "candidate", "suspects": "candidates",
     "suspected": "candidate", "steady": "extrapolation", "reweigh": "weights", "misfit": "mispredicted",
-    "careful": "conservative", "midway": "midpoint", "facing": "clip", "felt": "reaction", "baumgarte": "correction_factor",
+    "careful": "conservative", "midway": "midpoint", "facing": "clip", "felt": "reaction",
+    "baumgarte": "correction_factor",
     "gap": "separation", "gaps": "separations", "edited": "dirty", "told": "reported",
 }
 # Where a word has another sense: the duality gap of interior points; by how much a spring's law is ahead of its time.
@@ -26,6 +28,7 @@ PLAIN = {
 }
 FOLDERS = ("include", "src")
 LEFT_OUT = ("src/scenes", "src/cli")  # plain English: the gap between two cards, the lead of a thread
+COLUMNS = 120
 CODE = (".c", ".h", ".cu", ".cpp", ".py", ".pyi", ".build")
 
 
@@ -40,8 +43,21 @@ def names(path):
     return set(re.findall(r"[A-Za-z_]\w*", text))
 
 
+def long_lines(project):
+    for folder in ("include", "src", "tests", "bench", "examples", "python"):
+        pattern = os.path.join(project, folder, "**", "*")
+        for path in sorted(glob.glob(pattern, recursive=True)):
+            if path.endswith((".c", ".h", ".cu", ".cpp")):
+                with open(path, encoding="utf-8") as file:
+                    yield from (f"{os.path.relpath(path, project)}:{number}: {len(line) - 1} columns"
+                                for number, line in enumerate(file, 1) if len(line) - 1 > COLUMNS)
+
+
 def main():
-    project, wrong, count = sys.argv[1], 0, 0
+    project, count = sys.argv[1], 0
+    long = list(long_lines(project))
+    print("\n".join(long), end="\n" * bool(long))
+    wrong = len(long)
     for top in FOLDERS:
         for folder, _, files in os.walk(os.path.join(project, top)):
             for file in files:

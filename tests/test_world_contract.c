@@ -209,7 +209,8 @@ START_TEST(forces_and_impulses_at_a_point)
     const sadmm_body_state now = body_state(world, ball), then = body_state(other, ball);
     /* it turns in that step, by different moments: what it has got is its angular momentum */
     const vec3 got = rigid_angular_momentum(q_load(now.orientation), v3_load(moments), v3_load(now.angular_velocity)),
-               wanted = rigid_angular_momentum(q_load(then.orientation), v3_load(moments), v3_load(then.angular_velocity));
+               wanted =
+                   rigid_angular_momentum(q_load(then.orientation), v3_load(moments), v3_load(then.angular_velocity));
     ck_assert_double_lt(v3_norm(v3_sub(got, wanted)), 1e-9);
     for (int k = 0; k < 3; ++k) { /* a few roundings of numbers of 1 to 1000 */
         ck_assert_double_eq_tol(now.linear_velocity[k], then.linear_velocity[k], 1e-12);

@@ -15,6 +15,6 @@ breathe_domain_by_extension = {"h": "c"}
 c_id_attributes = ["SADMM_API"]
 autodoc_typehints = "description"
 nitpicky = False
-# Pages name files of the repository, which stand beside them there and not here; tests/test_docs.py looks that they exist.
-# `typedef struct x {} x;` is two declarations of one name.
+# Pages name files of the repository, which stand beside them there and not here; tests/test_docs.py looks that they
+# exist. `typedef struct x {} x;` is two declarations of one name.
 suppress_warnings = ["myst.xref_missing", "duplicate_declaration.c"]

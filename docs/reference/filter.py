@@ -3,8 +3,8 @@
 
     filter.py HEADER
 
-A comment before a declaration is about it; one behind a member, a value or a declaration is about that; the first one of
-a header is about the header. `|x|` and the like stay as they are: text is taken literally.
+A comment before a declaration is about it; one behind a member, a value or a declaration is about that; the first one
+of a header is about the header. `|x|` and the like stay as they are: text is taken literally.
 """
 import re
 import sys

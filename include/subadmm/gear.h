@@ -28,8 +28,8 @@ extern "C" {
 typedef struct sadmm_gear_def {
     size_t struct_size;          /* set by sadmm_gear_def_default() */
     sadmm_joint_id joint_1;      /* No default */
-    int32_t coordinate_1;        /* a free one of joint_1, in [0, 6): any translation or distance; a rotation that is the
-                                    only free one or one of two. No default */
+    int32_t coordinate_1;        /* a free one of joint_1, in [0, 6): any translation or distance; a rotation that is
+                                    the only free one or one of two. No default */
     sadmm_joint_id joint_2;      /* may be joint_1, with another coordinate. No default */
     int32_t coordinate_2;        /* likewise */
     double ratio;                /* |ratio| in [1e-9, 1e9], unit of coordinate 1 over that of 2; default 1 */
@@ -59,7 +59,8 @@ SADMM_API int32_t sadmm_world_gear_count(const sadmm_world *world); /* also thos
 /* The index-th live gear in order of creation slot, index in [0, gear_count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_world_gear_at(sadmm_world *world, int32_t index, sadmm_gear_id *id);
 /* Read back the definition as it is now. Errors: STALE_ID. */
-SADMM_API sadmm_status sadmm_world_gear_def_sized(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def, size_t size);
+SADMM_API sadmm_status sadmm_world_gear_def_sized(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def,
+                                                  size_t size);
 static inline sadmm_status sadmm_world_gear_def(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def)
 {
     return sadmm_world_gear_def_sized(world, id, def, sizeof *def);

@@ -1,9 +1,9 @@
 /* World level: save the whole state of a world to a buffer and restore it, to the last bit.
  *
- * A buffer holds everything that the next step depends on and everything that can be read: settings, bodies, shapes with
- * their hulls and meshes, joints, gears, couplings, forces, the contacts of the last step with their impulses, caches
- * of collision detection and joints, the report, all ids. A restored world makes the same steps as the saved one, bit
- * for bit, on the same backend, precision and kind of machine, in this process or another.
+ * A buffer holds everything that the next step depends on and everything that can be read: settings, bodies, shapes
+ * with their hulls and meshes, joints, gears, couplings, forces, the contacts of the last step with their impulses,
+ * caches of collision detection and joints, the report, all ids. A restored world makes the same steps as the saved
+ * one, bit for bit, on the same backend, precision and kind of machine, in this process or another.
  *
  * A buffer has no pointers, and is only valid for the build that made it (sadmm_build_commit, sadmm_build_compiler,
  * sadmm_version) and its byte order; use scene files to exchange worlds. A checksum detects damage, but is no

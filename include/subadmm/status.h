@@ -14,9 +14,9 @@
  *       (their names end in _sized; the functions without it are inline and pass it on). What the program does not know
  *       is not written, what the library does not know is 0. A size below that of the first version: INVALID_ARGUMENT.
  *
- * Everything else stays as it is: ids, states, contacts, events, rays and their hits, masses, tasks, elements of arrays,
- * and the parts of reports (sadmm_residual, sadmm_certificate, sadmm_phase_times). Other languages call the functions
- * with a size (_init, _sized): inline ones are in no library.
+ * Everything else stays as it is: ids, states, contacts, events, rays and their hits, masses, tasks, elements of
+ * arrays, and the parts of reports (sadmm_residual, sadmm_certificate, sadmm_phase_times). Other languages call the
+ * functions with a size (_init, _sized): inline ones are in no library.
  */
 #ifndef SUBADMM_STATUS_H
 #define SUBADMM_STATUS_H

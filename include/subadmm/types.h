@@ -114,7 +114,8 @@ typedef struct sadmm_shape_def {
     double orientation[4];       /* shape to body, w x y z; default identity */
     double friction;             /* mu >= 0, <= 1e6; a pair uses the geometric mean; default 0.5 */
     double restitution;          /* in [0, 1]; a pair uses the larger; default 0 */
-    uint32_t category, mask;     /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1, all */
+    uint32_t category, mask;     /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1,
+                                    all */
     bool sensor;                 /* has no contacts but reports what overlaps it (events.h); not for a MESH, which has
                                     no inside; default false */
     const sadmm_hull *hull;      /* of HULL; NULL, the default, for all others. The world keeps its own reference while

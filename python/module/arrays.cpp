@@ -34,7 +34,8 @@ static std::string described(nb::handle given)
     if (!nb::hasattr(given, "dtype") || !nb::hasattr(given, "shape")) return nb::type_name(given.type()).c_str();
     std::string out = text("dtype") + " of shape " + text("shape");
     if (nb::hasattr(given, "strides")) out += " and strides " + text("strides");
-    if (nb::hasattr(given, "flags") && !nb::cast<bool>(nb::bool_(nb::getattr(given.attr("flags"), "writeable", nb::bool_(true)))))
+    if (nb::hasattr(given, "flags") &&
+        !nb::cast<bool>(nb::bool_(nb::getattr(given.attr("flags"), "writeable", nb::bool_(true)))))
         out += ", not to be written to";
     return out;
 }
@@ -54,7 +55,8 @@ struct range {
     {
         const std::string said = to_the_end ? "" : ", count = " + std::to_string(count);
         raise_status(SADMM_ERROR_INVALID_ARGUMENT, "first = " + std::to_string(first) + said +
-                                                       ": must be rows of the array, which has " + std::to_string(rows));
+                                                       ": must be rows of the array, which has " +
+                                                       std::to_string(rows));
     }
 };
 
@@ -64,7 +66,8 @@ static nb::object get(world &w, const std::string &name, whole first, std::optio
     const size_t columns = (size_t)sadmm_array_columns(array);
     range r{0, (int32_t)first.in("first", 0, INT32_MAX), count ? (int32_t)count->in("count", 0, INT32_MAX) : 0, !count};
     const auto is_sized = [&](const out_rows &to) { return to.shape(0) == (size_t)r.count && to.shape(1) == columns; };
-    out_rows to; // where `out` has its numbers: itself, no copy of another type or layout, which would be filled in its place
+    // where `out` has its numbers: itself, no copy of another type or layout, which would be filled in its place
+    out_rows to;
     const bool given = !out.is_none(), usable = given && nb::try_cast(out, to, false);
     std::unique_ptr<double[]> made;
     bool fits = false, sized = true;
@@ -79,7 +82,8 @@ static nb::object get(world &w, const std::string &name, whole first, std::optio
     if (!fits) r.refuse();
     if (!sized)
         throw nb::value_error(("out: must have shape (" + std::to_string(r.count) + ", " + std::to_string(columns) +
-                               "), be of float64, in C order without gaps, and writable; is " + described(out)).c_str());
+                               "), be of float64, in C order without gaps, and writable; is " + described(out))
+                                  .c_str());
     if (given) return out;
     const size_t shape[2] = {(size_t)r.count, columns};
     double *values = made.release();
@@ -95,11 +99,13 @@ static void set(world &w, const std::string &name, nb::object given, whole first
     if (!nb::try_cast(given, values, false) || values.shape(1) != (size_t)columns)
         values = nb::cast<in_rows>(nb::module_::import_("subadmm.given").attr("numbers")("values", given, columns));
     if (values.shape(0) > INT32_MAX) throw nb::value_error("values: too many rows");
-    call(w, [&](sadmm_world *h) { return sadmm_world_set_array(h, array, begin, (int32_t)values.shape(0), values.data()); });
+    call(w, [&](sadmm_world *h) {
+        return sadmm_world_set_array(h, array, begin, (int32_t)values.shape(0), values.data());
+    });
 }
 
-// The C world is kept as long as the array is, its Python object is not: an attribute of it may hold the array. How long
-// the numbers are there is said below.
+// The C world is kept as long as the array is, its Python object is not: an attribute of it may hold the array. How
+// long the numbers are there is said below.
 static nb::object device_array(world &w, const std::string &name)
 {
     const sadmm_array array = named<sadmm_array>("array", name);
@@ -159,22 +165,30 @@ void bind_arrays(nb::module_ &m, nb::class_<world> &w)
 {
     nb::list names;
     for (int k = 0; k < SADMM_ARRAY_COUNT; ++k)
-        names.append(nb::make_tuple(array_names[k], sadmm_array_columns((sadmm_array)k), sadmm_array_is_settable((sadmm_array)k)));
+        names.append(nb::make_tuple(array_names[k], sadmm_array_columns((sadmm_array)k),
+                                    sadmm_array_is_settable((sadmm_array)k)));
     m.attr("_arrays") = names;
     m.attr("_contact_members") = contact_members();
     m.attr("_contact_size") = sizeof(sadmm_contact);
     w.def("get", &get, "array"_a, "first"_a = 0, "count"_a = nb::none(), "out"_a = nb::none(),
-          "Rows [first, first + count) of an array as float64, or into `out`, an array of float64 with as many rows and columns,\n"
+          "Rows [first, first + count) of an array as float64, or into `out`, an array of float64 with as many rows "
+          "and columns,\n"
           "in C order without gaps, which is returned then. Rows are bodies (World.bodies), joints or couplings.\n\n"
-          "body_state (13 columns: position m, orientation w x y z, linear velocity m/s, angular velocity rad/s), body_wrench (6: N, N m),\n"
-          "body_contact_wrench (6), body_inertia (4: kg, kg m^2), joint_position, joint_speed, joint_drive_force, joint_wrench,\n"
-          "joint_target_position, joint_target_speed (6 each: coordinates), coupling_target (13, as body_state), coupling_reaction (6).");
+          "body_state (13 columns: position m, orientation w x y z, linear velocity m/s, angular velocity rad/s), "
+          "body_wrench (6: N, N m),\n"
+          "body_contact_wrench (6), body_inertia (4: kg, kg m^2), joint_position, joint_speed, joint_drive_force, "
+          "joint_wrench,\n"
+          "joint_target_position, joint_target_speed (6 each: coordinates), coupling_target (13, as body_state), "
+          "coupling_reaction (6).");
     w.def("set", &set, "array"_a, "values"_a, "first"_a = 0,
-          "Set rows of an array that can be set: body_state, body_wrench, body_inertia, joint_target_position, joint_target_speed,\n"
+          "Set rows of an array that can be set: body_state, body_wrench, body_inertia, joint_target_position, "
+          "joint_target_speed,\n"
           "coupling_target. If a row is refused, nothing is set.");
     w.def("device_array", &device_array, "array"_a,
-          "body_state or body_contact_wrench of the dynamic bodies on the device (CUDA), without a copy: an object for\n"
-          "torch.from_dlpack and the like. Valid until the next step or change; read only. Rows: World.dynamic_bodies().");
+          "body_state or body_contact_wrench of the dynamic bodies on the device (CUDA), without a copy: an object "
+          "for\n"
+          "torch.from_dlpack and the like. Valid until the next step or change; read only. Rows: "
+          "World.dynamic_bodies().");
     w.def("device_stream", [](world &w) {
         sadmm_device_array a;
         call(w, [&](sadmm_world *h) { return sadmm_world_device_array(h, SADMM_ARRAY_BODY_STATE, &a); });

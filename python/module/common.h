@@ -26,7 +26,7 @@ using vec3 = std::array<double, 3>;
 using quat = std::array<double, 4>;
 using vec6 = std::array<double, 6>;
 
-// ---- arguments -------------------------------------------------------------------------------------------------------
+// ---- arguments ------------------------------------------------------------------------------------------------------
 
 // An argument as it was given. It is read where its name is known, so that an error can say which one it was, and
 // nothing is made to fit: no float becomes an index, no other shape the one that is meant.
@@ -77,7 +77,7 @@ template <size_t N> struct type_caster<numbers<N>> {
 };
 } // namespace nanobind::detail
 
-// ---- errors ----------------------------------------------------------------------------------------------------------
+// ---- errors ---------------------------------------------------------------------------------------------------------
 
 // Raise the exception of a status.
 [[noreturn]] void raise_status(sadmm_status status, const std::string &message);

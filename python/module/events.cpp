@@ -56,13 +56,18 @@ void bind_events(nb::module_ &m, nb::class_<world> &w)
     }
     m.attr("_event_members") = members();
     m.attr("_event_size") = sizeof(sadmm_event);
-    w.def("record_events", [](world &w, whole capacity) {
-        const int most = capacity.as_int("capacity");
-        call(w, [&](sadmm_world *h) { return sadmm_world_record_events(h, most); });
-    }, "capacity"_a = 65536, "Record the begin and end of contacts and sensor overlaps from the next step on; up to `capacity` events "
-                             "are kept until they are taken, the oldest are dropped. 0: stop.");
-    w.def_prop_ro("event_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_event_count(h); }); },
-                  "Number of events that can be taken.");
+    w.def(
+        "record_events",
+        [](world &w, whole capacity) {
+            const int most = capacity.as_int("capacity");
+            call(w, [&](sadmm_world *h) { return sadmm_world_record_events(h, most); });
+        },
+        "capacity"_a = 65536,
+        "Record the begin and end of contacts and sensor overlaps from the next step on; up to `capacity` events "
+        "are kept until they are taken, the oldest are dropped. 0: stop.");
+    w.def_prop_ro(
+        "event_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_event_count(h); }); },
+        "Number of events that can be taken.");
     w.def("_take_events", &take);
     w.def("sensor_overlaps", [](nb::handle_t<world> self, const shape &sensor) {
         world &w = nb::cast<world &>(self);

@@ -5,7 +5,7 @@
 #include "core/base/definition_fields.h"
 #include "core/base/settings_fields.h"
 
-// ---- properties ------------------------------------------------------------------------------------------------------
+// ---- properties -----------------------------------------------------------------------------------------------------
 
 // "Text. In [lo, hi]."
 std::string documented(const sadmm_field &field);
@@ -25,15 +25,18 @@ template <class T, class At> void bind_FLAG(nb::class_<T> &c, const char *name, 
 }
 template <class T, class At> void bind_WHOLE(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
-    c.def_prop_rw(name, [at](const T &o) { return at(o); }, [at, name](T &o, const whole &x) { at(o) = x.as_int(name); },
-                  doc.c_str());
+    c.def_prop_rw(
+        name, [at](const T &o) { return at(o); }, [at, name](T &o, const whole &x) { at(o) = x.as_int(name); },
+        doc.c_str());
 }
 template <class T, class At> void bind_BITS(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
-    c.def_prop_rw(name, [at](const T &o) { return at(o); }, [at, name](T &o, const whole &x) { at(o) = x.as_bits(name); },
-                  doc.c_str());
+    c.def_prop_rw(
+        name, [at](const T &o) { return at(o); }, [at, name](T &o, const whole &x) { at(o) = x.as_bits(name); },
+        doc.c_str());
 }
-template <size_t N, class T, class At> void bind_numbers(nb::class_<T> &c, const char *name, At at, const std::string &doc)
+template <size_t N, class T, class At>
+void bind_numbers(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
     c.def_prop_rw(name, [at](const T &o) { return array_of<N>(at(o)); },
                   [at, name](T &o, const numbers<N> &x) { put(x.as(name), at(o)); }, doc.c_str());
@@ -55,7 +58,7 @@ template <class T, class At> void bind_named(nb::class_<T> &c, const char *name,
 #define bind_METHOD bind_named
 #define bind_DRIVE bind_named
 
-// ---- what is read of an object ----------------------------------------------------------------------------------------
+// ---- what is read of an object --------------------------------------------------------------------------------------
 
 inline double shown(double x) { return x; }
 inline bool shown(bool x) { return x; }
@@ -65,9 +68,10 @@ template <size_t N> std::array<double, N> shown(const double (&x)[N]) { return a
 template <class E> std::enable_if_t<std::is_enum_v<E>, const char *> shown(E x) { return name_of(x); }
 
 // of: def_of(object) gives the definition.
-#define READ_ONLY(c, object, name, text) c.def_prop_ro(#name, [](const object &o) { return shown(def_of(o).name); }, text)
+#define READ_ONLY(c, object, name, text) \
+    c.def_prop_ro(#name, [](const object &o) { return shown(def_of(o).name); }, text)
 
-// ---- arguments -------------------------------------------------------------------------------------------------------
+// ---- arguments ------------------------------------------------------------------------------------------------------
 
 // Of a function that adds an object: parameters, their names and defaults (each behind a comma), and from them into a
 // definition. What has another form in Python (role OWN) is left out.

@@ -21,7 +21,8 @@ void refuse_value(const char *name, nb::handle given, const std::string &must_be
 
 const std::string &without_null(const char *name, const std::string &text)
 {
-    if (text.find('\0') != std::string::npos) refuse_value(name, nb::str(text.data(), text.size()), "must have no null character");
+    if (text.find('\0') != std::string::npos)
+        refuse_value(name, nb::str(text.data(), text.size()), "must have no null character");
     return text;
 }
 
@@ -71,7 +72,8 @@ static bool read_number(PyObject *item, double &x)
 void read_numbers(const char *name, nb::handle given, size_t count, double *out)
 {
     PyObject *o = given.ptr();
-    bool fine = PySequence_Check(o) && !PyUnicode_Check(o) && !PyBytes_Check(o) && PySequence_Size(o) == (Py_ssize_t)count;
+    bool fine =
+        PySequence_Check(o) && !PyUnicode_Check(o) && !PyBytes_Check(o) && PySequence_Size(o) == (Py_ssize_t)count;
     for (size_t k = 0; k < count && fine; ++k) {
         nb::object item = nb::steal(PySequence_GetItem(o, (Py_ssize_t)k));
         fine = item.is_valid() && read_number(item.ptr(), out[k]);
@@ -90,7 +92,8 @@ void set_members(nb::handle object, nb::handle values)
         } catch (nb::python_error &error) {
             if (!error.matches(PyExc_TypeError)) throw;
             const std::string why = nb::str(error.value()).c_str();
-            // What reads its value itself has said so; nanobind says neither name nor value, only "(self, arg: float, /)".
+            // What reads its value itself has said so; nanobind says neither name nor value, only "(self, arg: float,
+            // /)".
             if (why.compare(0, name.size() + 3, name + " = ") == 0) throw;
             const size_t at = why.find("arg: "), end = why.find_first_of(",)", at);
             if (at == std::string::npos || end == std::string::npos) throw;

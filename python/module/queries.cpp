@@ -6,7 +6,8 @@
 using rows3 = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
 static sadmm_query_filter filter_of(world &w, const std::optional<body> &ignore, const std::vector<std::string> &types,
-                                    const whole &category, const whole &mask, bool from_inside, bool from_behind, bool sensors)
+                                    const whole &category, const whole &mask, bool from_inside, bool from_behind,
+                                    bool sensors)
 {
     sadmm_query_filter filter = sadmm_query_filter_default();
     if (ignore) filter.ignored = id_in(w, *ignore, "ignore");
@@ -85,36 +86,48 @@ static nb::dict dict_of(const sadmm_closest_points &c)
 
 void bind_queries(nb::class_<world> &w)
 {
-    w.def("_cast_rays", &cast_rays, "origins"_a.noconvert(), "directions"_a.noconvert(), "length"_a, "ignore"_a.none(), "types"_a, "category"_a, "mask"_a,
-          "from_inside"_a, "from_behind"_a, "sensors"_a);
+    w.def("_cast_rays", &cast_rays, "origins"_a.noconvert(), "directions"_a.noconvert(), "length"_a, "ignore"_a.none(),
+          "types"_a, "category"_a, "mask"_a, "from_inside"_a, "from_behind"_a, "sensors"_a);
     w.def("overlap_box", [](nb::handle_t<world> self, numbers<3> from, numbers<3> to) {
         const vec3 lowest = from.as("lowest"), highest = to.as("highest");
         return overlaps(self, [&](sadmm_world *h, int32_t capacity, sadmm_shape_id *ids, int32_t *count) {
             return sadmm_world_overlap_box(h, lowest.data(), highest.data(), nullptr, capacity, ids, count);
         });
     }, "lowest"_a, "highest"_a, "Shapes whose bounding boxes overlap the box from lowest to highest (m, world).");
-    w.def("overlap", [](nb::handle_t<world> self, const shape_def &shape, numbers<3> position, numbers<4> orientation) {
-        const sadmm_shape_def def = shape.def; // another thread may change it
-        const vec3 x = position.as("position");
-        const quat q = orientation.as("orientation");
-        return overlaps(self, [&](sadmm_world *h, int32_t capacity, sadmm_shape_id *ids, int32_t *count) {
-            return sadmm_world_overlap_shape(h, &def, x.data(), q.data(), nullptr, capacity, ids, count);
-        });
-    }, "shape"_a, "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0}, "Shapes that overlap this one at a pose in the world.");
-    w.def("closest_points", [](world &w, const shape &a, const shape &b) {
-        const sadmm_shape_id first = id_in(w, a, "a"), second = id_in(w, b, "b");
-        sadmm_closest_points c;
-        call(w, [&](sadmm_world *h) { return sadmm_world_closest_points(h, first, second, &c); });
-        return dict_of(c);
-    }, "a"_a, "b"_a, "Distance of two shapes: a dict with distance (m; negative: penetration), normal from a to b, points a and b, "
-                     "triangle.");
-    w.def("closest_to", [](world &w, const shape_def &shape_, const shape &other, numbers<3> position, numbers<4> orientation) {
-        const sadmm_shape_def def = shape_.def; // another thread may change it
-        const sadmm_shape_id id = id_in(w, other, "other");
-        const vec3 x = position.as("position");
-        const quat q = orientation.as("orientation");
-        sadmm_closest_points c;
-        call(w, [&](sadmm_world *h) { return sadmm_world_closest_to_shape(h, &def, x.data(), q.data(), id, &c); });
-        return dict_of(c);
-    }, "shape"_a, "other"_a, "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0}, "The same for a shape definition at a pose and a shape.");
+    w.def(
+        "overlap",
+        [](nb::handle_t<world> self, const shape_def &shape, numbers<3> position, numbers<4> orientation) {
+            const sadmm_shape_def def = shape.def; // another thread may change it
+            const vec3 x = position.as("position");
+            const quat q = orientation.as("orientation");
+            return overlaps(self, [&](sadmm_world *h, int32_t capacity, sadmm_shape_id *ids, int32_t *count) {
+                return sadmm_world_overlap_shape(h, &def, x.data(), q.data(), nullptr, capacity, ids, count);
+            });
+        },
+        "shape"_a, "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0},
+        "Shapes that overlap this one at a pose in the world.");
+    w.def(
+        "closest_points",
+        [](world &w, const shape &a, const shape &b) {
+            const sadmm_shape_id first = id_in(w, a, "a"), second = id_in(w, b, "b");
+            sadmm_closest_points c;
+            call(w, [&](sadmm_world *h) { return sadmm_world_closest_points(h, first, second, &c); });
+            return dict_of(c);
+        },
+        "a"_a, "b"_a,
+        "Distance of two shapes: a dict with distance (m; negative: penetration), normal from a to b, points a and b, "
+        "triangle.");
+    w.def(
+        "closest_to",
+        [](world &w, const shape_def &shape_, const shape &other, numbers<3> position, numbers<4> orientation) {
+            const sadmm_shape_def def = shape_.def; // another thread may change it
+            const sadmm_shape_id id = id_in(w, other, "other");
+            const vec3 x = position.as("position");
+            const quat q = orientation.as("orientation");
+            sadmm_closest_points c;
+            call(w, [&](sadmm_world *h) { return sadmm_world_closest_to_shape(h, &def, x.data(), q.data(), id, &c); });
+            return dict_of(c);
+        },
+        "shape"_a, "other"_a, "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0},
+        "The same for a shape definition at a pose and a shape.");
 }

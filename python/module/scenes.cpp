@@ -24,8 +24,8 @@ static void check_error(sadmm_status status, const sadmm_error &error)
 
 // Of `spec`, or (a text) of a scene file's text. As `subadmm run` does it.
 static std::unique_ptr<world> build(const std::string &spec, bool is_text, const std::string &backend,
-                                    const std::optional<std::string> &precision, const std::optional<std::string> &method,
-                                    whole device, nb::handle settings)
+                                    const std::optional<std::string> &precision,
+                                    const std::optional<std::string> &method, whole device, nb::handle settings)
 {
     auto made = std::make_unique<world>();
     sadmm_error error{};
@@ -38,7 +38,8 @@ static std::unique_ptr<world> build(const std::string &spec, bool is_text, const
     if (precision) def.precision = named<sadmm_precision>("precision", *precision);
     if (method) sadmm_scene_set_method(&made->scene, named<sadmm_method>("method", *method));
     if (!settings.is_none()) {
-        if (!nb::isinstance<nb::dict>(settings)) refuse_type("settings", settings, "must be a dict of changes, as {'dt': 0.002}");
+        if (!nb::isinstance<nb::dict>(settings))
+            refuse_type("settings", settings, "must be a dict of changes, as {'dt': 0.002}");
         nb::object changed = nb::cast(def.settings);
         set_members(changed, settings);
         def.settings = nb::cast<sadmm_settings>(changed);
@@ -59,8 +60,8 @@ static std::unique_ptr<world> build(const std::string &spec, bool is_text, const
 }
 
 // As a scene file: of a scene what `subadmm scenes SPEC --json` writes, where nothing else is given.
-static std::string to_json(world &w, const std::optional<std::string> &name, const std::optional<std::string> &description,
-                           std::optional<double> duration)
+static std::string to_json(world &w, const std::optional<std::string> &name,
+                           const std::optional<std::string> &description, std::optional<double> duration)
 {
     if (name) without_null("name", *name);
     if (description) without_null("description", *description);
@@ -87,7 +88,8 @@ static std::string to_json(world &w, const std::optional<std::string> &name, con
             about.description = about_it.c_str();
             about.n = about.m = -1;
             about.duration = duration.value_or(w.scripted ? w.scene.duration : 10.0);
-            for (int k = 0; k < SADMM_METHOD_COUNT; ++k) about.iterations[k] = settings.iterations, about.substeps[k] = settings.substeps;
+            for (int k = 0; k < SADMM_METHOD_COUNT; ++k)
+                about.iterations[k] = settings.iterations, about.substeps[k] = settings.substeps;
             status = sadmm_scene_file_write(&about, &w.def, w.handle, stream, &error);
         }
         if (stream) fclose(stream);
@@ -114,22 +116,28 @@ static nb::object result(world &w)
 
 void bind_scenes(nb::module_ &m, nb::class_<world> &w)
 {
-    m.def("scenes", &list_scenes, "The scenes of the library: a list of dicts with name, arguments, description, duration (s), "
-                                  "chaotic.");
-    m.def("_scene", &build, "spec"_a, "is_text"_a, nb::kw_only(), "backend"_a = "auto", "precision"_a = nb::none(), "method"_a = nb::none(),
-          "device"_a = 0, "settings"_a = nb::none());
+    m.def("scenes", &list_scenes,
+          "The scenes of the library: a list of dicts with name, arguments, description, duration (s), "
+          "chaotic.");
+    m.def("_scene", &build, "spec"_a, "is_text"_a, nb::kw_only(), "backend"_a = "auto", "precision"_a = nb::none(),
+          "method"_a = nb::none(), "device"_a = 0, "settings"_a = nb::none());
     w.def("_to_json", &to_json, "name"_a.none(), "description"_a.none(), "duration"_a.none());
-    w.def_prop_ro("has_script", [](world &w) { return w.scripted && ask(w, [&](sadmm_world *) { return sadmm_scene_has_script(&w.scene); }); },
-                  "Whether the scene has a script: inputs that steps apply and that scene files do not contain.");
+    w.def_prop_ro(
+        "has_script",
+        [](world &w) { return w.scripted && ask(w, [&](sadmm_world *) { return sadmm_scene_has_script(&w.scene); }); },
+        "Whether the scene has a script: inputs that steps apply and that scene files do not contain.");
     w.def_prop_ro("duration", [](world &w) -> nb::object {
         return w.scripted ? nb::cast(ask(w, [&](sadmm_world *) { return w.scene.duration; })) : nb::none();
     }, "Duration of the scene, s; None for other worlds.");
-    w.def_prop_rw("script", [](world &w) { return w.scripted && ask(w, [&](sadmm_world *) { return w.script_on; }); },
-                  [](world &w, bool on) {
-                      if (on && !w.scripted) throw nb::value_error("script: the world has none; only a scene's world can have one");
-                      ask(w, [&](sadmm_world *) { return w.script_on = on; });
-                  },
-                  "Whether the scene's script runs: its motions and measurements. While it is off, the caller sets the targets of joints\n"
-                  "and couplings; switched on again, it continues at the current time.");
+    w.def_prop_rw(
+        "script", [](world &w) { return w.scripted && ask(w, [&](sadmm_world *) { return w.script_on; }); },
+        [](world &w, bool on) {
+            if (on && !w.scripted)
+                throw nb::value_error("script: the world has none; only a scene's world can have one");
+            ask(w, [&](sadmm_world *) { return w.script_on = on; });
+        },
+        "Whether the scene's script runs: its motions and measurements. While it is off, the caller sets the "
+        "targets of joints\n"
+        "and couplings; switched on again, it continues at the current time.");
     w.def_prop_ro("tasks", &result, "What the scene measures of its task, after steps that were waited for.");
 }

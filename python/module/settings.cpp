@@ -48,7 +48,8 @@ void bind_settings(nb::module_ &m)
         .def_ro("momentum_max", &C::momentum_max, "Momentum error of the worst body, relative.")
         .def_ro("momentum_worst", &C::momentum_worst, "Index of that body among the dynamic ones; -1: none.")
         .def_ro("siconos", &C::siconos, "siconos' measure, or -1.")
-        .def_ro("islands_above", &C::islands_above, "Islands above the certificate tolerances; -1: no tolerance is set.");
+        .def_ro("islands_above", &C::islands_above,
+                "Islands above the certificate tolerances; -1: no tolerance is set.");
 
     using R = sadmm_step_report;
     nb::class_<R>(m, "Report", "What the last step did.")
@@ -72,8 +73,8 @@ void bind_settings(nb::module_ &m)
                 "Largest error of a locked translation of a joint after the step, m; 0 without joints.")
         .def_prop_ro("ms", [](const R &r) {
             nb::dict d;
-            d["total"] = r.ms.total, d["collide"] = r.ms.collide, d["assemble"] = r.ms.assemble, d["solve"] = r.ms.solve,
-            d["finish"] = r.ms.finish, d["certify"] = r.certify_ms;
+            d["total"] = r.ms.total, d["collide"] = r.ms.collide, d["assemble"] = r.ms.assemble,
+            d["solve"] = r.ms.solve, d["finish"] = r.ms.finish, d["certify"] = r.certify_ms;
             return d;
         }, "Times, ms: total, collide, assemble, solve, finish; certify.")
         .def_prop_ro("residual_primal", [](const R &r) { return r.residual.primal; }, "m/s; -1: not measured.")

@@ -79,7 +79,8 @@ static shape_def make_heightfield(grid heights, numbers<2> given)
 std::vector<shape_def> read_shapes(const char *name, nb::handle given)
 {
     std::vector<shape_def> out;
-    if (!PySequence_Check(given.ptr()) || nb::isinstance<nb::str>(given)) refuse_type(name, given, "must be a sequence of subadmm.Shape");
+    if (!PySequence_Check(given.ptr()) || nb::isinstance<nb::str>(given))
+        refuse_type(name, given, "must be a sequence of subadmm.Shape");
     for (nb::handle one : given) {
         const std::string which = std::string(name) + "[" + std::to_string(out.size()) + "]";
         if (!nb::isinstance<shape_def>(one)) refuse_type(which.c_str(), one, "must be a subadmm.Shape");
@@ -134,22 +135,30 @@ static nb::object geometry_of(const shape_def &s)
 void bind_shapes(nb::module_ &m)
 {
     using S = shape_def;
-    nb::class_<S> c(m, "Shape", "A shape's definition; made by subadmm.sphere, box, hull, ... and given to World.add_shape "
-                              "or World.add_solid.");
-    c.def("__init__", [](S *self, const std::string &type, const std::vector<double> &size) {
-            new (self) S();
-            self->def.type = named<sadmm_shape_type>("type", type);
-            if (self->def.type == SADMM_SHAPE_HULL || self->def.type == SADMM_SHAPE_MESH)
-                throw nb::value_error("a hull is made by subadmm.hull, a mesh by subadmm.mesh or subadmm.heightfield");
-            const size_t count = (size_t)sadmm_shape_sizes[self->def.type];
-            if (size.size() != count) throw nb::value_error(("size: must have " + std::to_string(count) + " numbers").c_str());
-            for (size_t k = 0; k < size.size(); ++k) self->def.size[k] = size[k];
-        }, "type"_a, "size"_a = std::vector<double>())
+    nb::class_<S> c(m, "Shape",
+                    "A shape's definition; made by subadmm.sphere, box, hull, ... and given to World.add_shape "
+                    "or World.add_solid.");
+    c.def(
+         "__init__",
+         [](S *self, const std::string &type, const std::vector<double> &size) {
+             new (self) S();
+             self->def.type = named<sadmm_shape_type>("type", type);
+             if (self->def.type == SADMM_SHAPE_HULL || self->def.type == SADMM_SHAPE_MESH)
+                 throw nb::value_error("a hull is made by subadmm.hull, a mesh by subadmm.mesh or subadmm.heightfield");
+             const size_t count = (size_t)sadmm_shape_sizes[self->def.type];
+             if (size.size() != count)
+                 throw nb::value_error(("size: must have " + std::to_string(count) + " numbers").c_str());
+             for (size_t k = 0; k < size.size(); ++k) self->def.size[k] = size[k];
+         },
+         "type"_a, "size"_a = std::vector<double>())
         .def_prop_ro("type", [](const S &s) { return name_of(s.def.type); })
-        .def("copy", [](const S &s) { return S(s); }, "A copy of the definition; hulls and meshes are shared.")
-        .def("geometry", &geometry_of, "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.")
-        .def_prop_ro("convex_radius", [](const S &s) { return sadmm_hull_convex_radius(s.def.hull); },
-                     "Convex radius of a hull, m; geometry() is the polyhedron without it. 0 for other types.");
+        .def(
+            "copy", [](const S &s) { return S(s); }, "A copy of the definition; hulls and meshes are shared.")
+        .def("geometry", &geometry_of,
+             "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.")
+        .def_prop_ro(
+            "convex_radius", [](const S &s) { return sadmm_hull_convex_radius(s.def.hull); },
+            "Convex radius of a hull, m; geometry() is the polyhedron without it. 0 for other types.");
     const sadmm_field *field = sadmm_shape_table;
     SADMM_SHAPE_FIELDS(BIND, )
 
@@ -160,21 +169,31 @@ void bind_shapes(nb::module_ &m)
     using M = sadmm_mass;
     nb::class_<M>(m, "Mass", "Mass, centre of mass and principal axes of solids.")
         .def_ro("mass", &M::mass, "kg.")
-        .def_prop_ro("centre", [](const M &a) { return array_of<3>(a.centre); }, "m, in the frame of the layout.")
-        .def_prop_ro("inertia", [](const M &a) { return array_of<3>(a.inertia); }, "Principal moments, kg m^2.")
-        .def_prop_ro("orientation", [](const M &a) { return array_of<4>(a.orientation); }, "Principal axes to the frame of the layout.")
-        .def("pose_in_body", [](const M &a, numbers<3> position, numbers<4> orientation) {
-            vec3 x = position.as("position");
-            quat q = orientation.as("orientation");
-            check(sadmm_mass_pose_in_body(&a, x.data(), q.data()));
-            return std::make_pair(x, q);
-        }, "position"_a, "orientation"_a, "Convert a pose from the frame of the layout to that of the body.")
-        .def("pose_of_body", [](const M &a, numbers<3> position, numbers<4> orientation) {
-            vec3 x = position.as("position");
-            quat q = orientation.as("orientation");
-            check(sadmm_mass_pose_of_body(&a, x.data(), q.data()));
-            return std::make_pair(x, q);
-        }, "position"_a, "orientation"_a, "The body's pose in the world for a pose of the layout's frame.");
+        .def_prop_ro(
+            "centre", [](const M &a) { return array_of<3>(a.centre); }, "m, in the frame of the layout.")
+        .def_prop_ro(
+            "inertia", [](const M &a) { return array_of<3>(a.inertia); }, "Principal moments, kg m^2.")
+        .def_prop_ro(
+            "orientation", [](const M &a) { return array_of<4>(a.orientation); },
+            "Principal axes to the frame of the layout.")
+        .def(
+            "pose_in_body",
+            [](const M &a, numbers<3> position, numbers<4> orientation) {
+                vec3 x = position.as("position");
+                quat q = orientation.as("orientation");
+                check(sadmm_mass_pose_in_body(&a, x.data(), q.data()));
+                return std::make_pair(x, q);
+            },
+            "position"_a, "orientation"_a, "Convert a pose from the frame of the layout to that of the body.")
+        .def(
+            "pose_of_body",
+            [](const M &a, numbers<3> position, numbers<4> orientation) {
+                vec3 x = position.as("position");
+                quat q = orientation.as("orientation");
+                check(sadmm_mass_pose_of_body(&a, x.data(), q.data()));
+                return std::make_pair(x, q);
+            },
+            "position"_a, "orientation"_a, "The body's pose in the world for a pose of the layout's frame.");
     m.def("mass_of", [](nb::object given, double density) {
         const std::vector<S> shapes = read_shapes("shapes", given);
         std::vector<M> parts(shapes.size());

@@ -69,10 +69,11 @@ static void step(world &w, const whole &steps, bool wait)
     }
 }
 
-// ---- bodies ----------------------------------------------------------------------------------------------------------
+// ---- bodies ---------------------------------------------------------------------------------------------------------
 
 // The shapes of a new body; of several, `which` is one that is refused.
-static sadmm_status add_shapes(sadmm_world *h, sadmm_body_id body, const std::vector<shape_def> &shapes, std::string &which)
+static sadmm_status add_shapes(sadmm_world *h, sadmm_body_id body, const std::vector<shape_def> &shapes,
+                               std::string &which)
 {
     for (size_t k = 0; k < shapes.size(); ++k) {
         const sadmm_status status = sadmm_world_add_shape(h, body, &shapes[k].def, nullptr);
@@ -84,7 +85,8 @@ static sadmm_status add_shapes(sadmm_world *h, sadmm_body_id body, const std::ve
 }
 
 // All of it or nothing, and nobody sees a part of it: under one lock.
-static body add_body(nb::handle_t<world> self, const std::string &name SADMM_BODY_FIELDS(PARAMETER, ), nb::object shapes)
+static body add_body(nb::handle_t<world> self, const std::string &name SADMM_BODY_FIELDS(PARAMETER, ),
+                     nb::object shapes)
 {
     world &w = nb::cast<world &>(self);
     sadmm_body_def def = sadmm_body_def_default();
@@ -172,89 +174,142 @@ static shape add_shape(const body &b, const shape_def &given)
 
 static void bind_body(nb::module_ &m)
 {
-    nb::class_<body> c(m, "Body", collected<sadmm_body_id>(), "A body of a world. Body(...) is made by World.add_body, World.add_solid, World.bodies.");
-    c.def("__eq__", [](const body &a, const body &b) { return same_id(a, b); }, nb::is_operator())
+    nb::class_<body> c(m, "Body", collected<sadmm_body_id>(),
+                       "A body of a world. Body(...) is made by World.add_body, World.add_solid, World.bodies.");
+    c.def(
+         "__eq__", [](const body &a, const body &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_body_id>)
-        .def("__repr__", [](const body &b) { return "<subadmm.Body " + std::to_string(b.id.slot) + "." + std::to_string(b.id.generation) + ">"; })
+        .def("__repr__",
+             [](const body &b) {
+                 return "<subadmm.Body " + std::to_string(b.id.slot) + "." + std::to_string(b.id.generation) + ">";
+             })
         .def_prop_ro("world", [](const body &b) { return b.owner; })
-        .def_prop_ro("index", [](const body &b) {
-            int32_t index;
-            call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_index(h, b.id, &index); });
-            return index;
-        }, "Row of the world's arrays.")
-        .def("set_mass", [](const body &b, double mass, numbers<3> moments) {
-            const vec3 inertia = moments.as("inertia");
-            call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_mass(h, b.id, mass, inertia.data()); });
-        }, "mass"_a, "inertia"_a, "From the next step on.");
+        .def_prop_ro(
+            "index",
+            [](const body &b) {
+                int32_t index;
+                call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_index(h, b.id, &index); });
+                return index;
+            },
+            "Row of the world's arrays.")
+        .def(
+            "set_mass",
+            [](const body &b, double mass, numbers<3> moments) {
+                const vec3 inertia = moments.as("inertia");
+                call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_mass(h, b.id, mass, inertia.data()); });
+            },
+            "mass"_a, "inertia"_a, "From the next step on.");
     SADMM_BODY_FIELDS(BODY_IS, )
     c.def("add_shape", &add_shape, "shape"_a, "Put a shape on the body, at the definition's position and orientation.")
-        .def("move_to", [](const body &b, numbers<3> position, numbers<4> orientation) {
-            const vec3 x = position.as("position");
-            const quat q = orientation.as("orientation");
-            call(b.in(), [&](sadmm_world *h) { return sadmm_world_move_body(h, b.id, x.data(), q.data()); });
-        }, "position"_a, "orientation"_a, "Move a kinematic body to a pose within the next step.")
-        .def("set_wrench", [](const body &b, numbers<3> force, numbers<3> torque) {
-            const vec3 f = force.as("force"), t = torque.as("torque");
-            call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_wrench(h, b.id, f.data(), t.data()); });
-        }, "force"_a, "torque"_a = vec3{}, "External force (N) at the centre of mass and torque (N m), world frame, kept until set again.")
-        .def("add_force_at", [](const body &b, numbers<3> force, numbers<3> point) {
-            const vec3 f = force.as("force"), x = point.as("point");
-            call(b.in(), [&](sadmm_world *h) { return sadmm_world_add_body_force_at(h, b.id, f.data(), x.data()); });
-        }, "force"_a, "point"_a, "Add a force (N) at a point (m, world) to the external wrench.")
-        .def("apply_impulse_at", [](const body &b, numbers<3> impulse, numbers<3> point) {
-            const vec3 p = impulse.as("impulse"), x = point.as("point");
-            call(b.in(), [&](sadmm_world *h) { return sadmm_world_apply_body_impulse_at(h, b.id, p.data(), x.data()); });
-        }, "impulse"_a, "point"_a, "Change the velocities at once by an impulse (N s) at a point (m, world).")
-        .def("set_gravity_scale", [](const body &b, double s) {
-            call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_gravity_scale(h, b.id, s); });
-        }, "scale"_a)
-        .def("set_damping", [](const body &b, double linear, double angular) {
-            call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_damping(h, b.id, linear, angular); });
-        }, "linear"_a, "angular"_a, "1/s.")
-        .def_prop_ro("contact_wrench", [](const body &b) {
-            vec6 out;
-            call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_contact_wrench(h, b.id, out.data()); });
-            return out;
-        }, "Force (N) and torque about the centre of mass (N m) of the last step's contacts.")
-        .def("ignore", [](const body &a, const body &b, bool off) {
-            const sadmm_body_id other = id_in(a.in(), b, "other");
-            call(a.in(), [&](sadmm_world *h) { return sadmm_world_set_body_pair_contact(h, a.id, other, !off); });
-        }, "other"_a, "off"_a = true, "Turn contact with another body off, or on again.")
-        .def("remove", [](const body &b) { call(b.in(), [&](sadmm_world *h) { return sadmm_world_remove_body(h, b.id); }); },
-             "Remove the body with its shapes, joints and couplings.");
+        .def(
+            "move_to",
+            [](const body &b, numbers<3> position, numbers<4> orientation) {
+                const vec3 x = position.as("position");
+                const quat q = orientation.as("orientation");
+                call(b.in(), [&](sadmm_world *h) { return sadmm_world_move_body(h, b.id, x.data(), q.data()); });
+            },
+            "position"_a, "orientation"_a, "Move a kinematic body to a pose within the next step.")
+        .def(
+            "set_wrench",
+            [](const body &b, numbers<3> force, numbers<3> torque) {
+                const vec3 f = force.as("force"), t = torque.as("torque");
+                call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_wrench(h, b.id, f.data(), t.data()); });
+            },
+            "force"_a, "torque"_a = vec3{},
+            "External force (N) at the centre of mass and torque (N m), world frame, kept until set again.")
+        .def(
+            "add_force_at",
+            [](const body &b, numbers<3> force, numbers<3> point) {
+                const vec3 f = force.as("force"), x = point.as("point");
+                call(b.in(),
+                     [&](sadmm_world *h) { return sadmm_world_add_body_force_at(h, b.id, f.data(), x.data()); });
+            },
+            "force"_a, "point"_a, "Add a force (N) at a point (m, world) to the external wrench.")
+        .def(
+            "apply_impulse_at",
+            [](const body &b, numbers<3> impulse, numbers<3> point) {
+                const vec3 p = impulse.as("impulse"), x = point.as("point");
+                call(b.in(),
+                     [&](sadmm_world *h) { return sadmm_world_apply_body_impulse_at(h, b.id, p.data(), x.data()); });
+            },
+            "impulse"_a, "point"_a, "Change the velocities at once by an impulse (N s) at a point (m, world).")
+        .def(
+            "set_gravity_scale",
+            [](const body &b, double s) {
+                call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_gravity_scale(h, b.id, s); });
+            },
+            "scale"_a)
+        .def(
+            "set_damping",
+            [](const body &b, double linear, double angular) {
+                call(b.in(), [&](sadmm_world *h) { return sadmm_world_set_body_damping(h, b.id, linear, angular); });
+            },
+            "linear"_a, "angular"_a, "1/s.")
+        .def_prop_ro(
+            "contact_wrench",
+            [](const body &b) {
+                vec6 out;
+                call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_contact_wrench(h, b.id, out.data()); });
+                return out;
+            },
+            "Force (N) and torque about the centre of mass (N m) of the last step's contacts.")
+        .def(
+            "ignore",
+            [](const body &a, const body &b, bool off) {
+                const sadmm_body_id other = id_in(a.in(), b, "other");
+                call(a.in(), [&](sadmm_world *h) { return sadmm_world_set_body_pair_contact(h, a.id, other, !off); });
+            },
+            "other"_a, "off"_a = true, "Turn contact with another body off, or on again.")
+        .def(
+            "remove",
+            [](const body &b) { call(b.in(), [&](sadmm_world *h) { return sadmm_world_remove_body(h, b.id); }); },
+            "Remove the body with its shapes, joints and couplings.");
 
     nb::class_<shape>(m, "BodyShape", collected<sadmm_shape_id>(), "A shape on a body.")
-        .def("__eq__", [](const shape &a, const shape &b) { return same_id(a, b); }, nb::is_operator())
+        .def(
+            "__eq__", [](const shape &a, const shape &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_shape_id>)
         .def_prop_ro("world", [](const shape &s) { return s.owner; })
-        .def_prop_ro("index", [](const shape &s) {
-            int32_t index;
-            call(s.in(), [&](sadmm_world *h) { return sadmm_world_shape_index(h, s.id, &index); });
-            return index;
-        })
-        .def_prop_ro("body", [](const shape &s) {
-            body out{s.owner, s.w, {}};
-            sadmm_shape_def def;
-            call(s.in(), [&](sadmm_world *h) { return sadmm_world_shape_def(h, s.id, &def, &out.id); });
-            return out;
-        })
-        .def_prop_ro("definition", [](const shape &s) {
-            shape_def out;
-            call(s.in(), [&](sadmm_world *h) {
-                const sadmm_status status = sadmm_world_shape_def(h, s.id, &out.def, nullptr);
-                if (status == SADMM_OK) hold_parts(out); // the world could let go of them
-                return status;
-            });
-            return out;
-        }, "As it is now.")
-        .def("set_material", [](const shape &s, double mu, double e) {
-            call(s.in(), [&](sadmm_world *h) { return sadmm_world_set_shape_material(h, s.id, mu, e); });
-        }, "friction"_a, "restitution"_a = 0.0)
-        .def("set_pair_friction", [](const shape &a, const shape &b, double mu) {
-            const sadmm_shape_id other = id_in(a.in(), b, "other");
-            call(a.in(), [&](sadmm_world *h) { return sadmm_world_set_pair_friction(h, a.id, other, mu); });
-        }, "other"_a, "friction"_a, "Friction of the two shapes; -1: the geometric mean again.")
-        .def("remove", [](const shape &s) { call(s.in(), [&](sadmm_world *h) { return sadmm_world_remove_shape(h, s.id); }); });
+        .def_prop_ro("index",
+                     [](const shape &s) {
+                         int32_t index;
+                         call(s.in(), [&](sadmm_world *h) { return sadmm_world_shape_index(h, s.id, &index); });
+                         return index;
+                     })
+        .def_prop_ro("body",
+                     [](const shape &s) {
+                         body out{s.owner, s.w, {}};
+                         sadmm_shape_def def;
+                         call(s.in(), [&](sadmm_world *h) { return sadmm_world_shape_def(h, s.id, &def, &out.id); });
+                         return out;
+                     })
+        .def_prop_ro(
+            "definition",
+            [](const shape &s) {
+                shape_def out;
+                call(s.in(), [&](sadmm_world *h) {
+                    const sadmm_status status = sadmm_world_shape_def(h, s.id, &out.def, nullptr);
+                    if (status == SADMM_OK) hold_parts(out); // the world could let go of them
+                    return status;
+                });
+                return out;
+            },
+            "As it is now.")
+        .def(
+            "set_material",
+            [](const shape &s, double mu, double e) {
+                call(s.in(), [&](sadmm_world *h) { return sadmm_world_set_shape_material(h, s.id, mu, e); });
+            },
+            "friction"_a, "restitution"_a = 0.0)
+        .def(
+            "set_pair_friction",
+            [](const shape &a, const shape &b, double mu) {
+                const sadmm_shape_id other = id_in(a.in(), b, "other");
+                call(a.in(), [&](sadmm_world *h) { return sadmm_world_set_pair_friction(h, a.id, other, mu); });
+            },
+            "other"_a, "friction"_a, "Friction of the two shapes; -1: the geometric mean again.")
+        .def("remove",
+             [](const shape &s) { call(s.in(), [&](sadmm_world *h) { return sadmm_world_remove_shape(h, s.id); }); });
 }
 
 void bind_world(nb::module_ &m, nb::class_<world> &w)
@@ -262,7 +317,8 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
     bind_body(m);
     w.def("__init__", &init_world, nb::kw_only(), "backend"_a = "auto", "precision"_a = "f64", "device"_a = 0,
           "contact_margin"_a = 0.02, "settings"_a = nb::none(),
-          "backend: 'auto', 'ref', 'cpu' or 'cuda'; precision: 'f64' or 'f32'; device: which accelerator; contact_margin: "
+          "backend: 'auto', 'ref', 'cpu' or 'cuda'; precision: 'f64' or 'f32'; device: which accelerator; "
+          "contact_margin: "
           "speculative margin as a share of the thinner shape's extent; settings: Settings, or the defaults.");
     w.def_prop_rw("settings", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_settings(h); }); },
                   [](world &w, nb::object given) {
@@ -281,10 +337,13 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
         });
     }, "backend"_a, "precision"_a = "f64", "device"_a = 0, "Change the backend from the next step on.");
     w.def("add_body", &add_body, nb::kw_only(), "name"_a = "" SADMM_BODY_FIELDS(ARGUMENT, ), "shapes"_a = nb::tuple(),
-          "A body. SI units; `inertia`: principal moments; `shapes`: Shapes to put on it, none by default. If one of them is\n"
+          "A body. SI units; `inertia`: principal moments; `shapes`: Shapes to put on it, none by default. If one of "
+          "them is\n"
           "refused, no body is added. World.add_solid computes masses.");
-    w.def_prop_ro("body_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_body_count(h); }); });
-    w.def_prop_ro("shape_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_shape_count(h); }); });
+    w.def_prop_ro("body_count",
+                  [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_body_count(h); }); });
+    w.def_prop_ro("shape_count",
+                  [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_shape_count(h); }); });
     w.def_prop_ro("bodies", [](nb::handle_t<world> self) {
         return all_of<body>(self, &sadmm_world_body_count, &sadmm_world_body_at);
     }, "All bodies, in the order of the arrays' rows.");
@@ -295,13 +354,16 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
           "Make n steps. Scenes also run their script.");
     w.def("step_async", [](world &w, whole n) { step(w, n, false); }, "n"_a = 1,
           "Begin n steps without waiting for them, if the backend can.");
-    w.def("wait", [](world &w) { call(w, [](sadmm_world *h) { return sadmm_world_wait(h); }); }, "Wait until all steps begun are done.");
+    w.def(
+        "wait", [](world &w) { call(w, [](sadmm_world *h) { return sadmm_world_wait(h); }); },
+        "Wait until all steps begun are done.");
     w.def_prop_ro("report", [](world &w) {
         sadmm_step_report r;
         call(w, [&](sadmm_world *h) { return sadmm_world_report(h, &r); });
         return r;
     }, "Of the last step.");
-    w.def_prop_ro("contact_count", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_contact_count(h); }); });
+    w.def_prop_ro("contact_count",
+                  [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_contact_count(h); }); });
     w.def("state_hash", [](world &w) {
         uint64_t hash;
         call(w, [&](sadmm_world *h) { return sadmm_world_state_hash(h, &hash); });

@@ -8,8 +8,8 @@
     world.step(400)
     print(box.position, world.report.penetration_max)
 
-SI units everywhere; orientations are unit quaternions w x y z, body to world. What a name means in detail is said once, in
-the C headers of the same names (include/subadmm/).
+SI units everywhere; orientations are unit quaternions w x y z, body to world. What a name means in detail is said once,
+in the C headers of the same names (include/subadmm/).
 """
 
 import warnings
@@ -60,16 +60,18 @@ __version__ = version()
 __all__ = [
     "decompose", "load",
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
-    "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape", "StaleId",
+    "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape",
+    "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
     "CONTACT_BEGUN", "CONTACT_ENDED", "SENSOR_BEGUN", "SENSOR_ENDED", "event_dtype",
-    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "scene", "scene_from_json",
+    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "scene",
+    "scene_from_json",
     "scenes", "sphere",
     "version",
 ]
 
 
-# ---- shapes -----------------------------------------------------------------------------------------------------------
+# ---- shapes ----------------------------------------------------------------------------------------------------------
 
 
 def _with(shape, options):
@@ -81,8 +83,9 @@ def _with(shape, options):
 
 
 def plane(**options):
-    """Half-space z <= 0 of the shape's frame, for static bodies. Options of this and all shapes: position and orientation in
-    the body's frame, friction (0.5), restitution (0), category, mask, sensor (False; a sensor has no contacts and reports overlaps)."""
+    """Half-space z <= 0 of the shape's frame, for static bodies. Options of this and all shapes: position and
+    orientation in the body's frame, friction (0.5), restitution (0), category, mask, sensor (False; a sensor has no
+    contacts and reports overlaps)."""
     return _with(Shape("plane"), options)
 
 
@@ -135,23 +138,24 @@ def heightfield(heights, spacing, **options):
     return _with(_core._heightfield(numbers("heights", heights), spacing), options)
 
 
-# ---- scenes -----------------------------------------------------------------------------------------------------------
+# ---- scenes ----------------------------------------------------------------------------------------------------------
 
 
 def scene(spec, *, backend="auto", precision=None, method=None, device=0, settings=None):
-    """The world of a scene by name ("pile:300"), or of a scene file (a path that ends in .json or has a slash), as the subadmm
-    command makes it; World.step also runs the scene's script. `settings`: a dict of changes to the scene's settings, like
-    {"dt": 0.002}; `method`, "fast" or "paper", also sets the scene's number of iterations for it."""
+    """The world of a scene by name ("pile:300"), or of a scene file (a path that ends in .json or has a slash), as the
+    subadmm command makes it; World.step also runs the scene's script. `settings`: a dict of changes to the scene's
+    settings, like {"dt": 0.002}; `method`, "fast" or "paper", also sets the scene's number of iterations for it."""
     return _core._scene(str(spec), False, backend=backend, precision=precision, method=method, device=device,
                         settings=settings)
 
 
 def scene_from_json(text, *, backend="auto", precision=None, method=None, device=0, settings=None):
     """The same from the text of a scene file."""
-    return _core._scene(text, True, backend=backend, precision=precision, method=method, device=device, settings=settings)
+    return _core._scene(text, True, backend=backend, precision=precision, method=method, device=device,
+                        settings=settings)
 
 
-# ---- worlds -----------------------------------------------------------------------------------------------------------
+# ---- worlds ----------------------------------------------------------------------------------------------------------
 
 
 def _add_ground(self, friction=0.5, height=0.0):
@@ -165,9 +169,10 @@ def _add_solid(self, shapes, density=None, mass=None, *, position=(0, 0, 0), ori
                **options):
     """A solid body of one or several shapes, with a uniform density (kg/m^3) or a total mass (kg).
 
-    `position` and `orientation` are those of the frame in which the shapes are placed (the layout); the origin of the body is
-    its centre of mass, its axes are the principal axes. For static and kinematic bodies both frames are the same, and neither
-    density nor mass is needed. Sensors have no mass. Other options: as add_body. After an error no body is added.
+    `position` and `orientation` are those of the frame in which the shapes are placed (the layout); the origin of the
+    body is its centre of mass, its axes are the principal axes. For static and kinematic bodies both frames are the
+    same, and neither density nor mass is needed. Sensors have no mass. Other options: as add_body. After an error no
+    body is added.
     """
     if isinstance(shapes, Shape):
         shapes = [shapes]
@@ -195,7 +200,8 @@ def _add_solid(self, shapes, density=None, mass=None, *, position=(0, 0, 0), ori
     own = [shape.copy() for shape in shapes]
     for shape in own:
         shape.position, shape.orientation = whole.pose_in_body(shape.position, shape.orientation)
-    return self.add_body(mass=whole.mass, inertia=whole.inertia, position=place, orientation=turn, shapes=own, **options)
+    return self.add_body(mass=whole.mass, inertia=whole.inertia, position=place, orientation=turn, shapes=own,
+                         **options)
 
 
 def _struct_dtype(members, size):
@@ -226,8 +232,8 @@ event_dtype = _struct_dtype(_core._event_members, _core._event_size)
 
 
 def _events(self):
-    """Take the events since the last call (record_events): an array of `event_dtype`, the oldest first. If there were more than
-    the capacity, the oldest are lost, and a warning says how many."""
+    """Take the events since the last call (record_events): an array of `event_dtype`, the oldest first. If there were
+    more than the capacity, the oldest are lost, and a warning says how many."""
     data, dropped = self._take_events()
     if dropped:
         warnings.warn(f"{dropped} events were lost: take them more often, or keep more (record_events)", stacklevel=2)
@@ -244,12 +250,13 @@ def _to_json(self, name=None, description=None, duration=None):
 
 def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(), category=0, mask=0, from_inside=True,
                from_behind=False, sensors=False):
-    """What rays hit: origins (n x 3, m, world), directions (n x 3, of any length), how far to search (m). A dict of arrays: shape
-    (n; index in World.shapes, -1: nothing), distance (n, m; infinite: nothing), point and normal (n x 3, world), triangle (n;
-    of a mesh, else -1). ignore: a Body; types: of bodies, like ("dynamic",); category, mask: only shapes that would collide
-    with a shape with these; from_inside: also shapes that contain the origin, at distance 0; from_behind: also the back of
-    mesh triangles; sensors: also sensors."""
-    return self._cast_rays(numbers("origins", origins, 3), numbers("directions", directions, 3), length, ignore, list(types),
+    """What rays hit: origins (n x 3, m, world), directions (n x 3, of any length), how far to search (m). A dict of
+    arrays: shape (n; index in World.shapes, -1: nothing), distance (n, m; infinite: nothing), point and normal (n x 3,
+    world), triangle (n; of a mesh, else -1). ignore: a Body; types: of bodies, like ("dynamic",); category, mask: only
+    shapes that would collide with a shape with these; from_inside: also shapes that contain the origin, at distance 0;
+    from_behind: also the back of mesh triangles; sensors: also sensors."""
+    return self._cast_rays(numbers("origins", origins, 3), numbers("directions", directions, 3), length, ignore,
+                           list(types),
                            category, mask, from_inside, from_behind, sensors)
 
 

@@ -21,7 +21,9 @@ def _arguments():
     )
     picture = commands.add_parser("picture", help="run a scene and write a picture of its end (.png)")
     for command in (view, record, picture):
-        command.add_argument("scene", help="as 'pile:300', the names: subadmm.scenes(); or a file, .json, .xml, .urdf or .usd...")
+        command.add_argument("scene",
+                             help="as 'pile:300', the names: subadmm.scenes(); or a file, .json, .xml, .urdf or "
+                                  ".usd...")
         command.add_argument("--backend", default="auto", choices=["auto", "ref", "cpu", "cuda"])
         command.add_argument("--precision", choices=["f32", "f64"], help="default: the scene's")
         command.add_argument("--method", choices=["fast", "paper"], help="default: the scene's")
@@ -39,11 +41,13 @@ def _arguments():
     picture.add_argument("--azimuth", type=float, default=-60, help="where the camera stands, degrees (-60)")
     picture.add_argument("--elevation", type=float, default=24, help="degrees (24)")
     picture.add_argument("--zoom", type=float, default=1, help="2: twice as near (1)")
-    convert = commands.add_parser("convert", help="write a robot's file (MJCF, URDF, USD) or a scene as a scene file (.json)")
+    convert = commands.add_parser("convert",
+                                  help="write a robot's file (MJCF, URDF, USD) or a scene as a scene file (.json)")
     convert.add_argument("source", help="a .xml, .urdf, .usd... file, a scene as 'pile:300', or a scene file")
     convert.add_argument("output", help="the scene file to write, for 'subadmm run' and others")
     convert.add_argument("--report", metavar="FILE", help="also write what is not carried over to a file, as JSON")
-    convert.add_argument("--duration", type=float, help="how long the scene is meant to be run for, s (default: its own, or 10)")
+    convert.add_argument("--duration", type=float,
+                         help="how long the scene is meant to be run for, s (default: its own, or 10)")
     convert.add_argument("--floating", action="store_true", help="URDF: the base is free")
     convert.add_argument("--keyframe", help="MJCF: the keyframe to start from")
     convert.add_argument("--decompose", action="store_true",

@@ -21,7 +21,8 @@ def vertices_and_triangles(mesh):
     elif isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         vertices, triangles = mesh
     else:
-        raise TypeError(f"mesh: must be a Shape, a pair (vertices, triangles) or have vertices and faces; is {type(mesh).__name__}")
+        raise TypeError(f"mesh: must be a Shape, a pair (vertices, triangles) or have vertices and faces; "
+                        f"is {type(mesh).__name__}")
     vertices = numbers("mesh: vertices", vertices, 3)
     if not np.isfinite(vertices).all():
         raise ValueError("mesh: vertices: must be finite numbers")

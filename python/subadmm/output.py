@@ -82,7 +82,8 @@ class Output:
                 raise ValueError(f"{self.name} = {self.path!r}: is a file that is read: must be another")
         for other in others:
             if self._place() == other._place() and not (self._old and stat.S_ISCHR(self._old.st_mode)):
-                raise ValueError(f"{self.name} = {self.path!r}: is the same as {other.name} = {other.path!r}: must be another")
+                raise ValueError(f"{self.name} = {self.path!r}: is the same as {other.name} = {other.path!r}: "
+                                 f"must be another")
 
     def _open_direct(self):
         for number in (1, 2):

@@ -1,4 +1,5 @@
-"""The same scene by the command, where it is installed beside this package or named by SUBADMM, ends in the same bits."""
+"""The same scene by the command, where it is installed beside this package or named by SUBADMM, ends in the same
+bits."""
 import os
 import re
 import shutil

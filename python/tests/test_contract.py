@@ -1,5 +1,5 @@
-"""What every call keeps to: nothing is made to fit in silence, objects are of their world, what fails leaves nothing behind,
-names are texts, calls of several threads take turns, and what is no longer used is collected."""
+"""What every call keeps to: nothing is made to fit in silence, objects are of their world, what fails leaves nothing
+behind, names are texts, calls of several threads take turns, and what is no longer used is collected."""
 import gc
 import threading
 import time
@@ -78,7 +78,8 @@ def test_what_is_set_is_what_was_given():
     world, box = falling_box()
     state = world.get("body_state")
     state[1, :3] = 0.1, 0.2, 0.3
-    for same in (state, state.tolist(), np.asfortranarray(state), np.repeat(state, 2, axis=1)[:, ::2], state.astype(">f8")):
+    for same in (state, state.tolist(), np.asfortranarray(state), np.repeat(state, 2, axis=1)[:, ::2],
+                 state.astype(">f8")):
         world.set("body_state", np.where(np.arange(13) == 0, 5.0, world.get("body_state")))
         world.set("body_state", same)
         assert (world.get("body_state") == state).all()
@@ -182,7 +183,8 @@ def test_whole_numbers_are_whole_and_of_their_size(name):
     for wrong in (1.0, 1.5, np.float32(1.5), np.float64(1), "1", (1, 1)):
         with pytest.raises(TypeError, match=f"{argument}.*[:;] must be a whole number"):
             WHOLE[name](world, joint, wrong)
-    for wrong in (2**31 if argument not in ("category", "mask", "locks", "id", "n") else 2**32, 2**63, 2**70, -(2**31) - 1):
+    for wrong in (2**31 if argument not in ("category", "mask", "locks", "id", "n") else 2**32, 2**63, 2**70,
+                  -(2**31) - 1):
         if argument == "n" and 0 <= wrong < 2**63:
             continue
         with pytest.raises(ValueError, match=f"{argument}.*{wrong}[:;] must be a whole number"):
@@ -196,11 +198,14 @@ def test_the_largest_counts_are_refused_without_memory_for_them():
     for call, said in (
         (lambda: world.get("body_state", first=most), "first = 2147483647.*which has 2"),
         (lambda: world.get("body_state", count=most), "count = 2147483647.*which has 2"),
-        (lambda: world.get("body_state", first=1, count=most, out=np.zeros((1, 13))), "count = 2147483647.*which has 2"),
+        (lambda: world.get("body_state", first=1, count=most, out=np.zeros((1, 13))),
+         "count = 2147483647.*which has 2"),
         (lambda: world.set("body_state", world.get("body_state"), first=most), "first = 2147483647"),
         (lambda: world.record_events(most), r"capacity = 2147483647: must be in \[0, "),
-        (lambda: setattr(world, "settings", subadmm.Settings(iterations=most)), r"iterations = 2147483647: must be in \[1, 1000000\]"),
-        (lambda: subadmm.World(settings=subadmm.Settings(threads=most)), r"threads = 2147483647: must be in \[0, 1024\]"),
+        (lambda: setattr(world, "settings", subadmm.Settings(iterations=most)),
+         r"iterations = 2147483647: must be in \[1, 1000000\]"),
+        (lambda: subadmm.World(settings=subadmm.Settings(threads=most)),
+         r"threads = 2147483647: must be in \[0, 1024\]"),
         (lambda: subadmm.scene("pile:2147483647"), r"N must be in \[1, "),
         (lambda: subadmm.scene("pile:3", settings={"substeps": most}), r"substeps = 2147483647: must be in \[1, 64\]"),
     ):
@@ -259,7 +264,8 @@ def test_texts_have_no_end_within():
     (lambda: subadmm.Settings(warm_start=3), "warm_start = 3: must be of type bool"),
     (lambda: subadmm.Coordinate(lower="a"), "lower = 'a': must be of type float"),
     (lambda: subadmm.sphere(1, friction="a"), "friction = 'a': must be of type float"),
-    (lambda: subadmm.World().add_joint("spherical", coordinates={5: 3}), r"coordinates\[5\] = 3: must be a subadmm.Coordinate"),
+    (lambda: subadmm.World().add_joint("spherical", coordinates={5: 3}),
+     r"coordinates\[5\] = 3: must be a subadmm.Coordinate"),
     (lambda: subadmm.World().add_solid([None], mass=1), r"shapes\[0\] = None: must be a subadmm.Shape"),
     (lambda: subadmm.World().add_solid(3), "shapes = 3: must be a subadmm.Shape"),
     (lambda: subadmm.World().add_body(shapes=[subadmm.sphere(1), 3]), r"shapes\[1\] = 3: must be a subadmm.Shape"),
@@ -330,10 +336,12 @@ def test_what_fails_leaves_nothing_behind():
         (lambda: world.add_solid([good, 3], type="static"), TypeError),
         (lambda: world.add_solid([good, subadmm.plane()], type="kinematic"), subadmm.InvalidArgument),
         (lambda: world.add_solid([good, subadmm.box(1, 1, 1, friction=-1)], density=1), subadmm.InvalidArgument),
-        (lambda: world.add_solid([good, subadmm.box(1, 1, 1, sensor=True, restitution=2)], density=1), subadmm.InvalidArgument),
+        (lambda: world.add_solid([good, subadmm.box(1, 1, 1, sensor=True, restitution=2)], density=1),
+         subadmm.InvalidArgument),
         (lambda: world.add_body(mass=1, inertia=(1, 1, 1), shapes=[good, mesh]), subadmm.InvalidArgument),
         (lambda: world.add_body(mass=-1, inertia=(1, 1, 1), shapes=[good]), subadmm.InvalidArgument),
-        (lambda: world.add_joint("revolute", None, box, position=(0, 0, 1), coordinates={0: subadmm.Coordinate(friction=1)}),
+        (lambda: world.add_joint("revolute", None, box, position=(0, 0, 1),
+                                 coordinates={0: subadmm.Coordinate(friction=1)}),
          subadmm.InvalidArgument),
         (lambda: world.add_coupling(box, linear_stiffness=-1), subadmm.InvalidArgument),
     ):

@@ -1,6 +1,6 @@
-"""Blocks of Python in the user's guide run as they stand: each by itself, in an empty folder. Those that name a program of
-examples in their first line are part of it (tests/test_docs.py) and are run with it; those that say what they need are run
-where it is there."""
+"""Blocks of Python in the user's guide run as they stand: each by itself, in an empty folder. Those that name a program
+of examples in their first line are part of it (tests/test_docs.py) and are run with it; those that say what they need
+are run where it is there."""
 
 import importlib.util
 import re

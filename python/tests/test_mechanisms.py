@@ -1,6 +1,6 @@
-"""Random mechanisms that fall on the ground, by the direct solves (ncp_points): trees of joints of most kinds with limits,
-drives, friction and dampers, masses over two decades. Bodies begin apart, so that every step has a solution, or wherever
-they overlap, so that many have none.
+"""Random mechanisms that fall on the ground, by the direct solves (ncp_points): trees of joints of most kinds with
+limits, drives, friction and dampers, masses over two decades. Bodies begin apart, so that every step has a solution, or
+wherever they overlap, so that many have none.
 
     python test_mechanisms.py 600       # so many of both sorts: steps, unsolved ones, speeds
 """
@@ -30,7 +30,8 @@ def coordinate(random):
     if what < 0.2:
         options.update(drive="speed", target_speed=random.uniform(-2, 2), drive_force=10 ** random.uniform(-1, 1))
     elif what < 0.4:
-        options.update(drive="position", target_position=random.uniform(-0.1, 0.1), drive_force=10 ** random.uniform(0, 1),
+        options.update(drive="position", target_position=random.uniform(-0.1, 0.1),
+                       drive_force=10 ** random.uniform(0, 1),
                        drive_stiffness=10 ** random.uniform(0, 2), drive_damping=10 ** random.uniform(-1, 0))
     if random.random() < 0.2:
         options.update(friction=10 ** random.uniform(-2, 0))
@@ -85,8 +86,8 @@ def run(seed, precision="f64", apart=True):
 def test_every_step_is_solved(precision):
     runs = [run(seed, precision) for seed in range(40)]
     steps = len(runs) * STEPS
-    # Of 600 the worst has a joint 3.2 mm off, a light body that turns fast, and is at 3.6 m/s; one step in 15,000 is above
-    # 1e-6 m/s. Here one in 1,000 may be.
+    # Of 600 the worst has a joint 3.2 mm off, a light body that turns fast, and is at 3.6 m/s; one step in 15,000 is
+    # above 1e-6 m/s. Here one in 1,000 may be.
     assert max(drift for _, _, drift, _ in runs) < 5e-3
     assert max(speed for _, _, _, speed in runs) < 10
     assert sum(unsolved for unsolved, *_ in runs) <= steps // 1000

@@ -70,7 +70,8 @@ def test_what_cannot_be_written_is_said_before_the_work(command, tmp_path, capsy
     ending = os.path.splitext(path)[1]
     (tmp_path / f"folder{ending}").mkdir()
     (tmp_path / f"loop{ending}").symlink_to(f"loop{ending}")
-    cases = [(str(tmp_path / "none" / f"a{ending}"), "No such file"), (str(tmp_path / f"folder{ending}"), "Is a directory"),
+    cases = [(str(tmp_path / "none" / f"a{ending}"), "No such file"),
+             (str(tmp_path / f"folder{ending}"), "Is a directory"),
              (str(tmp_path / f"loop{ending}"), "symbolic links"), (f"{tmp_path}/{'n' * 300}{ending}", "too long")]
     if os.getuid() != 0:  # who may write everywhere
         read_only = tmp_path / f"read_only{ending}"
@@ -155,7 +156,8 @@ def test_functions_write_the_same_way(tmp_path, monkeypatch):
 
 def test_what_is_no_file_is_written_directly(tmp_path):
     made = tmp_path / "made.json"
-    out = subprocess.run([sys.executable, "-m", "subadmm", "convert", "pyramid:2", str(made), "--report", "/dev/stdout"],
+    out = subprocess.run([sys.executable, "-m", "subadmm", "convert", "pyramid:2", str(made), "--report",
+                          "/dev/stdout"],
                          capture_output=True, text=True, check=True)
     assert '"not_carried_over": []' in out.stdout and made.stat().st_size > 100
     with open(tmp_path / "log.txt", "w") as log:  # where standard output is a file, it goes on
@@ -173,9 +175,11 @@ def test_a_run_that_is_ended_leaves_what_was_there(tmp_path, number, status):
     path = tmp_path / "a.html"
     path.write_text("old")
     # A shell that begins the tests in the background has SIGINT ignored.
-    program = ("import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); from subadmm.__main__ import main; "
+    program = ("import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+               "from subadmm.__main__ import main; "
                "sys.exit(main())")
-    run = subprocess.Popen([sys.executable, "-c", program, "record", "pyramid:2", "-o", str(path), "--seconds", "100000",
+    run = subprocess.Popen([sys.executable, "-c", program, "record", "pyramid:2", "-o", str(path), "--seconds",
+                            "100000",
                             "--fps", "0.001", "--backend", "cpu"])
     end = time.monotonic() + 60
     while not any(name.endswith(".part") for name in left(tmp_path)) and time.monotonic() < end:
@@ -229,7 +233,8 @@ def test_arguments_out_of_range_are_named(arguments, said, tmp_path, capsys):
 def test_what_a_robot_is_made_of_is_read_as_well(tmp_path, capsys):
     pytest.importorskip("mujoco")
     (tmp_path / "parts").mkdir()
-    (tmp_path / "parts" / "wedge.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    (tmp_path / "parts" / "wedge.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
     (tmp_path / "more.xml").write_text('<mujoco><asset><mesh file="wedge.obj"/></asset></mujoco>')
     robot = tmp_path / "robot.xml"
     robot.write_text('<mujoco><compiler meshdir="parts"/><include file="more.xml"/><worldbody><body><freejoint/>'
@@ -245,7 +250,8 @@ def test_what_a_robot_is_made_of_is_read_as_well(tmp_path, capsys):
 
 def test_layers_of_a_stage_are_read_as_well(tmp_path, capsys):
     Usd = pytest.importorskip("pxr.Usd")
-    (tmp_path / "part.usda").write_text('#usda 1.0\ndef Cube "part" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsCollisionAPI"]) {}\n')
+    (tmp_path / "part.usda").write_text(
+        '#usda 1.0\ndef Cube "part" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsCollisionAPI"]) {}\n')
     stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
     stage.DefinePrim("/part").GetReferences().AddReference("./part.usda", "/part")
     stage.Save()

@@ -105,7 +105,8 @@ def test_a_led_hand_lifts_a_cube_and_feels_its_weight():
     start = lead.position.copy()
     session.step(50)
     alone = lead.reaction()[0][2]                      # its own weight
-    for position, opening, steps in (((0, 0, -0.117), 0, 250), ((0, 0, -0.117), -0.053, 150), ((0, 0, 0.03), -0.053, 300)):
+    for position, opening, steps in (((0, 0, -0.117), 0, 250), ((0, 0, -0.117), -0.053, 150),
+                                     ((0, 0, 0.03), -0.053, 300)):
         lead.position = start + position
         steering.close(hand, opening=opening)
         session.step(steps)

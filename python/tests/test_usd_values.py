@@ -12,7 +12,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade  # noqa: E402
 
 
 #: Attributes in which an infinity says that there is no limit.
-NO_LIMIT = ("lowerLimit", "upperLimit", "low", "high", "minDistance", "maxDistance", "maxForce", "breakForce", "breakTorque")
+NO_LIMIT = ("lowerLimit", "upperLimit", "low", "high", "minDistance", "maxDistance", "maxForce", "breakForce",
+            "breakTorque")
 
 
 def stage():
@@ -44,7 +45,8 @@ def stage():
     limit.CreateLowAttr(-1), limit.CreateHighAttr(1)
     rope = UsdPhysics.DistanceJoint.Define(made, "/rope")
     rope.CreateMinDistanceAttr(0), rope.CreateMaxDistanceAttr(2)
-    for joint, ends in ((hinge, ("/Cube", "/Sphere")), (generic, ("/Cone", "/Cylinder")), (rope, ("/Capsule", "/Mesh"))):
+    for joint, ends in ((hinge, ("/Cube", "/Sphere")), (generic, ("/Cone", "/Cylinder")),
+                        (rope, ("/Capsule", "/Mesh"))):
         joint.CreateBody0Rel().SetTargets([ends[0]]), joint.CreateBody1Rel().SetTargets([ends[1]])
     return made
 
@@ -64,7 +66,8 @@ def attributes():
 def with_numbers(kind, x):
     """Values of a type with x in one place; none of types without numbers."""
     return {"float": [x], "double": [x], "float3": [Gf.Vec3f(0, x, 0)], "double3": [Gf.Vec3d(0, x, 0)],
-            "point3f": [Gf.Vec3f(0, x, 0)], "vector3f": [Gf.Vec3f(0, x, 0)], "quatf": [Gf.Quatf(x, 0, 0, 0), Gf.Quatf(1, 0, x, 0)],
+            "point3f": [Gf.Vec3f(0, x, 0)], "vector3f": [Gf.Vec3f(0, x, 0)],
+            "quatf": [Gf.Quatf(x, 0, 0, 0), Gf.Quatf(1, 0, x, 0)],
             "point3f[]": [[(0, 0, 0), (1, 0, 0), (0, x, 0), (0, 0, 1)]]}.get(kind, [])
 
 
@@ -99,7 +102,8 @@ def test_numbers_that_are_not_finite_are_named(path, name, kind):
                 assert how == "report" or "must" in said
 
 
-@pytest.mark.parametrize("path, name, kind", attributes(), ids=lambda value: value.replace("/", "") if isinstance(value, str) else None)
+@pytest.mark.parametrize("path, name, kind", attributes(),
+                         ids=lambda value: value.replace("/", "") if isinstance(value, str) else None)
 def test_values_of_another_type_are_named(path, name, kind, usual):
     made = stage()
     prim = made.GetRootLayer().GetPrimAtPath(path)
@@ -124,13 +128,15 @@ def test_sizes_out_of_range_are_of_their_prim(x):
 
 @pytest.mark.parametrize("x", [math.nan, math.inf, 0.0, -1.0, 1e300])
 def test_units_are_numbers_above_0(x):
-    for name, set_unit in (("metersPerUnit", UsdGeom.SetStageMetersPerUnit), ("kilogramsPerUnit", UsdPhysics.SetStageKilogramsPerUnit)):
+    for name, set_unit in (("metersPerUnit", UsdGeom.SetStageMetersPerUnit),
+                           ("kilogramsPerUnit", UsdPhysics.SetStageKilogramsPerUnit)):
         made = stage()
         set_unit(made, x)
         assert outcome(made) == ("error", f"{name} = {x}: must be in [1e-12, 1e12]")
 
 
-@pytest.mark.parametrize("path, name", [("/Cone", "axis"), ("/hinge", "physics:axis"), ("/hinge", "drive:angular:physics:type"),
+@pytest.mark.parametrize("path, name", [("/Cone", "axis"), ("/hinge", "physics:axis"),
+                                        ("/hinge", "drive:angular:physics:type"),
                                         ("/Mesh", "orientation"), ("/ground", "axis")])
 def test_names_that_there_are_not_are_named(path, name):
     made = stage()

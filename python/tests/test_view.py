@@ -43,7 +43,8 @@ def view():
 def test_addresses_that_cannot_be_served_are_errors_and_no_server_is_waited_for(capsys):
     from subadmm.__main__ import main
 
-    for host, said in (("203.0.113.9", "'203.0.113.9', port: 18441; cannot be served at"), ("no.such.host.invalid", "must be an address"),
+    for host, said in (("203.0.113.9", "'203.0.113.9', port: 18441; cannot be served at"),
+                       ("no.such.host.invalid", "must be an address"),
                        ("300.1.1.1", "must be an address"), ("a" * 300, "must be an address")):
         with pytest.raises(OSError, match="host: '" + host[:9]):
             View(Session(led_box), host=host, port=18441)
@@ -150,12 +151,15 @@ def test_other_servers_of_viser_are_as_they_were(view):
 
 # ---- what may be said ----------------------------------------------------------------------------------------------
 
-CAMERA = {"type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [1, 2, 3], "fov": 1.0, "near": 0.1, "far": 1000,
+CAMERA = {"type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [1, 2, 3], "fov": 1.0, "near": 0.1,
+          "far": 1000,
           "image_height": 600, "image_width": 960, "look_at": [0, 0, 0], "up_direction": [0, 0, 1]}
-DRAG = {"type": "SceneNodeDragMessage", "phase": "start", "name": "/bodies/0", "instance_index": 0, "start_position": [0, 0, 0.2],
+DRAG = {"type": "SceneNodeDragMessage", "phase": "start", "name": "/bodies/0", "instance_index": 0,
+        "start_position": [0, 0, 0.2],
         "start_screen_pos": [0.5, 0.5], "end_position": [0, 0, 0.2], "end_screen_pos": [0.5, 0.5], "button": "left",
         "modifier": None, "owner": ""}
-GIZMO = {"type": "TransformControlsUpdateMessage", "name": "/steering/0", "wxyz": [1, 0, 0, 0], "position": [0, 0, 0.3], "owner": ""}
+GIZMO = {"type": "TransformControlsUpdateMessage", "name": "/steering/0", "wxyz": [1, 0, 0, 0], "position": [0, 0, 0.3],
+         "owner": ""}
 
 
 class Client:
@@ -165,7 +169,8 @@ class Client:
         from websockets.sync.client import connect
 
         self.view = view
-        self.line = connect(f"ws://127.0.0.1:{view.server.get_port()}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None)
+        self.line = connect(f"ws://127.0.0.1:{view.server.get_port()}", subprotocols=[f"viser-v{viser.__version__}"],
+                            max_size=None)
         self.send(CAMERA)
         until(lambda: view.server.get_clients())
 
@@ -223,7 +228,8 @@ def test_what_the_page_says_is_done(view):
         name = next(handle.name for group, handle in view._moving)
         client.send({**DRAG, "name": name})
         until(lambda: view.session.hand() is not None)
-        client.send({**DRAG, "name": name, "phase": "end", "end_position": [math.nan] * 3, "end_screen_pos": [math.nan, 0]})
+        client.send({**DRAG, "name": name, "phase": "end", "end_position": [math.nan] * 3,
+                     "end_screen_pos": [math.nan, 0]})
         until(lambda: view.session.hand() is None)
         client.set("steer", True)
         until(lambda: view.session.steering.on)
@@ -254,18 +260,23 @@ def test_values_that_would_leave_it_unusable_are_dropped(view):
                     continue
                 client.set(label, wrong)
         for uuid, _ in (client.control("speed"), client.control("run")):   # no other member of a control
-            for updates in ({"visible": False}, {"removed": True}, {"update_cb": []}, {"value": 1.0, "max": 2}, {}, [], None):
+            for updates in ({"visible": False}, {"removed": True}, {"update_cb": []}, {"value": 1.0, "max": 2}, {}, [],
+                            None):
                 client.send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates})
         for wrong in NUMBERS:
-            for message, fields in ((GIZMO, ("position", "wxyz")), ({**DRAG, "name": name}, ("start_position", "end_position"))):
+            for message, fields in ((GIZMO, ("position", "wxyz")),
+                                    ({**DRAG, "name": name}, ("start_position", "end_position"))):
                 for field in fields:
                     client.send({**message, field: wrong}, {**message, field: [wrong] * len(message[field])})
         client.send({**GIZMO, "wxyz": [0, 0, 0, 0]}, {**GIZMO, "position": [1e6, 0, 0]}, {**GIZMO, "position": [0, 0]},
                     {**DRAG, "name": name, "instance_index": 10**6}, {**DRAG, "name": name, "instance_index": -1},
-                    {**DRAG, "name": name, "start_position": [0, 0, 1e6]}, {**DRAG, "name": name, "end_position": [0, 0, 1e6]},
-                    {**DRAG, "name": name, "phase": "none"}, {**CAMERA, "fov": math.nan}, {**CAMERA, "position": [math.nan] * 3})
+                    {**DRAG, "name": name, "start_position": [0, 0, 1e6]},
+                    {**DRAG, "name": name, "end_position": [0, 0, 1e6]},
+                    {**DRAG, "name": name, "phase": "none"}, {**CAMERA, "fov": math.nan},
+                    {**CAMERA, "position": [math.nan] * 3})
         client.send({"type": "ShareUrlRequest"}, {"type": "none"}, {}, b"", b"\xc1", b"\x92\x01",
-                    {"type": "FileTransferStartUpload", "source_component_uuid": "", "transfer_uuid": "a", "filename": "a",
+                    {"type": "FileTransferStartUpload", "source_component_uuid": "", "transfer_uuid": "a",
+                     "filename": "a",
                      "mime_type": "", "part_count": 1, "size_bytes": 10**12})
         view.session.running = False
         client.set("speed", 1.25)
@@ -284,13 +295,16 @@ def test_whatever_is_said_the_view_goes_on(view):
     random = np.random.default_rng(7)
     with Client(view) as client:
         name = view._moving[0][1].name
-        uuids = [client.control(label)[0] for label in ("iterations", "run", "steer", "lever, °", "contact forces", "method")]
-        values = [*NUMBERS, 0, 1, -1, 0.5, 1e-300, 1e9, 2**31, 2**53, "", "start", "Reset", "paper", "x" * 3000, [0, 0, 1],
+        uuids = [client.control(label)[0]
+                 for label in ("iterations", "run", "steer", "lever, °", "contact forces", "method")]
+        values = [*NUMBERS, 0, 1, -1, 0.5, 1e-300, 1e9, 2**31, 2**53, "", "start", "Reset", "paper", "x" * 3000,
+                  [0, 0, 1],
                   [1, 0, 0, 0], [math.nan] * 3, [1e8] * 3, False, {"value": 7}, {"value": math.nan}, {"value": "Step"}]
         # as objects: what lists there are have lists in them
         pick = lambda of: of[random.integers(len(of))]  # noqa: E731
         for _ in range(1500):
-            message = dict(pick([CAMERA, {**DRAG, "name": name}, GIZMO, {"type": "GuiUpdateMessage", "uuid": pick(uuids), "updates": {"value": 1}}]))
+            message = dict(pick([CAMERA, {**DRAG, "name": name}, GIZMO,
+                                 {"type": "GuiUpdateMessage", "uuid": pick(uuids), "updates": {"value": 1}}]))
             for field in random.permutation(list(message))[:random.integers(0, 3)]:
                 message[str(field)] = pick(values)
             client.send(message)
@@ -331,13 +345,15 @@ def test_a_step_that_fails_pauses_and_is_said(view):
 def test_sessions_refuse_what_is_no_number():
     session = Session(led_box)
     for wrong in (math.nan, math.inf, -1, 1e9):
-        for call, name in ((lambda: setattr(session, "speed", wrong), "speed"), (lambda: session.advance(wrong, 1), "seconds"),
+        for call, name in ((lambda: setattr(session, "speed", wrong), "speed"),
+                           (lambda: session.advance(wrong, 1), "seconds"),
                            (lambda: session.advance(0, wrong), "budget")):
             if name == "speed" or wrong != 1e9:
                 with pytest.raises(ValueError, match=f"{name}: {wrong}; must be a number"):
                     call()
     for wrong in ((math.nan, 0, 0), (0, math.inf, 0)):
-        for call in (lambda: session.grab(1, wrong), lambda: session.pull(wrong), lambda: session.steering.leads[0].go(wrong, (1, 0, 0, 0))):
+        for call in (lambda: session.grab(1, wrong), lambda: session.pull(wrong),
+                     lambda: session.steering.leads[0].go(wrong, (1, 0, 0, 0))):
             with pytest.raises(ValueError, match="must be 3 finite numbers"):
                 call()
     for index in (-1, 3, 2**31 - 1):
@@ -346,7 +362,8 @@ def test_sessions_refuse_what_is_no_number():
     with pytest.raises(ValueError, match="orientation"):
         session.steering.leads[0].go((0, 0, 0), (0, 0, 0, 0))
     before = session.world.settings.iterations
-    for changes in (dict(iterations=7, backend="no such"), dict(iterations=7, method="no such"), dict(iterations=7, dt=-1.0)):
+    for changes in (dict(iterations=7, backend="no such"), dict(iterations=7, method="no such"),
+                    dict(iterations=7, dt=-1.0)):
         with pytest.raises((subadmm.Error, ValueError)):
             session.change(**changes)
         assert session.world.settings.iterations == before

@@ -1,7 +1,9 @@
-"""What recording events costs a step, and 100 sensors beside it: python measure_events.py [--backend cuda] [--precision f32] SCENE ...
+"""What recording events costs a step, and 100 sensors beside it: python measure_events.py [--backend cuda] [--precision
+f32] SCENE ...
 
-Each scene is run three times from its start: as it is, with events recorded, and with 100 balls of 0.1 m as sensors on its
-first bodies besides. 50 steps, then STEPS that are timed. The last column: are the three states the same to the bit?
+Each scene is run three times from its start: as it is, with events recorded, and with 100 balls of 0.1 m as sensors on
+its first bodies besides. 50 steps, then STEPS that are timed. The last column: are the three states the same to the
+bit?
 """
 
 import argparse

@@ -233,8 +233,8 @@ def kind_of_worst(world):
 
 
 def run(path, given, iterations, motion, options):
-    """(natural maps, what is worst of those above SMALL, worst error of loops, of locked coordinates, seconds a step with
-    its certificate)"""
+    """(natural maps, what is worst of those above SMALL, worst error of loops, of locked coordinates, seconds a step
+    with its certificate)"""
     loaded = loaded_of(path, given, options)
     world, loops, joints = loaded.world, [j for j in loaded.loops.values() if j.enabled], tree_joints(loaded)
     set_iterations(world, iterations, given)
@@ -287,7 +287,8 @@ def main():
     for path, model in wanted(BY_ITERATIONS):
         row(model[0], *(f"{m:.0e}" for m in maps_by_iterations(path, given)))
     print()
-    head("model, package", "", "iterations", "largest map", "small", "at the end", "loops, m", "joints off", "ms a step")
+    head("model, package", "", "iterations", "largest map", "small", "at the end", "loops, m", "joints off",
+         "ms a step")
     for path, (name, package, version, _, motion, counts, options) in wanted(RUNS):
         for count in given.iterations or counts:
             maps, worst, loops, joints, spent = run(path, given, count, motion, options)

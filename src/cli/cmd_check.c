@@ -264,7 +264,8 @@ const struct cli_command cli_check = {
     .summary = "compare every backend and precision with the literal one on a scene",
     .text =
         "Run: each table simulates the scene on its own. One step: contact problems of the literal run are frozen and\n"
-        "solved by each table with equal iterations. Kernels: the same with one. Hits are left to the solve (settings.hits = 0).\n"
+        "solved by each table with equal iterations. Kernels: the same with one. Hits are left to the solve "
+        "(settings.hits = 0).\n"
         "Exit status 1 when a difference exceeds its tolerance.\n",
     .options = options,
     .option_count = sizeof options / sizeof *options,

@@ -19,7 +19,8 @@
 enum {
     OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_SUBSTEPS, OPTION_METHOD,
     OPTION_ITERATIONS, OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_NCP_POINTS, OPTION_PENALTY_PERIOD,
-    OPTION_THREADS, OPTION_SET, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP, OPTION_QUIET
+    OPTION_THREADS, OPTION_SET, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE,
+    OPTION_DUMP, OPTION_QUIET
 };
 
 static const struct cli_option options[] = {
@@ -37,7 +38,8 @@ static const struct cli_option options[] = {
     [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between convergence checks (default 10)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "paper: iterations between penalty updates, 0 = never"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads at most, 0 = as many as pay (default)"},
-    [OPTION_SET] = {"set", "NAME=VALUE", "any setting (subadmm settings lists them), after the options above; repeatable"},
+    [OPTION_SET] = {"set", "NAME=VALUE",
+                    "any setting (subadmm settings lists them), after the options above; repeatable"},
     [OPTION_NO_WARM_START] = {"no-warm-start", NULL, "start every step from zero impulses"},
     [OPTION_CERTIFY] = {"certify", NULL, "measure the true error of every step"},
     [OPTION_EXPLAIN] = {"explain", NULL, "say what the last step ran, what it left out and why"},

@@ -175,7 +175,8 @@ bool cli_read_name(const char *option, const char *text, const char *const *name
             *out = k;
             return true;
         }
-        used += (size_t)snprintf(all + used, sizeof all - used, "%s%s", k == 0 ? "" : k < count - 1 ? ", " : " or ", names[k]);
+        const char *const between = k == 0 ? "" : k < count - 1 ? ", " : " or ";
+        used += (size_t)snprintf(all + used, sizeof all - used, "%s%s", between, names[k]);
     }
     cli_error(CLI_USAGE, "%s '%s': must be %s", option, text, all);
     return false;

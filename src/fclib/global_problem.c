@@ -64,7 +64,8 @@ static sadmm_status measure(sadmm_problem *problem, struct sizes *s, struct sadm
                               "block %d is soft: a global friction contact problem has no soft constraints", k);
         if (block.kind == SADMM_BLOCK_ROWS)
             return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
-                              "block %d has rows with bounds or springs: a global friction contact problem has none", k);
+                              "block %d has rows with bounds or springs: a global friction contact problem has none",
+                              k);
         if (block.kind == SADMM_BLOCK_CONTACT) ++s->contacts;
         else s->hard_rows += block.rows;
     }

@@ -10,7 +10,8 @@
 
 /* ---- tables ------------------------------------------------------------------------------------------------------ */
 
-#define MEMBER(type, kind, name) {#name, SADMM_KIND_##kind, SADMM_IS_PLAIN, offsetof(type, name), 0, 0, SADMM_ENDS_ANY, ""}
+#define MEMBER(type, kind, name) \
+    {#name, SADMM_KIND_##kind, SADMM_IS_PLAIN, offsetof(type, name), 0, 0, SADMM_ENDS_ANY, ""}
 #define OTHER(name) {name, SADMM_KIND_OTHER, SADMM_IS_OWN, 0, 0, 0, SADMM_ENDS_ANY, ""}
 #define TABLE(table, what, list) const struct sadmm_fields table = {what, list, COUNT(list)}
 
@@ -168,7 +169,8 @@ json_t *sadmm_json_reals(const double *x, size_t count)
 
 static json_t *value_of(const struct sadmm_field *field, const void *from)
 {
-    if (field->kind == SADMM_FIELD_OTHER) return json_null(); /* of some tables all are, and there is nothing to write */
+    /* of some tables all are, and there is nothing to write */
+    if (field->kind == SADMM_FIELD_OTHER) return json_null();
     const char *const at = (const char *)from + field->offset;
     int32_t number;
     uint32_t bits;

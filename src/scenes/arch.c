@@ -75,7 +75,8 @@ static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, st
 static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
                             struct sadmm_scene_result *result, struct sadmm_error *error)
 {
-    const struct sadmm_built arch = {FIRST, (int32_t)scene->n, -1, stone_at, .end = scene->info->duration, .most = 1e-3};
+    const struct sadmm_built arch = {
+        FIRST, (int32_t)scene->n, -1, stone_at, .end = scene->info->duration, .most = 1e-3};
     result->task_count = 1;
     return sadmm_observe_built(scene, world, step, &arch, &result->tasks[0], error);
 }

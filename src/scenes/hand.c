@@ -25,8 +25,8 @@ static const double least_moment = 1e-5;
 enum { META, KNUCKLE, PROXIMAL, MIDDLE, DISTAL, PAD };
 
 /* From its root in the palm a finger's first link goes to its knuckle; two more reach for the pad's place in the plane
- * y = const of the palm, the fourth points down and carries the pad in its middle, where it turns to lie flat on what it
- * presses. */
+ * y = const of the palm, the fourth points down and carries the pad in its middle, where it turns to lie flat on what
+ * it presses. */
 struct finger {
     double root[3], knuckle[3];     /* palm frame */
     double proximal, middle, distal; /* lengths */

@@ -255,7 +255,8 @@ static sadmm_status observe_lifting(sadmm_world *world, double t, double dt, con
         task->figures[2].value = t - about->when->lifted;
     }
     if (t + dt <= about->when->released + 1e-9) return SADMM_OK;
-    /* The hand rests at both times: what it feels less is the weight. 0.1 N: a hundredth of what it weighs by itself. */
+    /* The hand rests at both times: what it feels less is the weight. 0.1 N: a hundredth of what it weighs by
+     * itself. */
     sadmm_status status = reaction_weight(world, &weight, error);
     task->figures[3].value = memory[WEIGHT] - weight;
     task->finished = true;

@@ -1,6 +1,6 @@
 /* A paddle turns in a bin of N balls, by a motor of 2 rad/s and at most 100 N m. It is as it should be if the paddle
- * has gone round as far as the motor was to turn it, and nothing has left the bin. (Balls, because a row of cubes between
- * blade and wall is a strut of rigid bodies: it stops any motor.) */
+ * has gone round as far as the motor was to turn it, and nothing has left the bin. (Balls, because a row of cubes
+ * between blade and wall is a strut of rigid bodies: it stops any motor.) */
 #include <math.h>
 #include <string.h>
 

@@ -1,6 +1,6 @@
-/* A round peg (a prism of 32 sides, 40 mm wide and 80 mm long) falls into a round hole with 0.1 mm play, and has to come
- * to its bottom. It begins 5 mm above, 1 mm off the axis and leaning by 0.01 rad, so that it meets the lead-in first, a
- * cone of 2 mm.
+/* A round peg (a prism of 32 sides, 40 mm wide and 80 mm long) falls into a round hole with 0.1 mm play, and has to
+ * come to its bottom. It begins 5 mm above, 1 mm off the axis and leaning by 0.01 rad, so that it meets the lead-in
+ * first, a cone of 2 mm.
  *
  * The block is one static body of 32 wedges round the hole, their inner faces flat: a hole of 32 sides whose inscribed
  * circle is wider by the play than the peg's circumscribed one. So the peg fits however it is turned. It falls at up to

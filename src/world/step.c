@@ -209,12 +209,13 @@ static void report_solved(struct host_step *step)
     if (step->world->plan.residuals) step->report.residual = none;
 }
 
-/* The dense contact solve (NCP) of islands with joints (core/solve/ncp.h). Before the iterations no island of a world is
- * solved where some are seen from their supports. */
+/* The dense contact solve (NCP) of islands with joints (core/solve/ncp.h). Before the iterations no island of a world
+ * is solved where some are seen from their supports. */
 static sadmm_status solve_ncp(struct host_step *step, bool again)
 {
     sadmm_world *world = step->world;
-    const struct sadmm_ncp_input input = {world->articulations, &step->system, world->joint_constraints, &step->settings};
+    const struct sadmm_ncp_input input = {world->articulations, &step->system, world->joint_constraints,
+                                          &step->settings};
     if (!world->ncp) world->ncp = sadmm_ncp_create();
     if (!world->ncp) return sadmm_fail_memory(&world->error, "islands of the dense contact solve");
     if (again) {

@@ -445,7 +445,8 @@ static sadmm_status make_call(struct machine *m)
     }
 }
 
-/* A row of bodies, one of them static, one at times kinematic, light and heavy ones, boxes with three moments; the first two touch. */
+/* A row of bodies, one of them static, one at times kinematic, light and heavy ones, boxes with three moments; the
+ * first two touch. */
 static void add_bodies(struct machine *m)
 {
     for (int k = 0; k < BODIES; ++k) {

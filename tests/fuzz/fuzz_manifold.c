@@ -155,7 +155,8 @@ static void check_solids(const struct solid *a, const struct solid *b, double li
     if (m.count == 0) return;
 
     double along = separation_along(a, b, m.normal), least = least_separation(&m);
-    /* A corner is kept beside the face by the tolerance of clipping: seen along a normal that leans, that is as much. */
+    /* A corner is kept beside the face by the tolerance of clipping: seen along a normal that leans, that is as
+     * much. */
     double beside = 0;
     if (a->type == SADMM_SHAPE_BOX && b->type == SADMM_SHAPE_BOX)
         beside = MANIFOLD_SNAP * M_SQRT2 * fmin(radius_of(a), radius_of(b)) * lean_of(a, b, m.normal);

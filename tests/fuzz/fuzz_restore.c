@@ -136,7 +136,8 @@ static void make_worlds(void)
         if (k == 3) add(world, SADMM_BODY_KINEMATIC, SADMM_SHAPE_CYLINDER, 0.5, 0.3);
         if (k == 0 || k == 3) join(world, a, b);
         if (k == 1) add_hull(world, b);
-        for (int step = 0; step < 8; ++step) MUST(sadmm_world_step(world) == SADMM_OK, "a step: %s", sadmm_world_message(world));
+        for (int step = 0; step < 8; ++step)
+            MUST(sadmm_world_step(world) == SADMM_OK, "a step: %s", sadmm_world_message(world));
         save(world, &saved[k].bytes, &saved[k].size);
         sadmm_world_destroy(world);
     }
@@ -259,7 +260,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (repaired) sadmm_save_repair(bytes, length);
     MUST(sadmm_world_state_hash(world, &before) == SADMM_OK, "hash");
     const sadmm_status status = sadmm_world_restore(world, bytes, length);
-    MUST(repaired || status != SADMM_OK || memcmp(bytes, saved[which].bytes, saved[which].size) == 0, "damage is found");
+    MUST(repaired || status != SADMM_OK || memcmp(bytes, saved[which].bytes, saved[which].size) == 0,
+         "damage is found");
     if (status == SADMM_OK) {
         use(world);
         sadmm_world_destroy(world);

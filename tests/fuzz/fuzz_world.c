@@ -505,7 +505,8 @@ static sadmm_status take_events(struct machine *m, int32_t room)
     const int32_t waiting = sadmm_world_event_count(m->world);
     const sadmm_status status = sadmm_world_take_events(m->world, room < 8 ? room : 8, events, &count, NULL);
     if (status != SADMM_OK) return status;
-    MUST(count == (room < waiting ? room : waiting) || count == 8, "%d of %d events taken, for %d", count, waiting, room);
+    MUST(count == (room < waiting ? room : waiting) || count == 8, "%d of %d events taken, for %d", count, waiting,
+         room);
     for (int32_t k = 0; k < count; ++k)
         MUST((int)events[k].type >= 0 && events[k].type < SADMM_EVENT_TYPE_COUNT && events[k].shape_b.slot > 0 &&
                  (k == 0 || events[k].step >= events[k - 1].step), "event %d makes no sense", k);

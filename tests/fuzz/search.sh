@@ -1,7 +1,7 @@
 #!/bin/sh
-# usage: search.sh FUZZER CORPUS RUNS: that many inputs, the same ones every time. What it finds besides failures is not kept;
-# an input that fails is, in the folder this is started in, as FUZZER-crash-*. (-entropic=0: weighing the features of the
-# whole corpus costs more than these inputs do, and finds no more.)
+# usage: search.sh FUZZER CORPUS RUNS: that many inputs, the same ones every time. What it finds besides failures is not
+# kept; an input that fails is, in the folder this is started in, as FUZZER-crash-*. (-entropic=0: weighing the features
+# of the whole corpus costs more than these inputs do, and finds no more.)
 set -eu
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT

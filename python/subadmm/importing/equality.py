@@ -90,7 +90,8 @@ def _add_tie(loaded, index):
     # with q = sign x + offset of both
     offset = one.sign * (rest - one.offset + ratio * (other.offset - rest2))
     ends = (one.joint, one.coordinate, other.joint, other.coordinate)
-    terms = {"ratio": -one.sign * ratio * other.sign, "offset": float(offset), "enabled": bool(source.eq_active0[index])}
+    terms = {"ratio": -one.sign * ratio * other.sign, "offset": float(offset),
+             "enabled": bool(source.eq_active0[index])}
     try:
         gear = loaded.world.add_gear(*ends, **terms)
     except Error as error:
@@ -99,7 +100,8 @@ def _add_tie(loaded, index):
         except (Error, ValueError):
             report.add(what, f"not carried over: joints '{one.name}' and '{other.name}': {error}")
             return
-        report.add(what, f"by a wheel of {wheel.mass:.3g} kg between joints '{one.name}' and '{other.name}', with two gears")
+        report.add(what,
+                   f"by a wheel of {wheel.mass:.3g} kg between joints '{one.name}' and '{other.name}', with two gears")
     loaded.gears[name_of(source, "equality", index)] = gear
 
 

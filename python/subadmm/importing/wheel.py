@@ -1,6 +1,6 @@
 """A wheel between two coordinates that one gear cannot tie: their axes are parallel in one place, or they are slides in
-the same direction, on a body that moves (gear.h). The wheel is a small body on a hinge of that body, with a gear to each of
-the two."""
+the same direction, on a body that moves (gear.h). The wheel is a small body on a hinge of that body, with a gear to
+each of the two."""
 
 import numpy as np
 
@@ -57,6 +57,7 @@ def tie_by_wheel(world, one, first, other, second, ratio, offset, enabled):
     begin = one.position[first]
     gears = [
         world.add_gear(one, first, axle, 5, ratio=radius, offset=float(begin), enabled=enabled),
-        world.add_gear(other, second, axle, 5, ratio=-radius / ratio, offset=float((offset - begin) / ratio), enabled=enabled),
+        world.add_gear(other, second, axle, 5, ratio=-radius / ratio, offset=float((offset - begin) / ratio),
+                       enabled=enabled),
     ]
     return gears, wheel

@@ -55,7 +55,8 @@ def legend():
     low, high = SCALE[0], SCALE[-1]
     at = [100 * (power - low) / (high - low) for power in SCALE]
     stops = ", ".join(f"rgb{tuple(map(int, colour))} {place:.0f}%" for colour, place in zip(COLOURS, at))
-    marks = "".join(f'<span style="position:absolute;white-space:nowrap;left:{place:.0f}%;transform:translateX(-{place:.0f}%)">'
+    marks = "".join(f'<span style="position:absolute;white-space:nowrap;'
+                    f'left:{place:.0f}%;transform:translateX(-{place:.0f}%)">'
                     f"1e{power}</span>" for power, place in zip(SCALE, at))
     return (f'<div style="font-size:0.8em">natural map of contacts, m/s<div style="height:8px;border-radius:4px;'
             f'background:linear-gradient(to right, {stops})"></div>'

@@ -46,14 +46,16 @@ def free_port(host, port):
     try:
         places = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except (socket.gaierror, UnicodeError) as error:
-        raise OSError(errno.EADDRNOTAVAIL, f"host: {host!r}; must be an address or a name of this machine ({error})") from None
+        raise OSError(errno.EADDRNOTAVAIL,
+                      f"host: {host!r}; must be an address or a name of this machine ({error})") from None
     for candidate in range(port, min(port + _MOST_PORTS, 65536) if port else 1):
         try:
             _bind(places, candidate)
             return candidate
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
-                raise OSError(error.errno, f"host: {host!r}, port: {candidate}; cannot be served at: {error.strerror}") from None
+                raise OSError(error.errno,
+                              f"host: {host!r}, port: {candidate}; cannot be served at: {error.strerror}") from None
     raise OSError(errno.EADDRINUSE, f"port: {port}; no port is free from there on")
 
 
@@ -69,8 +71,8 @@ def _address(name):
 
 
 def _is_here(name, host):
-    """Is it a name of this machine that a server at `host` may be asked by? An address cannot be made to lead elsewhere,
-    a name can: only those that are this machine's by themselves."""
+    """Is it a name of this machine that a server at `host` may be asked by? An address cannot be made to lead
+    elsewhere, a name can: only those that are this machine's by themselves."""
     bound, asked = _address(host), _address(name)
     only_here = host == "localhost" or (bound is not None and bound.is_loopback)
     if asked is not None:
@@ -144,7 +146,8 @@ FIELDS = {
     "SceneNodeDragMessage": {
         "phase": _one_of("start", "update", "end"), "name": _is_text, "instance_index": _is_index,
         "start_position": _numbers(3), "start_screen_pos": _is_pair, "end_position": _numbers(3),
-        "end_screen_pos": _is_pair, "button": _one_of("left", "middle", "right"), "modifier": _is_modifier, "owner": _is_text,
+        "end_screen_pos": _is_pair, "button": _one_of("left", "middle", "right"), "modifier": _is_modifier,
+        "owner": _is_text,
     },
     "TransformControlsUpdateMessage": {"name": _is_text, "wxyz": _is_turn, "position": _numbers(3), "owner": _is_text},
     "TransformControlsDragStartMessage": {"name": _is_text, "owner": _is_text},

@@ -74,13 +74,15 @@ def check_frames(fps, contacts, prefix=""):
 def record(world, seconds, fps=30.0, title="", contacts=0, after_frame=None):
     """Step a world for a time (s, simulated) and keep its poses `fps` times a second, at the nearest step; the first
     frame is the world as it is. contacts: so many of the largest contact forces are kept a frame, with their errors
-    where settings ask for certificates. seconds: in (0, 1e9], fps: in (0, 1000], MOST_FRAMES frames at most. after_frame(frame, frames): called after each."""
+    where settings ask for certificates. seconds: in (0, 1e9], fps: in (0, 1000], MOST_FRAMES frames at most.
+    after_frame(frame, frames): called after each."""
     seconds = real("seconds", seconds, 0, 1e9, above=True)
     fps, contacts = check_frames(fps, contacts)
     dt = world.settings.dt
     frames = int(np.floor(seconds * fps + 1e-9)) + 1
     if frames > MOST_FRAMES:
-        raise ValueError(f"seconds: {seconds:g}; with {fps:g} frames a second that is {frames} frames, and must be {MOST_FRAMES} at most")
+        raise ValueError(f"seconds: {seconds:g}; with {fps:g} frames a second that is {frames} frames, and "
+                         f"must be {MOST_FRAMES} at most")
     at = np.unique(np.rint(np.arange(frames) / (fps * dt)).astype(np.int64))
     description = describe(world)
     step = position_step(description)

@@ -58,7 +58,8 @@ class Lead:
         angle, self._spin = _follow(away, self._spin, dt)
         at, turn = position + offset, multiply(_turn(angle), orientation)
         spin = _vector(multiply(turn, self.turn * [1, -1, -1, -1])) / dt
-        self.coupling.set_target(self.at.tolist(), self.turn.tolist(), [*((at - self.at) / dt).tolist(), *spin.tolist()])
+        self.coupling.set_target(self.at.tolist(), self.turn.tolist(),
+                                 [*((at - self.at) / dt).tolist(), *spin.tolist()])
         self.at, self.turn = at, _unit(turn)
 
     def grip(self):

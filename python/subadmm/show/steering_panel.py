@@ -36,7 +36,8 @@ class SteeringPanel:
             for k, hand in enumerate(steering.hands):
                 self._add_hand(k, hand)
             self._plots = []
-            for part, unit, colour in (("force", "N", "#1e5ac8"), ("torque", "N m", "#c87a1e")) if steering.leads else ():
+            for part, unit, colour in (("force", "N", "#1e5ac8"),
+                                       ("torque", "N m", "#c87a1e")) if steering.leads else ():
                 self._plots.append(gui.add_uplot(
                     (np.zeros(1),) * 2, ({"label": "s"}, {"label": unit, "stroke": colour, "width": 2}),
                     title=f"reaction {part}, {unit}", height=120, scales={"x": {"time": False}, "y": {"auto": True}}))
@@ -144,7 +145,8 @@ class SteeringPanel:
 
             self._gizmos.append(gizmo)
         thin = 0.006 * radius
-        self._arrows = [scene.add_arrows(f"/reaction/{name}", np.zeros((0, 2, 3), np.float32), colour, shaft_radius=thin,
+        self._arrows = [scene.add_arrows(f"/reaction/{name}", np.zeros((0, 2, 3), np.float32), colour,
+                                         shaft_radius=thin,
                                          head_radius=2.5 * thin, head_length=6 * thin)
                         for name, colour in (("force", (30, 90, 200)), ("torque", (200, 122, 30)))]
 

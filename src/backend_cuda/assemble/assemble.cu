@@ -50,10 +50,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 static sadmm_status launch_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
     const bool energies = c->fast || c->plan.momentum;
-    const cuda_kernel kernel = c->view.joints.count > 0
-                                   ? (energies ? assemble_bodies_kernel<true, true> : assemble_bodies_kernel<false, true>)
-                                   : (energies ? assemble_bodies_kernel<true, false>
-                                               : assemble_bodies_kernel<false, false>);
+    const cuda_kernel kernel =
+        c->view.joints.count > 0
+            ? (energies ? assemble_bodies_kernel<true, true> : assemble_bodies_kernel<false, true>)
+            : (energies ? assemble_bodies_kernel<true, false> : assemble_bodies_kernel<false, false>);
     cuda_args args = {};
     args.paper = !c->fast;
     return CUDA(launch_of)(c, kernel, "assemble_bodies",

@@ -48,8 +48,8 @@ sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, bool sub
  * counts say afterwards whether everything fitted (nothing is written to the set when not). */
 sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *stream,
                                 const struct sadmm_cuda_find *find, struct sadmm_error *error);
-/* What hits of bodies in flight are to know of the world; held: by body slot, not 0: joints hold the body. After attach,
- * with its input. */
+/* What hits of bodies in flight are to know of the world; held: by body slot, not 0: joints hold the body. After
+ * attach, with its input. */
 sadmm_status COLLISION(load_hits)(struct sadmm_cuda_collision *collision, const struct sadmm_collision_input *input,
                                   const unsigned char *held, struct sadmm_error *error);
 /* Can they be taken in it? */

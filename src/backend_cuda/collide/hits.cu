@@ -23,7 +23,8 @@ void COLLISION(free_hits)(struct sadmm_cuda_collision *c)
     struct hit_lists *lists = c->hit_lists;
     c->hit_lists = nullptr;
     if (!lists) return;
-    void *blocks[] = {lists->keys, lists->bodies, lists->leaves, lists->of, lists->shared, lists->groups, lists->held, lists};
+    void *blocks[] = {lists->keys,   lists->bodies, lists->leaves, lists->of,
+                      lists->shared, lists->groups, lists->held,   lists};
     for (void *block : blocks) sadmm_free(block);
 }
 
@@ -147,11 +148,13 @@ static sadmm_status reserve_groups(struct sadmm_cuda_collision *c, const struct 
     return SADMM_OK;
 }
 
-static sadmm_status upload_lists(struct sadmm_cuda_collision *c, const struct hit_lists &lists, struct sadmm_error *error)
+static sadmm_status upload_lists(struct sadmm_cuda_collision *c, const struct hit_lists &lists,
+                                 struct sadmm_error *error)
 {
     const size_t number = sizeof(int32_t), slots = (size_t)c->view.body_count;
     struct hits_view *h = &c->hits;
-    CUDA_CALL(c, cudaMemsetAsync(h->progress, 0, lists.count * sizeof *h->progress, c->stream), "cudaMemsetAsync(hits)");
+    CUDA_CALL(c, cudaMemsetAsync(h->progress, 0, lists.count * sizeof *h->progress, c->stream),
+              "cudaMemsetAsync(hits)");
     CUDA_CALL(c, cudaMemsetAsync(h->state, 0, sizeof *h->state, c->stream), "cudaMemsetAsync(hits)");
     CUDA_CALL(c, cudaMemsetAsync(h->marks, 0, slots * sizeof *h->marks, c->stream), "cudaMemsetAsync(hits)");
     TRY(copy(c, in<void>(c, HIT_GROUPS), lists.groups, lists.count * sizeof *lists.groups, true, error));

@@ -84,8 +84,8 @@ static __device__ __forceinline__ double since_of(const hits_view &v, const stru
     return max_of(v.since[a->body], v.since[b->body]);
 }
 
-/* From where a pair with a mesh that moves on is found, as find_triangles has it on the host: where it first touches any
- * of its triangles. They are neighbours in the list. */
+/* From where a pair with a mesh that moves on is found, as find_triangles has it on the host: where it first touches
+ * any of its triangles. They are neighbours in the list. */
 static __device__ __noinline__ void start_on_mesh(const hits_view &v, const struct collision_step &step,
                                                   const struct candidate &own, const struct sadmm_proxy *a,
                                                   const struct sadmm_proxy *b, double gravity, double left,

@@ -106,8 +106,8 @@ static __device__ __forceinline__ struct sadmm_swept_shape swept_shape(const hit
     return {shape, &v.c.geometries[shape->geometry], flight};
 }
 
-/* When do two shapes of the group hit each other, from `from` on? Into its list; what does not fit is counted. False: it
- * took too many tests to decide. */
+/* When do two shapes of the group hit each other, from `from` on? Into its list; what does not fit is counted. False:
+ * it took too many tests to decide. */
 static __device__ __noinline__ bool foresee(const hits_view &v, int32_t group, uint64_t key, const struct swept_body *a,
                                             const struct swept_body *b, double from, uint64_t mark)
 {

@@ -169,8 +169,8 @@ static __device__ __forceinline__ bool goes_on(const collision_view &v, int32_t 
     return contact_find_feature(v.before.points + old.first, old.count, feature, lane) >= 0;
 }
 
-/* A point in the new set goes on from other triangles' old pairs, where it is of a mesh and its own has none. By itself:
- * others should not pay in registers. */
+/* A point in the new set goes on from other triangles' old pairs, where it is of a mesh and its own has none. By
+ * itself: others should not pay in registers. */
 static __device__ __noinline__ void carry_across(const collision_view &v, int64_t i, int32_t lane, vec3 normal,
                                                  double friction, struct sadmm_contact_point *point)
 {
@@ -186,7 +186,7 @@ static __device__ __noinline__ void carry_across(const collision_view &v, int64_
                          along, friction, step_ratio(step_of(v).dt, v.before.counts->dt), point);
 }
 
-/* ---- pairs that roll, or were found elsewhere than halfway -------------------------------------------------------- */
+/* ---- pairs that roll, or were found elsewhere than halfway ------------------------------------------------------- */
 
 /* Point `lane` of candidate i. By itself: others should not pay in registers. */
 static __device__ __noinline__ void emit_general(const collision_view &v, int64_t i, int32_t lane, int32_t at,
@@ -330,7 +330,7 @@ emit_few_kernel(const __grid_constant__ collision_view v)
     if (has_point) emit_now(v, dt, i, lane, start, source, before);
 }
 
-/* ---- the rest of many candidates: kernels of their own ------------------------------------------------------------ */
+/* ---- the rest of many candidates: kernels of their own ----------------------------------------------------------- */
 
 static __global__ void __launch_bounds__(GENERAL_THREADS)
 emit_general_kernel(const __grid_constant__ collision_view v)

@@ -47,9 +47,11 @@ static const char *const buffer_names[BUFFERS] = {
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "touching pairs",
     "hits", "marks of bodies", "bodies held by joints", "kinds of bodies", "swept bodies", "moments of hits",
-    "impulses of hits", "boxes after hits", "pairs after hits", "fast pairs", "foreseen hits", "hits taken", "list of hits",
+    "impulses of hits", "boxes after hits", "pairs after hits", "fast pairs", "foreseen hits", "hits taken",
+    "list of hits",
     "groups", "progress of groups", "bodies of groups", "shapes of groups", "shapes of all groups", "groups of bodies",
-    "shapes", "geometries", "hulls", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
+    "shapes", "geometries", "hulls", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs",
+    "friction values",
     "neighbours by shape", "neighbours",
     "staged shapes", "staged geometries", "staged hulls", "staged bodies", "staged list of shapes", "staged planes",
     "staged disabled pairs",
@@ -230,7 +232,8 @@ static inline sadmm_status launch_view(struct sadmm_cuda_collision *c, const Lau
 #else
     const dim3 grid(blocks), threads_a_block((unsigned)what.threads);
     void *parameters[] = {const_cast<View *>(&view)};
-    cudaError_t code = launch_on(c->stream, c->view.pdl, (const void *)what.kernel, grid, threads_a_block, 0, parameters);
+    cudaError_t code =
+        launch_on(c->stream, c->view.pdl, (const void *)what.kernel, grid, threads_a_block, 0, parameters);
 #endif
     CUDA_CALL(c, code, what.name);
     return SADMM_OK;

@@ -67,8 +67,8 @@ static __device__ __forceinline__ void each_leaf_near(const struct mesh *mesh, c
 }
 
 template <class F>
-static __device__ __forceinline__ void each_triangle_near(const struct mesh *mesh, const struct sadmm_box3 *box, int lane,
-                                                          struct waiting_nodes *waiting, const F &f)
+static __device__ __forceinline__ void each_triangle_near(const struct mesh *mesh, const struct sadmm_box3 *box,
+                                                          int lane, struct waiting_nodes *waiting, const F &f)
 {
     struct mesh_walk walk;
     mesh_walk_begin(mesh, box, &walk);

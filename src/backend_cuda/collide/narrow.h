@@ -79,8 +79,8 @@ static __device__ bool meet_now(const collision_view &v, const struct collision_
 }
 
 /* Is the triangle near the shape in this sub-step? As mesh_walk_next finds it on the host. */
-static __device__ bool triangle_now(const collision_view &v, const struct collision_step &step, const struct candidate &c,
-                                    const struct sadmm_proxy &a, const struct sadmm_proxy &b)
+static __device__ bool triangle_now(const collision_view &v, const struct collision_step &step,
+                                    const struct candidate &c, const struct sadmm_proxy &a, const struct sadmm_proxy &b)
 {
     const struct sadmm_box3 own = v.boxes[c.a];
     struct sadmm_box3 box;
@@ -168,8 +168,8 @@ static __device__ constexpr bool is_at_once(int how) { return how % 2 == NARROW_
 static __device__ constexpr bool is_listed(int how) { return !is_at_once(how); }
 static __device__ constexpr bool with_smooth(int how) { return how >= NARROW_ALL_AT_ONCE; }
 
-/* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. walk: what has
- * been done of it; GJK_FAR: nothing. */
+/* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. walk: what
+ * has been done of it; GJK_FAR: nothing. */
 static __device__ bool hulls_at_once(const collision_view &v, const struct collision_step &step,
                                      const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                      const struct pair_start &start, uint32_t cache, struct gjk_walk *walk,
@@ -182,7 +182,8 @@ static __device__ bool hulls_at_once(const collision_view &v, const struct colli
     m->cache = 0;
     if (a->geometry.type == SADMM_SHAPE_PLANE)
         hull_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
-    else if (!hull_manifold_at_once(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk, m))
+    else if (!hull_manifold_at_once(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk,
+                                    m))
         return false;
     walk->end = GJK_FAR;
     return !pair_asks_balls(a, b, v.hulls, 0, &start, step.gravity, step.dt, m);
@@ -233,8 +234,8 @@ static __device__ bool smooth_at_once(const collision_view &v, const struct coll
 }
 #endif
 
-/* The manifold with a triangle, as find_triangles makes it on the host; false: it is to be listed. missed: the pair moves
- * on, but not as far as this triangle, so that no ball in its body does. */
+/* The manifold with a triangle, as find_triangles makes it on the host; false: it is to be listed. missed: the pair
+ * moves on, but not as far as this triangle, so that no ball in its body does. */
 template <int HOW>
 static __device__ bool narrow_triangle(const collision_view &v, const struct collision_step &step,
                                        const struct sadmm_proxy *a, const struct sadmm_proxy *b,

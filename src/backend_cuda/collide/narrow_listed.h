@@ -42,8 +42,8 @@ at_once_kernel(const __grid_constant__ collision_view v)
     if (!with_hulls(HOW) && v.hides && i < usable_candidates(v)) hide_seams(v, i);
 }
 
-/* A warp a block; on every chip that this is compiled for about so many run at once. Where there are more than these have
- * lanes for, further ones follow. */
+/* A warp a block; on every chip that this is compiled for about so many run at once. Where there are more than these
+ * have lanes for, further ones follow. */
 enum { LISTED_WARPS = 1024 };
 
 template <int FOR, int HOW>

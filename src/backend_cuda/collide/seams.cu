@@ -1,6 +1,6 @@
 /* Seams by kernels of their own (narrow_seams.h): with hulls and meshes, and where hits come between them and the
- * narrow phase. One is for pairs that are not listed, and runs beside the kernel that makes those that are (narrow_listed.h),
- * whose own seams come after it.
+ * narrow phase. One is for pairs that are not listed, and runs beside the kernel that makes those that are
+ * (narrow_listed.h), whose own seams come after it.
  *
  * A thread a candidate sees that the first point of nearly all is not hidden. The few others take a long time, with
  * everything beside each of their points: eight lanes take one of them, a point or a direction each. */

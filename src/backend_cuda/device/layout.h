@@ -30,7 +30,9 @@ struct sadmm_contact_point;
 struct sadmm_row_constraint;
 
 /* REACH: a shape is not where the step's first sub-step thought it might be (collide/view.h). */
-enum cuda_abort { ABORT_NONE = 0, ABORT_CAPACITY, ABORT_PARTITION, ABORT_PLAN, ABORT_NON_FINITE, ABORT_REACH, ABORT_HITS };
+enum cuda_abort {
+    ABORT_NONE = 0, ABORT_CAPACITY, ABORT_PARTITION, ABORT_PLAN, ABORT_NON_FINITE, ABORT_REACH, ABORT_HITS
+};
 
 /* In device memory; written by begin() (problem level: copied from the host) or by the step's gate (world level). */
 struct cuda_live {

@@ -40,8 +40,8 @@ static __device__ __forceinline__ void pdl_trigger(int32_t bodies)
 }
 
 /* Of kernels that use PDL in small worlds alone: what they begin with. In others they do neither, for what
- * that takes counts where blocks are many and short: with 100,000 bodies 32 in place of 23 us for the step's start, 33 in
- * place of 22 for its contacts. */
+ * that takes counts where blocks are many and short: with 100,000 bodies 32 in place of 23 us for the step's start, 33
+ * in place of 22 for its contacts. */
 static __device__ __forceinline__ void pdl_wait_only_if(bool pdl)
 {
     if (pdl) pdl_wait();

@@ -254,9 +254,9 @@ struct cuda_stiffening {
     int32_t any, unused;
 };
 
-/* Where joints that have been closed let a body go: position, orientation and velocity; twice the energies that this has
- * given it and that it moves with (core/model/joint_close.h); at labels of islands what is left of their velocities.
- * closed: by its own part. */
+/* Where joints that have been closed let a body go: position, orientation and velocity; twice the energies that this
+ * has given it and that it moves with (core/model/joint_close.h); at labels of islands what is left of their
+ * velocities. closed: by its own part. */
 struct cuda_closed_body {
     double place[13], gained, moving, keep;
     int32_t closed, unused;
@@ -472,8 +472,8 @@ typedef void (*cuda_kernel)(const cuda_view, const cuda_args);
 enum { ALL_LANES = -1 }; /* of a warp */
 
 /* *out = max(*out, values of the warp). Every lane of the warp comes here. Bit patterns of non-negative doubles order
- * like the numbers, and a maximum does not depend on the order it is taken in; a NaN survives as the largest pattern.
- * */
+ * like the numbers, and a maximum does not depend on the order it is taken in; a NaN survives as the largest
+ * pattern. */
 static __device__ __forceinline__ void reduce_max(double value, unsigned long long *out)
 {
     /* -0 (what real_abs may give) has the largest pattern but one: it counts as 0. */

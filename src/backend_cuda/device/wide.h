@@ -1,5 +1,5 @@
-/* Records that lie one behind the other, a lane each: every access of a warp is then to as many sectors as it has lanes,
- * whatever its size. So records are read and written in the largest pieces that there are. */
+/* Records that lie one behind the other, a lane each: every access of a warp is then to as many sectors as it has
+ * lanes, whatever its size. So records are read and written in the largest pieces that there are. */
 #ifndef SADMM_CUDA_DEVICE_WIDE_H
 #define SADMM_CUDA_DEVICE_WIDE_H
 

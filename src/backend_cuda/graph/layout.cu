@@ -48,10 +48,10 @@ static sadmm_status number(struct sadmm_context *c, size_t count, struct sadmm_e
     TRY(CUDA(reserve)(c, BUFFER_NUMBERS, count * sizeof(int32_t), error));
     if (numbers->capacity == before && c->numbered) return SADMM_OK;
     c->numbered = false;
-    CUDA_CALL(
-        c,
-        LAYOUT(number)((int32_t *)numbers->data, (int32_t)(numbers->capacity / sizeof(int32_t)), stream_of(c), &c->kernel),
-        c->kernel);
+    CUDA_CALL(c,
+              LAYOUT(number)((int32_t *)numbers->data, (int32_t)(numbers->capacity / sizeof(int32_t)), stream_of(c),
+                             &c->kernel),
+              c->kernel);
     c->numbered = true;
     return SADMM_OK;
 }

@@ -138,7 +138,8 @@ static __global__ void number_kernel(const __grid_constant__ layout_view v, cons
         if (launch_code != cudaSuccess) return launch_code;                                                   \
     } while (0)
 
-cudaError_t LAYOUT(statistics)(const struct layout_view *v, bool islands, const struct layout_stream &stream, const char **kernel)
+cudaError_t LAYOUT(statistics)(const struct layout_view *v, bool islands, const struct layout_stream &stream,
+                               const char **kernel)
 {
     layout_args args = {};
     args.islands = islands;
@@ -171,8 +172,8 @@ static cudaError_t sort(const struct layout_view *v, const int32_t *keys, int32_
                                    bits_of(v->bodies), stream.stream);
 }
 
-cudaError_t LAYOUT(make)(const struct layout_view *v, const struct cuda_partition *partition, const struct layout_stream &stream,
-                         const char **kernel)
+cudaError_t LAYOUT(make)(const struct layout_view *v, const struct cuda_partition *partition,
+                         const struct layout_stream &stream, const char **kernel)
 {
     const int32_t sides = 2 * (v->pair_capacity + v->rows);
     layout_args args = {};

@@ -53,7 +53,8 @@ static __host__ __device__ inline bool slots_by_island(const struct cuda_partiti
 #endif
 
 /* On failure *kernel says what was launched; after success, what was launched last. */
-cudaError_t LAYOUT(statistics)(const struct layout_view *, bool islands, const struct layout_stream &stream, const char **kernel);
+cudaError_t LAYOUT(statistics)(const struct layout_view *, bool islands, const struct layout_stream &stream,
+                               const char **kernel);
 cudaError_t LAYOUT(make)(const struct layout_view *, const struct cuda_partition *, const struct layout_stream &stream,
                          const char **kernel);
 /* Either or both by one block: statistics, and a layout where there is a partition. `shared`: bytes it takes, SIZE_MAX:

@@ -279,7 +279,8 @@ cudaError_t LAYOUT(one_block_allow)(int bytes)
 }
 
 cudaError_t LAYOUT(one_block)(const struct layout_view *v, bool with_statistics, bool islands,
-                              const struct cuda_partition *partition, const struct layout_stream &stream, const char **kernel)
+                              const struct cuda_partition *partition, const struct layout_stream &stream,
+                              const char **kernel)
 {
     layout_args args = {};
     args.statistics = with_statistics;

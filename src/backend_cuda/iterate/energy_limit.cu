@@ -4,8 +4,8 @@
  *
  *   motions   of floating islands: which may be restored (beside the iterations, where these do not find out
  *             themselves what is anchored)
- *   candidate is there a body with more energy than its free motion has, or that rebounds? Else no anchored island does.
- *             Persistent kernels test that themselves, those of tier BLOCK see to the rest too
+ *   candidate is there a body with more energy than its free motion has, or that rebounds? Else no anchored island
+ *             does. Persistent kernels test that themselves, those of tier BLOCK see to the rest too
  *   limit     energies and work, sums over islands (weight/island_sums.h), the factor of each island's velocities: of
  *             anchored islands, if there is such a body; of floating ones in any case, and the rigid motion that
  *             restores their momentum. Whole steps apply both where they move bodies (step/move.h)

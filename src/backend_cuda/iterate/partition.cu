@@ -133,8 +133,8 @@ static bool parts_fit(const struct sadmm_context *c, const struct cuda_graph_sta
     return bound.sides <= most_sides_of(c, most) && blocks * threads_for(c, bound, most) <= most;
 }
 
-/* Parts in rounds of blocks that run one after another: as few rounds as there can be, and of those the smallest blocks,
- * which have more registers and do more of a step (persistent_does_prologue). */
+/* Parts in rounds of blocks that run one after another: as few rounds as there can be, and of those the smallest
+ * blocks, which have more registers and do more of a step (persistent_does_prologue). */
 static int64_t parts_in_rounds(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
                                int64_t most, int64_t *side_by_side)
 {

@@ -40,15 +40,15 @@ static __device__ __forceinline__ real relaxed(const model_view &model, const cu
     return FAST && args.relax & what ? (real)model.settings->relaxation : (real)1;
 }
 
-/* Step 1, two threads a body: components 0 to 2 by the one, 3 to 5 by the other. A record has force and torque in halves
- * of sixteen bytes (f32), and each of the two reads its own: a warp's loads are whole sectors, and twice as many records
- * are on their way. A's and H's numbers both read at the same address, rows by halves that they pass on. (Eight lanes a body, as in the persistent tiers, where
- * latency counts, spend the time on instructions that load and pass around single numbers.) What is read once leaves the
- * caches to states and records. The sums are those of free_momentum() and step_of(); FAST: of step_fast() and
- * residual_after(), as far as args.relax says.
+/* Step 1, two threads a body: components 0 to 2 by the one, 3 to 5 by the other. A record has force and torque in
+ * halves of sixteen bytes (f32), and each of the two reads its own: a warp's loads are whole sectors, and twice as many
+ * records are on their way. A's and H's numbers both read at the same address, rows by halves that they pass on. (Eight
+ * lanes a body, as in the persistent tiers, where latency counts, spend the time on instructions that load and pass
+ * around single numbers.) What is read once leaves the caches to states and records. The sums are those of
+ * free_momentum() and step_of(); FAST: of step_fast() and residual_after(), as far as args.relax says.
  *
- * FAST: a body that nothing touches has the velocity that it falls with after an iteration or two. Once none, relaxed or
- * not, can change a bit of it, RESIDUAL_STAYS says so, and its other numbers are not read any more. */
+ * FAST: a body that nothing touches has the velocity that it falls with after an iteration or two. Once none, relaxed
+ * or not, can change a bit of it, RESIDUAL_STAYS says so, and its other numbers are not read any more. */
 enum { HALVES = 2, HALF = 3 };
 
 /* The half's own of two numbers; the other half's. */
@@ -202,8 +202,8 @@ static __global__ void __launch_bounds__(THREADS)
     if (FAST && all_stopped(v.islands, args.checks)) return;
     if (t.there) {
         const bool on = t.live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, pair.ends));
-        primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, pair, t.lane,
-                                                                on, relaxation_factor);
+        primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, pair,
+                                                                t.lane, on, relaxation_factor);
     }
     if (MEASURE) reduce_max(primal, v.iteration.residual);
 }
@@ -253,9 +253,9 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
-/* A sweep. It fetches what no sweep writes, or the one before the last, and only then waits for the last one: while that
- * one's last blocks run, the next one's are loading. So the first of a batch, which other kernels precede, is launched
- * without PDL; `follows`: it is not the first. */
+/* A sweep. It fetches what no sweep writes, or the one before the last, and only then waits for the last one: while
+ * that one's last blocks run, the next one's are loading. So the first of a batch, which other kernels precede, is
+ * launched without PDL; `follows`: it is not the first. */
 static sadmm_status launch_sweep(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
                                  int threads, bool follows, const cuda_args *args, struct sadmm_error *error)
 {

@@ -54,8 +54,8 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
     if (live && side >= 0) out[2 * (size_t)side + (odd ? 1 : 0)] = pack(on_b ? sum : v3_neg(sum), 0);
 }
 
-/* A lane's share of a pair, but for its bodies' states: points lane and, where COUNT is 2, lane + 4. The first is loaded
- * whether it is there or not, so that nothing but the states waits for another load. */
+/* A lane's share of a pair, but for its bodies' states: points lane and, where COUNT is 2, lane + 4. The first is
+ * loaded whether it is there or not, so that nothing but the states waits for another load. */
 template <int COUNT> struct swept_pair {
     real4 about, between;
     pair_bodies ends;
@@ -94,8 +94,8 @@ static __device__ __forceinline__ swept_pair<COUNT> fetch_pair(const contact_vie
     return pair;
 }
 
-/* `live`: else nothing is stored. Every lane of the warp comes here. FAST: lambda goes `relaxation_factor` times as far;
- * records are those of Step 1 in any case. Returns the lane's share of the primal residual. */
+/* `live`: else nothing is stored. Every lane of the warp comes here. FAST: lambda goes `relaxation_factor` times as
+ * far; records are those of Step 1 in any case. Returns the lane's share of the primal residual. */
 template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __device__ __forceinline__ double sweep_pair(const model_view &model, const body_view &bodies,
                                                     const contact_view &contacts, const iteration_view &iteration,

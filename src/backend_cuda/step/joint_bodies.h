@@ -33,7 +33,8 @@ static __device__ __forceinline__ bool joint_closes(const joint_view &joints, in
     return def->locks && def->enabled && !joints.begin[j].broken;
 }
 
-/* The frame of joint j on its body at side s at the end of the step. place: of a dynamic body. Couplings have no locks. */
+/* The frame of joint j on its body at side s at the end of the step. place: of a dynamic body. Couplings have no
+ * locks. */
 static __device__ __forceinline__ struct joint_end joint_end_after(const cuda_view &v, int32_t j, int s,
                                                                    const double *place)
 {

@@ -16,8 +16,8 @@ struct close_shared {
     int32_t flag;
 };
 
-/* Bits of a body's island: a part with joints that are not enabled may be of several. What other parts of the same island
- * add to them here is not asked for. */
+/* Bits of a body's island: a part with joints that are not enabled may be of several. What other parts of the same
+ * island add to them here is not asked for. */
 static __device__ __forceinline__ int32_t bits_of(const cuda_view &v, int32_t body)
 {
     return v.joints.touch[articulation_label(v, body)];

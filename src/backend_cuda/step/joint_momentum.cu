@@ -1,7 +1,7 @@
-/* Momentum and energy of islands with joints (core/model/joint_momentum.h) on the device. A thread block an island, once
- * it is known where its joints let it go: what closing has cost, which it pays; then what each body adds, then sums over
- * the bodies, in the order of the host (world/step/joint_momentum.c). Bodies get what restores it where they are moved
- * (move_articulated.h). Beside them a thread a joint: how far that is off. */
+/* Momentum and energy of islands with joints (core/model/joint_momentum.h) on the device. A thread block an island,
+ * once it is known where its joints let it go: what closing has cost, which it pays; then what each body adds, then
+ * sums over the bodies, in the order of the host (world/step/joint_momentum.c). Bodies get what restores it where they
+ * are moved (move_articulated.h). Beside them a thread a joint: how far that is off. */
 #include <algorithm>
 
 #include "backend_cuda/device/double.h"
@@ -184,8 +184,8 @@ static __device__ __forceinline__ void restore_island(const cuda_view &v, const 
     v.joints.touch[island.label] |= ISLAND_RESTORED;
 }
 
-/* How far joint j is off, once it has been closed where it had to be. Its island may be paying for that: velocities do not
- * count here. */
+/* How far joint j is off, once it has been closed where it had to be. Its island may be paying for that: velocities do
+ * not count here. */
 static __device__ __noinline__ double drift_of(const cuda_view &v, int32_t j)
 {
     const struct sadmm_resident_joint *joint = &v.joints.joints[j];

@@ -108,8 +108,9 @@ static __device__ __forceinline__ void store_constraints(const cuda_view &v, con
         const int left = rows - SADMM_MAX_ROWS * c,
                   count = left < 0 ? 0 : left < SADMM_MAX_ROWS ? left : (int)SADMM_MAX_ROWS;
         const int32_t a = joint->body[0] >= 0 ? joint->body[0] : -1, b = joint->body[1] >= 0 ? joint->body[1] : -1;
-        const struct sadmm_row_constraint out = {count > 0 ? a : -1, count > 0 ? b : -1,
-                                                 (first + c) * (int32_t)SADMM_MAX_ROWS, count, false, 0, false, {0, 0, 0}};
+        const struct sadmm_row_constraint out = {
+            count > 0 ? a : -1, count > 0 ? b : -1, (first + c) * (int32_t)SADMM_MAX_ROWS, count, false, 0, false,
+            {0, 0, 0}};
         const_cast<struct sadmm_row_constraint *>(v.raw.constraints)[first + c] = out;
     }
 }

@@ -396,8 +396,8 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
 
 static __device__ double double_of(unsigned long long bits) { return __longlong_as_double((long long)bits); }
 
-/* Threads a body: in small worlds as many as keep what it rolls by; in others, where that would be a burden when nothing
- * rolls, one. */
+/* Threads a body: in small worlds as many as keep what it rolls by; in others, where that would be a burden when
+ * nothing rolls, one. */
 static __host__ __device__ inline int32_t commit_lanes(int32_t bodies) { return all_pdl(bodies) ? LANES : 1; }
 
 static __device__ __forceinline__ void commit_bodies(const cuda_view &v, int32_t thread, bool articulated)

@@ -1,7 +1,7 @@
-/* Islands that are pushed apart without a velocity (core/solve/push.h): the second problem of a step, in a context of its
- * own. Its partition is made for as many contacts as the step may have. It has all bodies, under their own numbers, and
- * the pairs of the islands that are pushed, one after the other; where there are none its kernels are not launched, or
- * leave at once. */
+/* Islands that are pushed apart without a velocity (core/solve/push.h): the second problem of a step, in a context of
+ * its own. Its partition is made for as many contacts as the step may have. It has all bodies, under their own numbers,
+ * and the pairs of the islands that are pushed, one after the other; where there are none its kernels are not launched,
+ * or leave at once. */
 #include "backend_cuda/device/double.h"
 
 #include "backend_cuda/device/condition.h"

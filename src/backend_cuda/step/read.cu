@@ -145,8 +145,9 @@ extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_r
     const int substeps = s->last_settings.substeps, /* of the last one */
               from = step_state(1 - s->into, substeps - 2, substeps);
     TRY(CUDA(get)(c, rigid,
-                  s->last_hits ? buffer<struct sadmm_rigid>(c, BUFFER_WORLD_HIT) + (size_t)(1 - s->into) * n /* after them */
-                               : buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)from * n,
+                  s->last_hits
+                      ? buffer<struct sadmm_rigid>(c, BUFFER_WORLD_HIT) + (size_t)(1 - s->into) * n /* after them */
+                      : buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)from * n,
                   n * sizeof *rigid, error));
     TRY(stiffen_start(c, rigid, error));
     TRY(CUDA(get)(c, velocity, buffer<double>(c, BUFFER_WORLD_VELOCITY), 6 * n * sizeof *velocity, error));

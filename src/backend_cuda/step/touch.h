@@ -233,8 +233,8 @@ static __device__ __forceinline__ void add_way(const cuda_view &v, const trapezo
     trapezoid_add_way(touch, separation, corrections, size, dt, slop);
 }
 
-/* Of the lane's points that roll. By itself, with all that it needs: few do, and the others should not pay in registers.
- * Bits of the island and of both bodies, a byte each. */
+/* Of the lane's points that roll. By itself, with all that it needs: few do, and the others should not pay in
+ * registers. Bits of the island and of both bodies, a byte each. */
 template <bool WHOLE>
 static __device__ __noinline__ int add_rolling_ways(const cuda_view &v, pair_ends ends, int32_t first, int32_t count,
                                                     int32_t lane)

@@ -46,8 +46,8 @@ struct learned {
 
 /* Steps that articulations are left alone until it is planned that they are; twice as many each time they were not. */
 enum { LEAST_BACKOFF = 16, MOST_BACKOFF = 1 << 16 };
-/* Steps without a push until they are planned to have none: to plan takes what a second problem's empty kernels do in as
- * many. */
+/* Steps without a push until they are planned to have none: to plan takes what a second problem's empty kernels do in
+ * as many. */
 enum { QUIET_STEPS = 32 };
 /* The same of hits, whose empty kernels take less. */
 enum { CALM_STEPS = 256 };
@@ -178,8 +178,8 @@ sadmm_status CUDA(launch_support)(struct sadmm_context *, struct sadmm_error *er
 /* and the end of a (sub-)step: poses, and what contacts give them. */
 sadmm_status CUDA(launch_kinematic_finish)(struct sadmm_context *, struct sadmm_error *error);
 
-/* push_view.due: not 0: some island is pushed; not 0: the second problem does not fit its partition; its pairs that carry
- * an impulse; bits of enum push_kind, 0: there is none. */
+/* push_view.due: not 0: some island is pushed; not 0: the second problem does not fit its partition; its pairs that
+ * carry an impulse; bits of enum push_kind, 0: there is none. */
 enum push_number { PUSH_DUE, PUSH_MISPREDICTED, PUSH_WARM_PAIRS, PUSH_KIND, PUSH_NUMBERS };
 /* The second problem is a cold one or a warm one, which its contacts say: it is recorded as both. */
 enum push_kind { PUSH_COLD = 1, PUSH_WARM = 2, PUSH_ANY = PUSH_COLD | PUSH_WARM };

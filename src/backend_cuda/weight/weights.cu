@@ -84,8 +84,8 @@ static __global__ void respond_rows_kernel(const __grid_constant__ cuda_view v, 
     v.rows.responses[slot] = out;
 }
 
-/* B = diag(weight) + along along^T. A thread a constraint. What the islands' sums do not say is fetched before the kernel
- * that makes them has ended. */
+/* B = diag(weight) + along along^T. A thread a constraint. What the islands' sums do not say is fetched before the
+ * kernel that makes them has ended. */
 static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const int32_t k = thread_index();

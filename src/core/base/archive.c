@@ -39,8 +39,9 @@ void sadmm_archive_count(struct sadmm_archive *archive, size_t *count, size_t un
     sadmm_archive_bytes(archive, &n, sizeof n);
     if (!archive->reading) return;
     const size_t left = archive->size - archive->at;
-    *count = sadmm_archive_expect(archive, n <= most && n <= left / (unit > 0 ? unit : 1), "a count is too large") ? (size_t)n
-                                                                                                                  : 0;
+    *count = sadmm_archive_expect(archive, n <= most && n <= left / (unit > 0 ? unit : 1), "a count is too large")
+                 ? (size_t)n
+                 : 0;
 }
 
 void sadmm_archive_count32(struct sadmm_archive *archive, int32_t *count, size_t unit, int32_t most)

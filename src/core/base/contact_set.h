@@ -40,15 +40,16 @@ struct sadmm_contact_point {
     double arm_a[3], arm_b[3]; /* from the centre of mass, m, world; arm_a is 0 when a is static (same for b) */
     double separation;         /* m (world level) */
     double error;              /* e, m/s: given at the problem level; at the world level what is added to that of
-                                  math/contact.h: a push that bodies are to be moved by alone (solve/push.h), mostly 0 */
+                                  math/contact.h: a push that bodies are to be moved by alone (solve/push.h), mostly
+                                  0 */
     double impulse[3];         /* lambda on b, world frame, N s: warm start in, solution out */
     uint32_t feature;
     uint32_t migrates; /* enum contact_migrates */
 };
 
-/* Has the set's `migrations` an entry of a point? Of its radius, or of an edge or a corner that goes on from the last step;
- * of a round surface that pressed in that step, so that it will go on from this one if its bodies move by means; or of
- * one that goes on from there, with the arms of this step's end. */
+/* Has the set's `migrations` an entry of a point? Of its radius, or of an edge or a corner that goes on from the last
+ * step; of a round surface that pressed in that step, so that it will go on from this one if its bodies move by means;
+ * or of one that goes on from there, with the arms of this step's end. */
 enum contact_migrates { MIGRATES_NOT, MIGRATES_NOWHERE, MIGRATES_SOON, MIGRATES_ON };
 
 /* How the point of a contact moves on its two bodies while these roll on each other. Normal and arms of a pair whose
@@ -113,8 +114,8 @@ SADMM_INLINE const struct sadmm_contact_migration *sadmm_migration_of(const stru
     return points[k].migrates ? &migrations[k] : 0;
 }
 
-/* A pair of dynamic bodies that roll on each other: its impulses act at one point in space of the step's end, not of its
- * start, so that the momentum of its island is not known from that. points: the pair's. */
+/* A pair of dynamic bodies that roll on each other: its impulses act at one point in space of the step's end, not of
+ * its start, so that the momentum of its island is not known from that. points: the pair's. */
 SADMM_INLINE bool sadmm_pair_rolls(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points)
 {
     return pair->body_a >= 0 && pair->body_b >= 0 && points[0].migrates == MIGRATES_ON;

@@ -15,7 +15,8 @@ struct sadmm_error {
     char message[SADMM_MESSAGE_SIZE];
 };
 
-/* Fill `error` (may be NULL) and this thread's last message, which are UTF-8 whatever they quote; returns `status` for `return sadmm_fail(...)`. */
+/* Fill `error` (may be NULL) and this thread's last message, which are UTF-8 whatever they quote; returns `status` for
+ * `return sadmm_fail(...)`. */
 #ifdef __GNUC__
 __attribute__((format(printf, 3, 4)))
 #endif

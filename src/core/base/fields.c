@@ -40,8 +40,8 @@ static sadmm_status check(const struct sadmm_field *of, double x, const char *pr
     number(of, x, value);
     number(of, of->lo, lo);
     if (to_hi)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s = %s: must be in [%s, %s%c", prefix, name, value, lo,
-                          number(of, of->hi, hi), of->ends == SADMM_ENDS_BELOW ? ')' : ']');
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s = %s: must be in [%s, %s%c", prefix, name, value,
+                          lo, number(of, of->hi, hi), of->ends == SADMM_ENDS_BELOW ? ')' : ']');
     return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s = %s: must be finite and %s %s", prefix, name, value,
                       of->ends == SADMM_ENDS_ABOVE ? ">" : ">=", lo);
 }

@@ -1,20 +1,20 @@
 /* Members of settings and definitions as lists (settings_fields.h, definition_fields.h): defaults, ranges and their
  * messages, what is saved, read from and written to files, Python's properties and arguments, the schema of scene files
- * (scripts/lists.py) are made of these. What a member means in full is said in the public headers; the text in a list is
- * one line of it.
+ * (scripts/lists.py) are made of these. What a member means in full is said in the public headers; the text in a list
+ * is one line of it.
  *
  * F(X, kind, role, name, value, lo, hi, ends, text), X passed through:
  *   kind   REAL (double), VECTOR (double[3]), TURN (double[4], a unit quaternion), TWIST (double[6]);
  *          BOUND (double that may be infinite: in files null), MEASURED (double; NaN, in files null: what is measured);
  *          WHOLE (int), BITS (uint32_t), FLAG (bool); METHOD, BODY_TYPE, SHAPE_TYPE, JOINT_KIND, DRIVE (names.h);
  *          ID (of an object); BODY_NAME, POINTS, ..., whatever else: C code alone knows these
- *   role   of settings:    NUMBER: data of formulas, may change from step to step without another plan; PLAN: what a step
- *                          consists of
+ *   role   of settings:    NUMBER: data of formulas, may change from step to step without another plan; PLAN: what a
+ *                          step consists of
  *          of definitions: PLAIN; DYNAMIC: of dynamic bodies alone, in files null for others; OWN: files have it in
  *                          another form under this name; HIDDEN: under another one
  *   value  the default
- *   ends   CLOSED: in [lo, hi], the numbers of a vector each; BELOW: in [lo, hi); FROM: finite, >= lo; ABOVE: finite, > lo;
- *          ANY: any value, or a rule of its own beside those of the list
+ *   ends   CLOSED: in [lo, hi], the numbers of a vector each; BELOW: in [lo, hi); FROM: finite, >= lo; ABOVE: finite, >
+ *          lo; ANY: any value, or a rule of its own beside those of the list
  */
 #ifndef SADMM_CORE_BASE_FIELDS_H
 #define SADMM_CORE_BASE_FIELDS_H
@@ -97,16 +97,17 @@ struct sadmm_field {
 
 /* That a list has every member of a struct, in its order, behind its sizes: a struct with too few initialisers is an
  * error, and so is one of another form. */
-#define SADMM_EVERY_FIELD_IS_LISTED(type, list, sizes)                                                                  \
-    _Pragma("GCC diagnostic push") _Pragma("GCC diagnostic error \"-Wmissing-field-initializers\"")                     \
-    _Static_assert(sizeof((type){sizes list(SADMM_FIELD_VALUE, )}) == sizeof(type), "every member is listed");          \
+#define SADMM_EVERY_FIELD_IS_LISTED(type, list, sizes)                                                         \
+    _Pragma("GCC diagnostic push") _Pragma("GCC diagnostic error \"-Wmissing-field-initializers\"")            \
+    _Static_assert(sizeof((type){sizes list(SADMM_FIELD_VALUE, )}) == sizeof(type), "every member is listed"); \
     _Pragma("GCC diagnostic pop")
 #define SADMM_NO_SIZE
 #define SADMM_ONE_SIZE 0,
 #define SADMM_TWO_SIZES 0, 0,
 #define SADMM_FIELD_VALUE(X, kind, role, name, value, ...) value,
 
-/* Is a member of an object in its range? Else INVALID_ARGUMENT with its name behind `prefix`, its value and the range. */
+/* Is a member of an object in its range? Else INVALID_ARGUMENT with its name behind `prefix`, its value and the
+ * range. */
 sadmm_status sadmm_field_check(const struct sadmm_field *field, const void *object, const char *prefix,
                                struct sadmm_error *error);
 sadmm_status sadmm_fields_check(const struct sadmm_field *fields, size_t count, const void *object, const char *prefix,

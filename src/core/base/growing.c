@@ -64,7 +64,8 @@ static sadmm_status take_known(unsigned char *out, size_t known, const unsigned 
     for (size_t k = known; k < size; ++k)
         if (given[k])
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                              "%s: a member at byte %zu is set, and must be 0: this library (version %s) is older than the "
+                              "%s: a member at byte %zu is set, and must be 0: this library (version %s) is older than "
+                              "the "
                               "program, and does not have it",
                               name, at + k, sadmm_version());
     return SADMM_OK;
@@ -115,7 +116,8 @@ sadmm_status sadmm_growing_give(const struct sadmm_growing *type, void *out, siz
                           type->least, LARGEST, name);
     if (type->part_count && (part_size < type->part_least || size < type->part_at + type->part_count * part_size))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s = %zu: must be in [%zu, %zu] with size = %zu",
-                          type->part_name, part_size, type->part_least, (size - type->part_at) / type->part_count, size);
+                          type->part_name, part_size, type->part_least, (size - type->part_at) / type->part_count,
+                          size);
     write_out(type, out, size, part_size, from);
     set_size(out, size);
     return SADMM_OK;

@@ -1,6 +1,6 @@
-/* Numbers by key, in the order of keys: found, set and removed, the one at an index and the next after a key in O(log n)
- * steps each, in whatever order keys come and go. A treap whose priorities are a hash of the keys: its shape, and all that
- * is read of it, depends on the keys alone. */
+/* Numbers by key, in the order of keys: found, set and removed, the one at an index and the next after a key in O(log
+ * n) steps each, in whatever order keys come and go. A treap whose priorities are a hash of the keys: its shape, and
+ * all that is read of it, depends on the keys alone. */
 #ifndef SADMM_CORE_BASE_KEY_TREE_H
 #define SADMM_CORE_BASE_KEY_TREE_H
 

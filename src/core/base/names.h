@@ -12,48 +12,48 @@
 extern "C" {
 #endif
 
-#define SADMM_BACKENDS(F, X)                                                                                            \
-    F(X, SADMM_BACKEND_AUTO, "auto")                                                                                    \
-    F(X, SADMM_BACKEND_REF, "ref")                                                                                      \
-    F(X, SADMM_BACKEND_CPU, "cpu")                                                                                      \
+#define SADMM_BACKENDS(F, X)         \
+    F(X, SADMM_BACKEND_AUTO, "auto") \
+    F(X, SADMM_BACKEND_REF, "ref")   \
+    F(X, SADMM_BACKEND_CPU, "cpu")   \
     F(X, SADMM_BACKEND_CUDA, "cuda")
 #define SADMM_PRECISIONS(F, X) F(X, SADMM_F32, "f32") F(X, SADMM_F64, "f64")
 #define SADMM_METHODS(F, X) F(X, SADMM_METHOD_PAPER, "paper") F(X, SADMM_METHOD_FAST, "fast")
-#define SADMM_BODY_TYPES(F, X)                                                                                          \
-    F(X, SADMM_BODY_DYNAMIC, "dynamic")                                                                                 \
-    F(X, SADMM_BODY_STATIC, "static")                                                                                   \
+#define SADMM_BODY_TYPES(F, X)          \
+    F(X, SADMM_BODY_DYNAMIC, "dynamic") \
+    F(X, SADMM_BODY_STATIC, "static")   \
     F(X, SADMM_BODY_KINEMATIC, "kinematic")
 /* How many numbers of its size it has. */
-#define SADMM_SHAPE_TYPES(F, X)                                                                                         \
-    F(X, SADMM_SHAPE_PLANE, "plane", 0)                                                                                 \
-    F(X, SADMM_SHAPE_SPHERE, "sphere", 1)                                                                               \
-    F(X, SADMM_SHAPE_CAPSULE, "capsule", 2)                                                                             \
-    F(X, SADMM_SHAPE_BOX, "box", 3)                                                                                     \
-    F(X, SADMM_SHAPE_HULL, "hull", 0)                                                                                   \
-    F(X, SADMM_SHAPE_MESH, "mesh", 0)                                                                                   \
-    F(X, SADMM_SHAPE_CYLINDER, "cylinder", 2)                                                                           \
-    F(X, SADMM_SHAPE_CONE, "cone", 2)                                                                                   \
+#define SADMM_SHAPE_TYPES(F, X)               \
+    F(X, SADMM_SHAPE_PLANE, "plane", 0)       \
+    F(X, SADMM_SHAPE_SPHERE, "sphere", 1)     \
+    F(X, SADMM_SHAPE_CAPSULE, "capsule", 2)   \
+    F(X, SADMM_SHAPE_BOX, "box", 3)           \
+    F(X, SADMM_SHAPE_HULL, "hull", 0)         \
+    F(X, SADMM_SHAPE_MESH, "mesh", 0)         \
+    F(X, SADMM_SHAPE_CYLINDER, "cylinder", 2) \
+    F(X, SADMM_SHAPE_CONE, "cone", 2)         \
     F(X, SADMM_SHAPE_ELLIPSOID, "ellipsoid", 3)
 /* What it locks; the free coordinates and the use, for documents. */
-#define SADMM_JOINT_KINDS(F, X)                                                                                         \
-    F(X, SADMM_JOINT_FIXED, "fixed", SADMM_LOCK_ALL, "none", "weld")                                                    \
-    F(X, SADMM_JOINT_REVOLUTE, "revolute", SADMM_LOCK_ALL - SADMM_LOCK_RZ, "5", "hinge about z")                        \
-    F(X, SADMM_JOINT_PRISMATIC, "prismatic", SADMM_LOCK_ALL - SADMM_LOCK_Z, "2", "slide along z")                       \
-    F(X, SADMM_JOINT_CYLINDRICAL, "cylindrical", SADMM_LOCK_ALL - SADMM_LOCK_Z - SADMM_LOCK_RZ, "2, 5",                 \
-      "slide and hinge on one axis")                                                                                    \
-    F(X, SADMM_JOINT_SPHERICAL, "spherical", SADMM_LOCK_X + SADMM_LOCK_Y + SADMM_LOCK_Z, "3, 4, 5", "ball joint")       \
-    F(X, SADMM_JOINT_UNIVERSAL, "universal", SADMM_LOCK_X + SADMM_LOCK_Y + SADMM_LOCK_Z + SADMM_LOCK_RZ, "3, 4",        \
-      "cardan joint")                                                                                                   \
-    F(X, SADMM_JOINT_PLANAR, "planar", SADMM_LOCK_Z + SADMM_LOCK_RX + SADMM_LOCK_RY, "0, 1, 5", "motion in a plane")    \
-    F(X, SADMM_JOINT_CARTESIAN, "cartesian", SADMM_LOCK_RX + SADMM_LOCK_RY + SADMM_LOCK_RZ, "0, 1, 2", "no rotation")   \
-    F(X, SADMM_JOINT_CUSTOM, "custom", 0, "all but those in `locks`", "anything else")                                  \
-    F(X, SADMM_JOINT_DISTANCE, "distance", SADMM_LOCK_X, "all but 0, which is the distance of the two origins", "rod")  \
-    F(X, SADMM_JOINT_SPRING, "spring", 0, "all; 0 is the distance", "spring, rope, actuator between two points")        \
-    F(X, SADMM_JOINT_LINK, "link", SADMM_LOCK_X + SADMM_LOCK_Z, "all but the distance and translation 2",               \
+#define SADMM_JOINT_KINDS(F, X)                                                                                        \
+    F(X, SADMM_JOINT_FIXED, "fixed", SADMM_LOCK_ALL, "none", "weld")                                                   \
+    F(X, SADMM_JOINT_REVOLUTE, "revolute", SADMM_LOCK_ALL - SADMM_LOCK_RZ, "5", "hinge about z")                       \
+    F(X, SADMM_JOINT_PRISMATIC, "prismatic", SADMM_LOCK_ALL - SADMM_LOCK_Z, "2", "slide along z")                      \
+    F(X, SADMM_JOINT_CYLINDRICAL, "cylindrical", SADMM_LOCK_ALL - SADMM_LOCK_Z - SADMM_LOCK_RZ, "2, 5",                \
+      "slide and hinge on one axis")                                                                                   \
+    F(X, SADMM_JOINT_SPHERICAL, "spherical", SADMM_LOCK_X + SADMM_LOCK_Y + SADMM_LOCK_Z, "3, 4, 5", "ball joint")      \
+    F(X, SADMM_JOINT_UNIVERSAL, "universal", SADMM_LOCK_X + SADMM_LOCK_Y + SADMM_LOCK_Z + SADMM_LOCK_RZ, "3, 4",       \
+      "cardan joint")                                                                                                  \
+    F(X, SADMM_JOINT_PLANAR, "planar", SADMM_LOCK_Z + SADMM_LOCK_RX + SADMM_LOCK_RY, "0, 1, 5", "motion in a plane")   \
+    F(X, SADMM_JOINT_CARTESIAN, "cartesian", SADMM_LOCK_RX + SADMM_LOCK_RY + SADMM_LOCK_RZ, "0, 1, 2", "no rotation")  \
+    F(X, SADMM_JOINT_CUSTOM, "custom", 0, "all but those in `locks`", "anything else")                                 \
+    F(X, SADMM_JOINT_DISTANCE, "distance", SADMM_LOCK_X, "all but 0, which is the distance of the two origins", "rod") \
+    F(X, SADMM_JOINT_SPRING, "spring", 0, "all; 0 is the distance", "spring, rope, actuator between two points")       \
+    F(X, SADMM_JOINT_LINK, "link", SADMM_LOCK_X + SADMM_LOCK_Z, "all but the distance and translation 2",              \
       "rod with a hinge at a and a ball joint at b")
-#define SADMM_DRIVES(F, X)                                                                                              \
-    F(X, SADMM_DRIVE_OFF, "off")                                                                                        \
-    F(X, SADMM_DRIVE_SPEED, "speed")                                                                                    \
+#define SADMM_DRIVES(F, X)           \
+    F(X, SADMM_DRIVE_OFF, "off")     \
+    F(X, SADMM_DRIVE_SPEED, "speed") \
     F(X, SADMM_DRIVE_POSITION, "position")
 
 /* Bits of coordinates. */

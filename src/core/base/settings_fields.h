@@ -5,38 +5,38 @@
 #include "fields.h"
 #include "subadmm/settings.h"
 
-#define SADMM_SETTINGS(F, X)                                                                                            \
-    F(X, REAL, NUMBER, dt, 0.005, 1e-6, 1, CLOSED, "Time step, s.")                                                     \
-    F(X, WHOLE, PLAN, substeps, 1, 1, 64, CLOSED, "Sub-steps of a step, which share its iterations.")                   \
-    F(X, VECTOR, NUMBER, gravity, SADMM_NUMBERS(0, 0, -9.81), -1e6, 1e6, ANY,                                           \
-      "m/s^2, world frame; norm <= 1e6.")                                                                               \
-    F(X, METHOD, PLAN, method, SADMM_METHOD_FAST, 0, 1, ANY, "'fast' or 'paper'.")                                      \
-    F(X, WHOLE, PLAN, iterations, 20, 1, 1000000, CLOSED, "Iterations a step.")                                         \
-    F(X, REAL, NUMBER, relaxation, 1.8, 1, 2, BELOW, "Over-relaxation of 'fast'.")                                      \
-    F(X, WHOLE, PLAN, penalty_period, 30, 0, 2147483647, CLOSED,                                                        \
-      "'paper': iterations between penalty updates, 0: never.")                                                         \
-    F(X, REAL, NUMBER, penalty_mass_factor, 16, 0, 1e12, CLOSED, "'paper': M of eq. (13).")                             \
-    F(X, REAL, NUMBER, penalty_offset, 1e5, 0, 1e15, CLOSED, "'paper': c of eq. (13), kg/s^2.")                         \
-    F(X, REAL, NUMBER, penalty_ratio_limit, 4, 1, 1e6, CLOSED, "'paper': alpha of eq. (15).")                           \
-    F(X, FLAG, PLAN, penalty_update_warm, false, 0, 1, ANY, "'paper': also update in steps that start warm.")           \
-    F(X, FLAG, PLAN, warm_start, true, 0, 1, ANY, "Start from the last step's impulses and velocities.")                \
-    F(X, WHOLE, PLAN, ncp_points, 0, 0, 128, CLOSED,                                                                    \
-      "Islands with joints and at most so many contact points: dense contact solve (NCP); 0: none.")                     \
-    F(X, REAL, PLAN, residual_tolerance, 0, 0, 0, FROM, "Stop when both residuals are at most this; 0: never.")         \
-    F(X, REAL, NUMBER, certificate_tolerance, 0, 0, 0, FROM,                                                            \
-      "Stop when the natural map, m/s, is at most this; 0: never.")                                                     \
-    F(X, REAL, NUMBER, certificate_momentum_tolerance, 1e-6, 0, 0, ABOVE, "... and the relative momentum error this.")  \
-    F(X, WHOLE, PLAN, check_period, 10, 1, 1000000, CLOSED, "Iterations between convergence checks.")                   \
-    F(X, FLAG, PLAN, measure_residuals, false, 0, 1, ANY, "Report the residuals of the last iteration.")                \
-    F(X, FLAG, PLAN, certify, false, 0, 1, ANY, "Report the true error of every step.")                                 \
-    F(X, FLAG, PLAN, recover_wrenches, true, 0, 1, ANY, "Compute the contact wrench of every body.")                    \
-    F(X, REAL, NUMBER, correction_factor, 0.2, 0, 1, CLOSED, "Share of penetration that a (sub-)step removes.")      \
-    F(X, REAL, NUMBER, slop, 1e-5, 0, 1, CLOSED, "Penetration left alone, m.")                                          \
-    F(X, REAL, NUMBER, correction_speed, 1, 0, 1e3, CLOSED, "Cap of the corrective speed, m/s.")                        \
-    F(X, REAL, NUMBER, restitution_threshold, 0.1, 0, 0, FROM,                                                          \
-      "Approach speed under which restitution is ignored, m/s.")                                                        \
-    F(X, WHOLE, PLAN, hits, 16, 0, 64, CLOSED,                                                                          \
-      "Hits of a body in flight that are taken at their moments, at most, a (sub-)step; 0: the solve has all.")         \
+#define SADMM_SETTINGS(F, X)                                                                                           \
+    F(X, REAL, NUMBER, dt, 0.005, 1e-6, 1, CLOSED, "Time step, s.")                                                    \
+    F(X, WHOLE, PLAN, substeps, 1, 1, 64, CLOSED, "Sub-steps of a step, which share its iterations.")                  \
+    F(X, VECTOR, NUMBER, gravity, SADMM_NUMBERS(0, 0, -9.81), -1e6, 1e6, ANY,                                          \
+      "m/s^2, world frame; norm <= 1e6.")                                                                              \
+    F(X, METHOD, PLAN, method, SADMM_METHOD_FAST, 0, 1, ANY, "'fast' or 'paper'.")                                     \
+    F(X, WHOLE, PLAN, iterations, 20, 1, 1000000, CLOSED, "Iterations a step.")                                        \
+    F(X, REAL, NUMBER, relaxation, 1.8, 1, 2, BELOW, "Over-relaxation of 'fast'.")                                     \
+    F(X, WHOLE, PLAN, penalty_period, 30, 0, 2147483647, CLOSED,                                                       \
+      "'paper': iterations between penalty updates, 0: never.")                                                        \
+    F(X, REAL, NUMBER, penalty_mass_factor, 16, 0, 1e12, CLOSED, "'paper': M of eq. (13).")                            \
+    F(X, REAL, NUMBER, penalty_offset, 1e5, 0, 1e15, CLOSED, "'paper': c of eq. (13), kg/s^2.")                        \
+    F(X, REAL, NUMBER, penalty_ratio_limit, 4, 1, 1e6, CLOSED, "'paper': alpha of eq. (15).")                          \
+    F(X, FLAG, PLAN, penalty_update_warm, false, 0, 1, ANY, "'paper': also update in steps that start warm.")          \
+    F(X, FLAG, PLAN, warm_start, true, 0, 1, ANY, "Start from the last step's impulses and velocities.")               \
+    F(X, WHOLE, PLAN, ncp_points, 0, 0, 128, CLOSED,                                                                   \
+      "Islands with joints and at most so many contact points: dense contact solve (NCP); 0: none.")                   \
+    F(X, REAL, PLAN, residual_tolerance, 0, 0, 0, FROM, "Stop when both residuals are at most this; 0: never.")        \
+    F(X, REAL, NUMBER, certificate_tolerance, 0, 0, 0, FROM,                                                           \
+      "Stop when the natural map, m/s, is at most this; 0: never.")                                                    \
+    F(X, REAL, NUMBER, certificate_momentum_tolerance, 1e-6, 0, 0, ABOVE, "... and the relative momentum error this.") \
+    F(X, WHOLE, PLAN, check_period, 10, 1, 1000000, CLOSED, "Iterations between convergence checks.")                  \
+    F(X, FLAG, PLAN, measure_residuals, false, 0, 1, ANY, "Report the residuals of the last iteration.")               \
+    F(X, FLAG, PLAN, certify, false, 0, 1, ANY, "Report the true error of every step.")                                \
+    F(X, FLAG, PLAN, recover_wrenches, true, 0, 1, ANY, "Compute the contact wrench of every body.")                   \
+    F(X, REAL, NUMBER, correction_factor, 0.2, 0, 1, CLOSED, "Share of penetration that a (sub-)step removes.")        \
+    F(X, REAL, NUMBER, slop, 1e-5, 0, 1, CLOSED, "Penetration left alone, m.")                                         \
+    F(X, REAL, NUMBER, correction_speed, 1, 0, 1e3, CLOSED, "Cap of the corrective speed, m/s.")                       \
+    F(X, REAL, NUMBER, restitution_threshold, 0.1, 0, 0, FROM,                                                         \
+      "Approach speed under which restitution is ignored, m/s.")                                                       \
+    F(X, WHOLE, PLAN, hits, 16, 0, 64, CLOSED,                                                                         \
+      "Hits of a body in flight that are taken at their moments, at most, a (sub-)step; 0: the solve has all.")        \
     F(X, WHOLE, PLAN, threads, 0, 0, 1024, CLOSED, "CPU threads at most; 0: no bound. Results do not depend on it.")
 
 #define SADMM_DEFAULT_SETTINGS {SADMM_SETTINGS(SADMM_FIELD_DEFAULT, )}

@@ -16,10 +16,10 @@ SADMM_INLINE double contact_error(double separation, double dt, double correctio
     return separation >= 0 ? speed : pushed;
 }
 
-/* How much of gravity, which gives `pull` m/s a step, takes back the velocity that a push of this speed leaves. The push
- * shrinks by a share of itself each step, as the overlap does. Up to 1 gravity slows bodies down by as much: they follow
- * it, and have no velocity when nothing overlaps any more; what friction alone slows down ends within d / (2 mu), d the
- * overlap. */
+/* How much of gravity, which gives `pull` m/s a step, takes back the velocity that a push of this speed leaves. The
+ * push shrinks by a share of itself each step, as the overlap does. Up to 1 gravity slows bodies down by as much: they
+ * follow it, and have no velocity when nothing overlaps any more; what friction alone slows down ends within d / (2
+ * mu), d the overlap. */
 SADMM_INLINE double contact_push_takes(double speed, double correction_factor, double pull)
 {
     return pull > 0 ? correction_factor * speed / pull : INFINITY;

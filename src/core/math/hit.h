@@ -3,9 +3,9 @@
  *
  *     0 <= lambda_n  _|_  x_n+ - bounce >= 0,     |lambda_t| <= mu lambda_n, opposite to x_t+,     x+ = x- + G lambda
  *
- * bounce is epsilon times the speed of approach at points that approach faster than the threshold, 0 at slower ones, and
- * what parts may not come back faster than epsilon times that. Friction can make this law give energy (Kane's paradox,
- * impact.h): epsilon is then lowered to the largest value that does not. Double on every precision. */
+ * bounce is epsilon times the speed of approach at points that approach faster than the threshold, 0 at slower ones,
+ * and what parts may not come back faster than epsilon times that. Friction can make this law give energy (Kane's
+ * paradox, impact.h): epsilon is then lowered to the largest value that does not. Double on every precision. */
 #ifndef SADMM_MATH_HIT_H
 #define SADMM_MATH_HIT_H
 

@@ -5,8 +5,8 @@
  *
  *   resolved   slope s = 2/L^2 times the integral of T - T(q_0) over the way's length L, through (q_0, T(q_0)): the
  *              spring's work along the way to second order, kinks included
- *   stiff      (joint_late) the line of the steepest part of the way, bounded by the loads at those ends of the way that
- *              are not on it: a way over one kink is exact, however steep, and whatever the way really is
+ *   stiff      (joint_late) the line of the steepest part of the way, bounded by the loads at those ends of the way
+ *              that are not on it: a way over one kink is exact, however steep, and whatever the way really is
  *
  * y goes on from the rate before by what the spring's own load changes, taken at the step's end, against the row's own
  * response: it solves A y + B T(y) = C, which has one solution where T does not fall. */

@@ -1,5 +1,5 @@
-/* The larger and the smaller of two: double in every precision, a NaN is no number. Not fmax and fmin, which host compilers
- * make calls of, and which take another zero on a device. */
+/* The larger and the smaller of two: double in every precision, a NaN is no number. Not fmax and fmin, which host
+ * compilers make calls of, and which take another zero on a device. */
 #ifndef SADMM_MATH_MAX_H
 #define SADMM_MATH_MAX_H
 

@@ -244,7 +244,8 @@ SADMM_INLINE int momentum_find_free(const struct momentum_sums *s, struct moment
     return 1;
 }
 
-/* `s` loses its gram. Every static contact shows in the directions that its point does not move in; rows are counted. */
+/* `s` loses its gram. Every static contact shows in the directions that its point does not move in; rows are
+ * counted. */
 SADMM_INLINE void momentum_find_motions(struct momentum_sums *s, struct momentum_motions *out)
 {
     const double linear = s->gram[0] + s->gram[2] + s->gram[5];

@@ -84,8 +84,8 @@ SADMM_INLINE real rigid_half_tangent(real y)
  *
  *     I m - I w + h/2 m x I m = 0,    c = h/2 ((I_z - I_y) / I_x, (I_x - I_z) / I_y, (I_y - I_x) / I_z)
  *
- * By sweeps over the equations, two of which take the error down by (|c| |w|)^3: in a piece of a motion |c| |w| is 1/3 at
- * most. */
+ * By sweeps over the equations, two of which take the error down by (|c| |w|)^3: in a piece of a motion |c| |w| is 1/3
+ * at most. */
 SADMM_INLINE vec3 rigid_mean_spin(vec3 w, vec3 c)
 {
     const real rate = v3_max_abs(c) * v3_max_abs(w), faster = rate * rate * rate;
@@ -110,8 +110,8 @@ struct rigid_tumbling {
     vec3 own;
 };
 
-/* No less than the square of a body's angular velocity at any time of its motion without torque, times `scale`: by w.Iw and
- * |Iw|^2, which stay. Of a turn about the axis of the least or the largest moment it is that square. */
+/* No less than the square of a body's angular velocity at any time of its motion without torque, times `scale`: by w.Iw
+ * and |Iw|^2, which stay. Of a turn about the axis of the least or the largest moment it is that square. */
 SADMM_INLINE real rigid_rate2_scaled(vec3 inertia, real energy2, real momentum2, real *scale)
 {
     const real lo = real_min(inertia.x, real_min(inertia.y, inertia.z)),
@@ -134,8 +134,8 @@ SADMM_INLINE real rigid_pieces(vec3 inertia, real energy2, real momentum2, real 
     real scale, square = dt * dt * rigid_rate2_scaled(inertia, energy2, momentum2, &scale);
     return 4 * square > scale ? 2 * real_sqrt(square / scale) + 1 : 1;
 }
-/* The most that are made: what turns by more than that in a step has gone round too often to ask where it is by then, but
- * its energy and its angular momentum stay. */
+/* The most that are made: what turns by more than that in a step has gone round too often to ask where it is by then,
+ * but its energy and its angular momentum stay. */
 enum { RIGID_PIECES = 4096 };
 
 /* A piece of twice `half`: turned about the mean by 2 atan(half |m|). */
@@ -155,9 +155,10 @@ SADMM_RARE struct rigid_tumbling rigid_tumble_pieces(struct rigid_tumbling from,
     return from;
 }
 
-/* dt of motion without torque by the midpoint rule: the turn by 2 atan(h |m| / 2) about the mean m takes w to 2 m - w, which
- * has the same energy and in space the same angular momentum, to rounding. h is longer than the time by as much as makes
- * that the turn of the angle by which a body goes about a principal axis. By -dt it goes back to where it was. */
+/* dt of motion without torque by the midpoint rule: the turn by 2 atan(h |m| / 2) about the mean m takes w to 2 m - w,
+ * which has the same energy and in space the same angular momentum, to rounding. h is longer than the time by as much
+ * as makes that the turn of the angle by which a body goes about a principal axis. By -dt it goes back to where it
+ * was. */
 SADMM_ALWAYS_INLINE struct rigid_tumbling rigid_tumble_on(struct rigid_tumbling from, vec3 inertia, real dt)
 {
     const vec3 p = v3(inertia.x * from.own.x, inertia.y * from.own.y, inertia.z * from.own.z);

@@ -184,10 +184,10 @@ SADMM_INLINE double weight_separation_error(double error, double share, double s
 
 /* ---- B ----------------------------------------------------------------------------------------------------------- */
 
-/* The most that a point of a pair carries, kg, by how many constraints each of its bodies has (0: it is not dynamic) and
- * their masses. On a body that nothing else touches nothing rests: its pair carries no more than it, times what V may be
- * divided by. V is the island's, and says nothing of a light body that hits a heavy one: by that it would have the
- * weight of what is heavy, and pass on its momentum slower than there are iterations. */
+/* The most that a point of a pair carries, kg, by how many constraints each of its bodies has (0: it is not dynamic)
+ * and their masses. On a body that nothing else touches nothing rests: its pair carries no more than it, times what V
+ * may be divided by. V is the island's, and says nothing of a light body that hits a heavy one: by that it would have
+ * the weight of what is heavy, and pass on its momentum slower than there are iterations. */
 SADMM_INLINE double weight_most(const int constraints[2], const double mass[2], int points)
 {
     double most = HUGE_VAL;

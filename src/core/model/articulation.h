@@ -354,7 +354,8 @@ SADMM_INLINE bool articulation_yield_row(const struct articulation_view *v, int3
     const struct articulation_row *row = &v->rows[r];
     const double residual = articulation_row_residual(v, r, true, true);
     const bool down = residual > 0;
-    if (!(fabs(residual) > ARTICULATION_SLACK * (1 + fabs(row->bias))) || !isfinite(down ? row->lo : row->hi)) return false;
+    if (!(fabs(residual) > ARTICULATION_SLACK * (1 + fabs(row->bias))) || !isfinite(down ? row->lo : row->hi))
+        return false;
     articulation_put_state(v, r, down ? ROW_AT_LO : ROW_AT_HI);
     return true;
 }

@@ -2,9 +2,9 @@
  * couplings"), for a host that makes steps and a device that does. In double.
  *
  * Where a dynamic body carries the axles of both joints, that sum is a row on three bodies, and rows are on two. But
- * the joints' locked rows may be added to it, each as often as one likes: they hold anyway, and so does their sum with it.
- * They are added so that nothing is left on the carrier. What they stand for is the teeth: what presses wheel on wheel,
- * while the bearings hold the carrier. */
+ * the joints' locked rows may be added to it, each as often as one likes: they hold anyway, and so does their sum with
+ * it. They are added so that nothing is left on the carrier. What they stand for is the teeth: what presses wheel on
+ * wheel, while the bearings hold the carrier. */
 #ifndef SADMM_CORE_MODEL_GEAR_LAW_H
 #define SADMM_CORE_MODEL_GEAR_LAW_H
 

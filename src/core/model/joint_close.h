@@ -50,10 +50,11 @@ SADMM_INLINE bool joint_opens_little(const sadmm_joint_def *def, const struct jo
     return off * off <= JOINT_CLOSE_FROM * JOINT_CLOSE_FROM * arms2 && joint_turns_little(&end[0], &end[1], def->locks);
 }
 
-/* Is a pose in which a loop may fold within so many steps? There a row says what others say, and near it the root of what
- * is left of it grows as the way to that pose. was, now: articulation_left of the row in the last step and in this one.
- * Rows that say the same in any pose (a plane mechanism of hinges) are left with what their errors make, 1e-6 at most.
- * Within two steps rows of ten windows at 12.5 ms are seen too late once in 10 s, and lose a third of their energy. */
+/* Is a pose in which a loop may fold within so many steps? There a row says what others say, and near it the root of
+ * what is left of it grows as the way to that pose. was, now: articulation_left of the row in the last step and in this
+ * one. Rows that say the same in any pose (a plane mechanism of hinges) are left with what their errors make, 1e-6 at
+ * most. Within two steps rows of ten windows at 12.5 ms are seen too late once in 10 s, and lose a third of their
+ * energy. */
 #define JOINT_FOLDS_WITHIN  3
 #define JOINT_SAYS_THE_SAME 1e-6
 

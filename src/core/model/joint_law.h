@@ -268,7 +268,8 @@ struct joint_moving {
     double turning;       /* what the row's rate halfway is more, before anything acts: axes, arms and bodies turn */
     double turned;        /* what the rate at the end is more than the row's, so far as the law counts it */
     double prescribed;    /* the rate due to sides of prescribed motion */
-    bool turns;           /* by more than a step resolves: its bodies will be moved by the velocities of the step's end, */
+    bool turns;           /* by more than a step resolves: its bodies will be moved by the velocities of the step's
+                             end, */
     bool late;            /* as they were in the last step, too */
     double reach;         /* it may move by so much */
     double response;
@@ -288,9 +289,9 @@ SADMM_INLINE void joint_add_law(struct joint_laws *laws, const struct joint_movi
                : role == SADMM_ROLE_LOWER || role == SADMM_ROLE_UPPER ? 2 * m->dt * fabs(m->turning) : 0;
 }
 
-/* Half a step resolves turning by up to this many rad. Beyond it positions that move by means of velocities gain energy:
- * what turns by an angle t in half a step, with a share s of its speed in points that are off its axis, gains as
- * (s t^2)^2 (docs/internals/algorithm.md, "Large turns"). */
+/* Half a step resolves turning by up to this many rad. Beyond it positions that move by means of velocities gain
+ * energy: what turns by an angle t in half a step, with a share s of its speed in points that are off its axis, gains
+ * as (s t^2)^2 (docs/internals/algorithm.md, "Large turns"). */
 #define JOINT_MOST_TURN 0.05
 /* What rounding makes of speeds is no turning. */
 #define JOINT_NO_TURN 1e-9
@@ -322,7 +323,8 @@ SADMM_INLINE bool joint_turns(const struct acting_joint *acting, int k, bool rad
                                    JOINT_NO_TURN * (v3_norm(turn_a) + v3_norm(turn_b));
     if (radial && k == 0) arm = v3_madd(arm, -g->value[0], g->axis[0]); /* to a's own point */
     around_a = v3_cross(turn_a, arm);
-    if (!(radial && k == 0)) { /* most rows: what the bodies' own spin and the point's speed add is not needed to say no */
+    if (!(radial && k == 0)) { /* most rows: what the bodies' own spin and the point's speed add is not needed to say
+                                  no */
         const double half = dt / 2 * turning, most = JOINT_MOST_TURN * JOINT_MOST_TURN;
         if (half * half * max_of(v3_norm2(turn_a), v3_norm2(turn_b)) <=
             most * most * (v3_norm2(around_a) + v3_norm2(around_b)))

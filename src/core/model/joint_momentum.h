@@ -15,8 +15,9 @@
 #include "system_math.h"
 
 /* Is there something to restore? bits: of an island, but for ISLAND_ANCHORED where that is not known yet. What nothing
- * touches has it already, but where the stiffness of joints holds on to some, or they have been closed; and what hangs on
- * rows that turn by more than a step resolves (joint_law.h) has neither its impulses nor its weight where they act. */
+ * touches has it already, but where the stiffness of joints holds on to some, or they have been closed; and what hangs
+ * on rows that turn by more than a step resolves (joint_law.h) has neither its impulses nor its weight where they
+ * act. */
 SADMM_INLINE bool joint_island_is_floating(int bits)
 {
     if (!(bits & ISLAND_ARTICULATED) || bits & ISLAND_ANCHORED) return false;
@@ -24,8 +25,8 @@ SADMM_INLINE bool joint_island_is_floating(int bits)
     return (bits & (ISLAND_TOUCHED | ISLAND_TRAPEZOID_OFF | ISLAND_STRAYS | ISLAND_CLOSED)) != 0;
 }
 
-/* Sums over an island; then what restores it: velocities times `factor`, the rigid motion in sums.now, and what all of it
- * is moved by. */
+/* Sums over an island; then what restores it: velocities times `factor`, the rigid motion in sums.now, and what all of
+ * it is moved by. */
 struct joint_momentum {
     struct momentum_sums sums;
     double energy, free_energy; /* twice the kinetic energy: at the end; of free motion, b . A^-1 b */

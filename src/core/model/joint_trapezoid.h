@@ -27,9 +27,9 @@ enum {
     ISLAND_CLOSED = 512
 };
 
-/* Joints of such islands may be opened by more than the order of the step: it is loaded beyond what explicit forces bear
- * (stiffening.h), or a row turns by more than a step resolves. Others are not closed (joint_close.h), since a body that is
- * moved to close a joint has another orientation for its spin. */
+/* Joints of such islands may be opened by more than the order of the step: it is loaded beyond what explicit forces
+ * bear (stiffening.h), or a row turns by more than a step resolves. Others are not closed (joint_close.h), since a body
+ * that is moved to close a joint has another orientation for its spin. */
 SADMM_INLINE bool joint_island_may_open(int bits) { return (bits & (ISLAND_STRAYS | ISLAND_TURNS)) != 0; }
 
 /* A body as the step ends. */

@@ -30,8 +30,8 @@ sadmm_settings sadmm_settings_of_substep(const struct sadmm_settings *whole);
 bool sadmm_settings_equal(const struct sadmm_settings *a, const struct sadmm_settings *b);
 
 /* Settings are of two kinds (core/base/settings_fields.h). Numbers are what formulas read: they may change from step to
- * step, and a backend keeps them as data. The rest says what a step consists of: how many iterations in which order, what
- * is checked, measured, kept. */
+ * step, and a backend keeps them as data. The rest says what a step consists of: how many iterations in which order,
+ * what is checked, measured, kept. */
 void sadmm_settings_numbers(const struct sadmm_settings *settings, double numbers[SADMM_SETTING_NUMBERS]);
 /* Do steps of both consist of the same? (A tolerance, or a limit of the penalty's update, counts by whether there is
  * one.) */

@@ -25,8 +25,8 @@ SADMM_INLINE struct rigid_spin spin_halfway(const struct sadmm_rigid *body, doub
     return rigid_drift(spin_start(body), v3_load(body->inertia), dt / 2);
 }
 
-/* What the spin of a body that rolls (rolling.h) changes by from there to the step's end without a torque, to first order;
- * momentum: angular, in the world. Of others 0. */
+/* What the spin of a body that rolls (rolling.h) changes by from there to the step's end without a torque, to first
+ * order; momentum: angular, in the world. Of others 0. */
 SADMM_INLINE vec3 spin_ahead(const struct sadmm_rigid *body, quat halfway, vec3 momentum, double dt)
 {
     const vec3 inertia = v3_load(body->inertia);
@@ -127,8 +127,8 @@ SADMM_INLINE struct rigid_spin spin_end_whole(const struct sadmm_rigid *body, co
     return spin_turned_whole(end, rigid_turn(q_load(body->orientation), v3_load(spin), dt));
 }
 
-/* The pose and the velocity that the solution v leaves it with. mean: what it is moved by, and turned, where moments are
- * equal; halfway: its orientation then, read where they differ; whole: the correction is off. */
+/* The pose and the velocity that the solution v leaves it with. mean: what it is moved by, and turned, where moments
+ * are equal; halfway: its orientation then, read where they differ; whole: the correction is off. */
 SADMM_INLINE void spin_move_from(const struct sadmm_rigid *body, const double halfway[4], const double v[6],
                                  const double mean[6], bool whole, double dt, double position[3],
                                  double orientation[4], double velocity[6])

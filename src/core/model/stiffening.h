@@ -4,10 +4,10 @@
  *
  *     K = (F . r) (1 - r r^T / |r|^2)
  *
- * for what of F is along r. A step takes forces in the directions that they have halfway by the velocities at its start.
- * Where K dt^2 / 4 is not small beside the inertia, it is added to the inertia that the change of velocity is found with:
- * that is to take the torque halfway by the mean of the velocities at both ends, the implicit midpoint rule, which is
- * stable for any K. In double. */
+ * for what of F is along r. A step takes forces in the directions that they have halfway by the velocities at its
+ * start. Where K dt^2 / 4 is not small beside the inertia, it is added to the inertia that the change of velocity is
+ * found with: that is to take the torque halfway by the mean of the velocities at both ends, the implicit midpoint
+ * rule, which is stable for any K. In double. */
 #ifndef SADMM_CORE_MODEL_STIFFENING_H
 #define SADMM_CORE_MODEL_STIFFENING_H
 

@@ -32,14 +32,15 @@ struct sadmm_rigid {
     double gravity_scale;   /* of the settings' gravity */
     double damping[2];      /* linear, angular, 1/s (forces.h) */
     int32_t mean;           /* it moved by the mean of its velocities before the last step and after it */
-    int32_t rolls;          /* which of owed and stiffness are of account: enum rolling_kept; the others may be anything */
-    int32_t was_hit;        /* it was hit within the step (world/hits.c): its start is one from which the velocity that it
-                               ends with takes it to where it is then, and has no trapezoid correction
+    int32_t rolls;          /* which of owed and stiffness are of account: enum rolling_kept; the others may be
+                               anything */
+    int32_t was_hit;        /* it was hit within the step (world/hits.c): its start is one from which the velocity that
+                               it ends with takes it to where it is then, and has no trapezoid correction
                                (math/trapezoid.h) */
     int32_t reserved;
     double owed[6];         /* of the last step's contacts that rolled, N s, N m s, world (rolling.h) */
-    double stiffness[6];    /* that no step resolves, N m: xx, yy, zz, xy, xz, yz, world: against rocking (rolling.h), and
-                               in a step what joints give (stiffening.h) */
+    double stiffness[6];    /* that no step resolves, N m: xx, yy, zz, xy, xz, yz, world: against rocking (rolling.h),
+                               and in a step what joints give (stiffening.h) */
 };
 
 /* The changes of velocity of a body's last steps (extrapolation.h). */

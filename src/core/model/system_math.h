@@ -24,7 +24,8 @@ SADMM_INLINE sym3 sadmm_stiffness(const struct sadmm_rigid *body, double dt)
     return more;
 }
 
-/* Its inertia with that; b, which is made of this angular velocity, along with it: what is added resists changes alone. */
+/* Its inertia with that; b, which is made of this angular velocity, along with it: what is added resists changes
+ * alone. */
 SADMM_INLINE sym3 sadmm_stiffened(const struct sadmm_rigid *body, vec3 angular, double dt, sym3 I, double b[6])
 {
     const sym3 more = sadmm_stiffness(body, dt);
@@ -33,8 +34,8 @@ SADMM_INLINE sym3 sadmm_stiffened(const struct sadmm_rigid *body, vec3 angular, 
 }
 
 /* Eq. (1) of a rigid body: A = diag(m I, world inertia) halfway through the step (spin: spin_of_system) and b = A v +
- * dt (m g + f, tau), with damping (forces.h), and what contacts that roll owe it. stiffens: its stiffness counts. Returns the
- * inertia; *mass: of A. */
+ * dt (m g + f, tau), with damping (forces.h), and what contacts that roll owe it. stiffens: its stiffness counts.
+ * Returns the inertia; *mass: of A. */
 SADMM_INLINE sym3 sadmm_rigid_body_by(const struct sadmm_rigid *body, const struct spin_system *spin, bool stiffens,
                                       const struct sadmm_settings *settings, double *mass, double b[6])
 {

@@ -60,10 +60,10 @@ void sadmm_articulations_find_left(const struct sadmm_articulations *articulatio
 /* Marks all bodies (of the system) of parts that have a marked one. */
 void sadmm_articulations_mark_parts(const struct sadmm_articulations *articulations, uint8_t *bodies);
 
-/* Moves `bodies` (what the step has made of the system's), of parts that have one of `opened`, by the least displacements,
- * weighed by A, that take away the errors (biases) of system->rows, which are hard. speeds: velocities are changed
- * instead of poses, by the least that gives the rows the rates that biases ask for. Parts that cannot be solved stay.
- * slots: as above. Errors: OUT_OF_MEMORY. */
+/* Moves `bodies` (what the step has made of the system's), of parts that have one of `opened`, by the least
+ * displacements, weighed by A, that take away the errors (biases) of system->rows, which are hard. speeds: velocities
+ * are changed instead of poses, by the least that gives the rows the rates that biases ask for. Parts that cannot be
+ * solved stay. slots: as above. Errors: OUT_OF_MEMORY. */
 sadmm_status sadmm_articulations_close(struct sadmm_articulations *articulations, const struct sadmm_system *system,
                                        const struct sadmm_row_constraint *slots, size_t slot_count,
                                        const struct sadmm_settings *settings, const uint8_t *opened, bool speeds,

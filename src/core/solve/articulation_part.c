@@ -91,8 +91,8 @@ double sadmm_articulation_part_scale(const struct articulation_part *part, int32
     return articulation_scale_of(own[0], own[1]);
 }
 
-/* Rows that left their bounds, or are at them against their law: did any change its state? one: the first of them alone,
- * which comes to an end where all at once go round in circles (Murty, 1974). */
+/* Rows that left their bounds, or are at them against their law: did any change its state? one: the first of them
+ * alone, which comes to an end where all at once go round in circles (Murty, 1974). */
 static bool change_rows(const struct articulation_view *v, bool one)
 {
     bool changed = false;
@@ -101,8 +101,8 @@ static bool change_rows(const struct articulation_view *v, bool one)
     return changed;
 }
 
-/* In a tree a row that says what another one says has no multiplier. If it asks for another rate, it goes to the bound that
- * pulls there: friction that a motor moves against. Did any? */
+/* In a tree a row that says what another one says has no multiplier. If it asks for another rate, it goes to the bound
+ * that pulls there: friction that a motor moves against. Did any? */
 static bool yield_rows(const struct articulation_part *part)
 {
     bool changed = false;

@@ -64,8 +64,8 @@ struct sadmm_articulations {
 void sadmm_articulation_part_load(struct articulation_part *part, const struct sadmm_system *system,
                                   const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots);
 
-/* For G (ncp.h): the sparse factor with rows in their states; multipliers of rows inside their bounds, for what the others
- * are. again: from what they are. */
+/* For G (ncp.h): the sparse factor with rows in their states; multipliers of rows inside their bounds, for what the
+ * others are. again: from what they are. */
 void sadmm_articulation_part_factorize(struct articulation_part *part);
 void sadmm_articulation_part_solve_rows(const struct articulation_part *part, bool again);
 

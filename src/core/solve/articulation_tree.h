@@ -1,9 +1,9 @@
 /* The block direct solve of an articulation that is a tree: Featherstone's articulated bodies (Rigid Body Dynamics
- * Algorithms, 2008, chapter 7), in velocities of the bodies. Work and memory grow with the bodies, nothing fills in, and
- * locks need no regularisation.
+ * Algorithms, 2008, chapter 7), in velocities of the bodies. Work and memory grow with the bodies, nothing fills in,
+ * and locks need no regularisation.
  *
- * A node is a body with the joint to its parent, which is nearer to the root. What the joint locks leaves free directions
- * S of the motion past the parent:
+ * A node is a body with the joint to its parent, which is nearer to the root. What the joint locks leaves free
+ * directions S of the motion past the parent:
  *
  *     v = X v_parent + S q + s         X: rigidly along with the parent; s: what meets the locks
  *     D q = S^T (p - A (X v_parent + s)) + the laws of other rows        D = S^T A S + those laws; H: its inverse, with
@@ -43,7 +43,9 @@ struct articulation_node {
 };
 
 /* What a row is to its node. */
-enum articulation_role { ARTICULATION_NONE, ARTICULATION_LOCK, ARTICULATION_SOFT, ARTICULATION_HARD, ARTICULATION_LEFT };
+enum articulation_role {
+    ARTICULATION_NONE, ARTICULATION_LOCK, ARTICULATION_SOFT, ARTICULATION_HARD, ARTICULATION_LEFT
+};
 
 struct articulation_tree {
     int32_t nodes;                  /* 0: it is no tree */
@@ -64,8 +66,8 @@ struct articulation_tree {
 void sadmm_articulation_tree_make(const struct articulation_structure *s, int32_t *queue, int32_t *parent,
                                   struct articulation_tree *tree);
 
-/* Of this call's rows. slots: as of sadmm_articulations_solve. False: the tree cannot solve them. Rows are no wrenches at
- * points of space (gears), or locks are not those of one joint. */
+/* Of this call's rows. slots: as of sadmm_articulations_solve. False: the tree cannot solve them. Rows are no wrenches
+ * at points of space (gears), or locks are not those of one joint. */
 bool sadmm_articulation_tree_begin(struct articulation_tree *tree, const struct articulation_view *v,
                                    const struct sadmm_row_constraint *slots);
 
@@ -79,18 +81,19 @@ static inline bool sadmm_articulation_tree_leaves(const struct articulation_tree
     return v->state[r] == ROW_INSIDE && tree->role[r] == ARTICULATION_LEFT;
 }
 
-/* Changes of the velocities, and of the multipliers of rows inside their bounds, for loads v->residual and what the other
- * rows are. again: from what they are, by what is left (iterative refinement). */
+/* Changes of the velocities, and of the multipliers of rows inside their bounds, for loads v->residual and what the
+ * other rows are. again: from what they are, by what is left (iterative refinement). */
 void sadmm_articulation_tree_solve(const struct articulation_tree *tree, const struct articulation_view *v, bool again);
 
 /* The node whose joint has row r. */
-int32_t sadmm_articulation_tree_node(const struct articulation_tree *tree, const struct articulation_view *v, int32_t r);
+int32_t sadmm_articulation_tree_node(const struct articulation_tree *tree, const struct articulation_view *v,
+                                     int32_t r);
 
 /* The largest residual of a row inside its bounds after that, m/s or rad/s. */
 double sadmm_articulation_tree_residual(const struct articulation_tree *tree, const struct articulation_view *v);
 
-/* A load on its way to the root, at a node. load (6): on its body, with what its child has handed on; then what it hands on
- * to its parent. along: what acts along S besides, NULL: nothing does. z, response: S^T p, and H S^T p. */
+/* A load on its way to the root, at a node. load (6): on its body, with what its child has handed on; then what it
+ * hands on to its parent. along: what acts along S besides, NULL: nothing does. z, response: S^T p, and H S^T p. */
 void sadmm_articulation_tree_pass(const struct articulation_node *node, double load[6], const double *along,
                                   double z[6], double response[6]);
 

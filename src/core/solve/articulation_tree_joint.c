@@ -27,8 +27,8 @@ static bool add_lock(const struct articulation_tree *tree, struct articulation_n
     return true;
 }
 
-/* Rows that nothing gives way to. False: some are no locks of one joint. Those of two joints between the same bodies say
- * the same, and share their loads by the regularisation of the sparse factor. */
+/* Rows that nothing gives way to. False: some are no locks of one joint. Those of two joints between the same bodies
+ * say the same, and share their loads by the regularisation of the sparse factor. */
 static bool find_locks(const struct articulation_tree *tree, struct articulation_node *node,
                        const struct articulation_view *v)
 {

@@ -1,18 +1,18 @@
 /* The dense contact solve (NCP) of small islands with joints: contacts and joints at once, to rounding.
  *
  * An iteration brings the loads of mechanisms along one contact at a time, and may cycle where rows resist what
- * contacts push. So before the first iteration, and after the last one what is not solved by then, an island with joints
- * and at most settings->ncp_points contact points, whose natural map or momentum is off by more than 1e-9 m/s, is solved
- * as a whole:
+ * contacts push. So before the first iteration, and after the last one what is not solved by then, an island with
+ * joints and at most settings->ncp_points contact points, whose natural map or momentum is off by more than 1e-9 m/s,
+ * is solved as a whole:
  *
  *     G = J_c (A - rows)^-1 J_c^T, dense: the response of its contacts to each other, with rows in their present states
  *     contacts by semismooth Newton steps, where need be from an interior point (ncp_newton.h)
  *     rows again by those impulses; one that changes its state is active from then on: one more number of G
  *
- * until no row changes. Where that ends without a solution, or with one that throws bodies about, contacts give by a share
- * of their response, from impulses of 0. What is neither is taken where it is nearer to the laws; else all stays as it is.
- * Islands that are solved before the first iteration need none, and keep their solution through those of others. In
- * double. Islands are independent of each other. */
+ * until no row changes. Where that ends without a solution, or with one that throws bodies about, contacts give by a
+ * share of their response, from impulses of 0. What is neither is taken where it is nearer to the laws; else all stays
+ * as it is. Islands that are solved before the first iteration need none, and keep their solution through those of
+ * others. In double. Islands are independent of each other. */
 #ifndef SADMM_CORE_SOLVE_NCP_H
 #define SADMM_CORE_SOLVE_NCP_H
 
@@ -42,8 +42,8 @@ struct sadmm_ncp_input {
 /* A (sub-)step begins. */
 void sadmm_ncp_begin(struct sadmm_ncp *ncp);
 
-/* Before the iterations. all: every island is solved, those without constraints, too. solved: islands that have changed.
- * Errors: OUT_OF_MEMORY, nothing has changed. */
+/* Before the iterations. all: every island is solved, those without constraints, too. solved: islands that have
+ * changed. Errors: OUT_OF_MEMORY, nothing has changed. */
 sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, bool *all, int32_t *solved,
                              struct sadmm_error *error);
 

@@ -95,7 +95,7 @@ static bool scale_cone(struct cone *c, const double x[3])
     return true;
 }
 
-/* ---- the problem -------------------------------------------------------------------------------------------------- */
+/* ---- the problem ------------------------------------------------------------------------------------------------- */
 
 static void find_velocities(struct interior *s)
 {
@@ -189,7 +189,7 @@ static void measure(struct interior *s)
     s->gap /= s->degree > 0 ? s->degree : 1;
 }
 
-/* ---- a step ------------------------------------------------------------------------------------------------------- */
+/* ---- a step ------------------------------------------------------------------------------------------------------ */
 
 /* (G + s's derivative + W^-2) dx = right: a dual's step is eliminated. */
 static bool make_matrix(struct interior *s)

@@ -50,8 +50,8 @@ struct sadmm_ncp {
     size_t kept_capacity, first_node_capacity, passed_capacity, passed_at_capacity, passed_count_capacity;
     uint8_t *states;           /* SADMM_MAX_ROWS a column, of the parts one after the other: those that G is for */
     size_t label_capacity, number_capacity, body_list_capacity, points_capacity, first_capacity, kind_capacity,
-        pair_list_capacity, body_capacity, contact_capacity, law_capacity, part_capacity, numbers_capacity, row_capacity,
-        state_capacity;
+        pair_list_capacity, body_capacity, contact_capacity, law_capacity, part_capacity, numbers_capacity,
+        row_capacity, state_capacity;
 };
 
 /* Of islands: they have rows; are the iterations'; are solved. */
@@ -99,9 +99,9 @@ bool sadmm_ncp_make_lists(struct sadmm_ncp *d, const struct sadmm_ncp_input *inp
 /* Is it one that the dense contact solve takes, and not solved yet? */
 bool sadmm_ncp_takes(const struct sadmm_ncp *d, int32_t label, const struct sadmm_settings *settings);
 bool sadmm_ncp_is_solved(const struct sadmm_ncp *d, int32_t body_a, int32_t body_b);
-/* Before the iterations: islands without contacts whose rows the block solve has solved, and bodies without either, which
- * are given A^-1 b; whether every other one may be solved, too, else those without joints are left to the iterations, which
- * would not be spared. */
+/* Before the iterations: islands without contacts whose rows the block solve has solved, and bodies without either,
+ * which are given A^-1 b; whether every other one may be solved, too, else those without joints are left to the
+ * iterations, which would not be spared. */
 void sadmm_ncp_choose_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input);
 /* Backends move bodies without joints by what their iterations end with. */
 void sadmm_ncp_leave_to_iterations(struct sadmm_ncp *d, const struct sadmm_system *system);

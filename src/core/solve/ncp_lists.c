@@ -11,8 +11,8 @@ static int32_t island_of(const struct sadmm_ncp *d, int32_t body_a, int32_t body
     return d->label[body_a >= 0 ? body_a : body_b];
 }
 
-/* Lists by island, ascending: its bodies from the first one, which is its label, its pairs. Last ones are kept meanwhile
- * in `number` and `points`. */
+/* Lists by island, ascending: its bodies from the first one, which is its label, its pairs. Last ones are kept
+ * meanwhile in `number` and `points`. */
 static void list_islands(struct sadmm_ncp *d, const struct sadmm_system *system)
 {
     const struct sadmm_contact_set *contacts = system->contacts;
@@ -31,9 +31,9 @@ static void list_islands(struct sadmm_ncp *d, const struct sadmm_system *system)
     }
 }
 
-/* What is known of them: how many points they have, and whether they are whole parts with rows and nothing else has rows.
- * Constraints may be left out of parts (articulation.h), and parts be connected by constraints that have no rows at the
- * time: a slack rope. Such islands are left to the iteration. Rows without a part are counted in `number`. */
+/* What is known of them: how many points they have, and whether they are whole parts with rows and nothing else has
+ * rows. Constraints may be left out of parts (articulation.h), and parts be connected by constraints that have no rows
+ * at the time: a slack rope. Such islands are left to the iteration. Rows without a part are counted in `number`. */
 static void describe_islands(struct sadmm_ncp *d, const struct sadmm_articulations *articulations,
                              const struct sadmm_system *system, const struct sadmm_row_constraint *slots)
 {
@@ -54,7 +54,8 @@ static void describe_islands(struct sadmm_ncp *d, const struct sadmm_articulatio
         const int32_t label = d->label[s->body[0]];
         if (d->number[label] > 0) d->kind[label] |= ISLAND_ARTICULATED;
         for (int32_t e = 1; e < s->bodies; ++e)
-            if (d->label[s->body[e]] != label) d->kind[label] |= ISLAND_LEFT, d->kind[d->label[s->body[e]]] |= ISLAND_LEFT;
+            if (d->label[s->body[e]] != label)
+                d->kind[label] |= ISLAND_LEFT, d->kind[d->label[s->body[e]]] |= ISLAND_LEFT;
         for (int32_t p = 0; p < s->columns; ++p) d->number[label] -= slots[s->constraint[p]].count;
     }
     for (size_t i = 0; i < n; ++i)
@@ -169,7 +170,8 @@ void sadmm_ncp_take_kept(const struct sadmm_ncp *d, const struct sadmm_system *s
 {
     const size_t numbers = 6 * (size_t)system->body_count, rows = system->rows->row_count;
     for (int32_t i = 0; i < system->body_count; ++i)
-        if (sadmm_ncp_is_solved(d, i, i)) memcpy(system->velocity + 6 * (size_t)i, d->kept + 6 * (size_t)i, 6 * sizeof *d->kept);
+        if (sadmm_ncp_is_solved(d, i, i))
+            memcpy(system->velocity + 6 * (size_t)i, d->kept + 6 * (size_t)i, 6 * sizeof *d->kept);
     for (size_t k = 0; k < system->rows->constraint_count; ++k) {
         const struct sadmm_row_constraint *c = &system->rows->constraints[k];
         if (sadmm_ncp_is_solved(d, c->body_a, c->body_b))
@@ -178,7 +180,8 @@ void sadmm_ncp_take_kept(const struct sadmm_ncp *d, const struct sadmm_system *s
     }
     for (size_t p = 0; p < system->contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &system->contacts->pairs[p];
-        for (int32_t k = pair->first; sadmm_ncp_is_solved(d, pair->body_a, pair->body_b) && k < pair->first + pair->count; ++k)
+        for (int32_t k = pair->first;
+             sadmm_ncp_is_solved(d, pair->body_a, pair->body_b) && k < pair->first + pair->count; ++k)
             memcpy(system->contacts->points[k].impulse, d->kept + numbers + rows + 3 * (size_t)k,
                    3 * sizeof *d->kept);
     }

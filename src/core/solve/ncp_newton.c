@@ -8,9 +8,9 @@
 /* Steps from where the iterations are, which is what most problems need, and from an interior point. */
 enum { STEPS_FROM_START = 20, STEPS_FROM_INTERIOR = 200, STEPS_IN_TURN = 50 };
 /* What is added to the diagonal of a step's matrix, whose entries are shares of a law's own response: `share` of the
- * natural map, by the size of velocities, within bounds. It keeps impulses that do the same from running away; along those
- * a step finds rounding / `least`. In turn, since no one of them suits all: a rag doll at rest takes the first, the many
- * contacts of a bridge's plank the second. */
+ * natural map, by the size of velocities, within bounds. It keeps impulses that do the same from running away; along
+ * those a step finds rounding / `least`. In turn, since no one of them suits all: a rag doll at rest takes the first,
+ * the many contacts of a bridge's plank the second. */
 static const struct damping {
     double share, least, most;
 } damping[] = {{100, 1e-8, 1e-5}, {1, 1e-10, 1e-3}};
@@ -49,7 +49,8 @@ static struct newton newton_of(struct ncp_dense *d)
     return s;
 }
 
-/* Numbers that their law fixes go where it has them: an open contact's to 0. The others are listed, to be solved for. */
+/* Numbers that their law fixes go where it has them: an open contact's to 0. The others are listed, to be solved
+ * for. */
 static void sort_numbers(struct newton *s)
 {
     const struct ncp_dense *d = s->d;

@@ -5,7 +5,7 @@
 #include "core/math/ldl6.h"
 #include "ncp_island.h"
 
-/* ---- of trees ------------------------------------------------------------------------------------------------------ */
+/* ---- of trees ---------------------------------------------------------------------------------------------------- */
 
 static int32_t node_of(const struct island *s, int32_t number, int32_t *part)
 {
@@ -127,7 +127,7 @@ static void make_tree_responses(struct island *s, double *G)
     }
 }
 
-/* ---- by the sparse factor ------------------------------------------------------------------------------------------ */
+/* ---- by the sparse factor ---------------------------------------------------------------------------------------- */
 
 /* Rows of a part respond to impulses alone, from rest, in their present states. */
 static void make_linear(const struct articulation_view *v)
@@ -243,7 +243,7 @@ static void make_sparse_responses(struct island *s, double *G)
     }
 }
 
-/* ---- of an island -------------------------------------------------------------------------------------------------- */
+/* ---- of an island ------------------------------------------------------------------------------------------------ */
 
 static bool are_trees(const struct island *s)
 {

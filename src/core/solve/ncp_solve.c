@@ -17,17 +17,17 @@ static const double ENOUGH = 1e-9, AIM = 1e-10, NEWTON_AIM = 1e-13;
 static const double REGULARISATION = 3e-12;
 /* Multiplications for a search, so that one that does not come to an end takes some 10 ms. */
 static const double BUDGET = 4e7;
-/* Contacts that cannot be met give by this share of their response: a body's own weight by 0.5 mm/s in a step of 5 ms. Of
- * 600 mechanisms that begin in overlap (python/tests/test_mechanisms.py 600) 15 end above 20 m/s, with 1e-3 29, with 1e-4
- * 82. */
+/* Contacts that cannot be met give by this share of their response: a body's own weight by 0.5 mm/s in a step of 5 ms.
+ * Of 600 mechanisms that begin in overlap (python/tests/test_mechanisms.py 600) 15 end above 20 m/s, with 1e-3 29, with
+ * 1e-4 82. */
 static const double GIVES = 1e-2;
-/* A solution of so many times the energy that is expected is held against that of contacts that give: where bodies are all
- * but wedged, the one throws them about, and the other has less than half its energy. */
+/* A solution of so many times the energy that is expected is held against that of contacts that give: where bodies are
+ * all but wedged, the one throws them about, and the other has less than half its energy. */
 static const double MOST_ENERGY = 10;
 /* How many times larger than those they replace impulses may be that are no solution. */
 static const double MOST_GROWTH = 4;
-/* How often it goes from contacts to rows and back, in all and without coming nearer though no row changed; and passes of
- * the inner rows. */
+/* How often it goes from contacts to rows and back, in all and without coming nearer though no row changed; and passes
+ * of the inner rows. */
 enum { MOST_ROUNDS = 40, MOST_IDLE = 4, MOST_PASSES = 6 };
 
 struct sadmm_ncp *sadmm_ncp_create(void)
@@ -45,7 +45,7 @@ void sadmm_ncp_destroy(struct sadmm_ncp *d)
     sadmm_free(d);
 }
 
-/* ---- an island's contacts and bodies ------------------------------------------------------------------------------ */
+/* ---- an island's contacts and bodies ----------------------------------------------------------------------------- */
 
 static void add_body(struct island *s, int32_t i)
 {
@@ -107,7 +107,7 @@ static void find_contact_velocities(struct island *s)
     }
 }
 
-/* ---- what the iterations have left -------------------------------------------------------------------------------- */
+/* ---- what the iterations have left ------------------------------------------------------------------------------- */
 
 static void add_row_loads(struct island *s, const struct articulation_view *v)
 {
@@ -149,7 +149,7 @@ static double momentum_residual(struct island *s)
     return most;
 }
 
-/* ---- velocities and rows for given impulses ----------------------------------------------------------------------- */
+/* ---- velocities and rows for given impulses ---------------------------------------------------------------------- */
 
 /* To single bodies with what acts on them besides, to parts alone: they add the rest when they are loaded. */
 static void put_loads(struct island *s)
@@ -163,7 +163,8 @@ static void put_loads(struct island *s)
     for (int32_t k = 0; k < s->parts; ++k) {
         struct articulation_part *part = part_of(s, k);
         for (int32_t e = 0; e < part->view.s.bodies; ++e)
-            memcpy(part->impulse + 6 * (size_t)e, s->d->bodies[s->d->number[part->view.s.body[e]]].dv, 6 * sizeof(double));
+            memcpy(part->impulse + 6 * (size_t)e, s->d->bodies[s->d->number[part->view.s.body[e]]].dv,
+                   6 * sizeof(double));
     }
 }
 
@@ -257,7 +258,7 @@ static bool activate(struct island *s, const uint8_t *before, const uint8_t *aft
     return true;
 }
 
-/* ---- the search --------------------------------------------------------------------------------------------------- */
+/* ---- the search -------------------------------------------------------------------------------------------------- */
 
 static void add_regularisation(struct island *s, double sign)
 {
@@ -383,7 +384,7 @@ static void store_best(const struct island *s)
     }
 }
 
-/* ---- an island ----------------------------------------------------------------------------------------------------- */
+/* ---- an island --------------------------------------------------------------------------------------------------- */
 
 /* The largest speed that an impulse of the contacts makes by itself, or that there is: m/s. */
 static double size_of(const struct island *s, const double *lambda)
@@ -490,7 +491,7 @@ static bool solve_island(struct island *s, int32_t label)
     return take(s, label, true);
 }
 
-/* ---- all islands -------------------------------------------------------------------------------------------------- */
+/* ---- all islands ------------------------------------------------------------------------------------------------- */
 
 static int32_t solve_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, bool again)
 {
@@ -509,7 +510,8 @@ sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input
     *solved = 0;
     *all = true;
     ncp->known = false;
-    if (!sadmm_ncp_make_lists(ncp, input, system)) return sadmm_fail_memory(error, "islands of the dense contact solve");
+    if (!sadmm_ncp_make_lists(ncp, input, system))
+        return sadmm_fail_memory(error, "islands of the dense contact solve");
     sadmm_ncp_choose_islands(ncp, input);
     *solved = solve_islands(ncp, input, false);
     for (int32_t i = 0; i < system->body_count; ++i) *all = *all && sadmm_ncp_is_solved(ncp, i, i);

@@ -8,14 +8,14 @@
  *     e_1 = -push there                 v_1, from v_0 and lambda_0 on: bodies move by dt (v_1 - v_0) besides
  *
  * The second one is that of the islands that need it, by themselves, solved by the same kernels with a context of its
- * own. What they have then moved by makes no momentum, as impulses do not. Nothing is between two bodies that turn about
- * each other but distance, though: an island in the air is turned by as much as keeps its angular momentum.
+ * own. What they have then moved by makes no momentum, as impulses do not. Nothing is between two bodies that turn
+ * about each other but distance, though: an island in the air is turned by as much as keeps its angular momentum.
  *
  * A push need not be kept out of velocities where gravity takes it back as fast as it shrinks (contact_push_takes in
  * math/contact.h): velocities follow the overlap down, and nothing is left of them. That is so where no push takes more
- * than all of gravity, nor do those that add up on the way from the ground: all of an island's, over the number of pairs
- * that it stands on. Heaps, where nearly everything overlaps a little, are solved once. Islands with constraints given by
- * rows are, too. In double; which islands, and what they move by (model/push_law.h), depends on no threads.
+ * than all of gravity, nor do those that add up on the way from the ground: all of an island's, over the number of
+ * pairs that it stands on. Heaps, where nearly everything overlaps a little, are solved once. Islands with constraints
+ * given by rows are, too. In double; which islands, and what they move by (model/push_law.h), depends on no threads.
  *
  * Backends that make whole steps do the same by themselves. */
 #ifndef SADMM_CORE_SOLVE_PUSH_H

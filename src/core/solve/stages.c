@@ -122,7 +122,8 @@ static void begin_substep(struct sadmm_stages *s)
 bool sadmm_stages_next(struct sadmm_stages *s, struct sadmm_stage *stage)
 {
     while (s->next < SADMM_STAGE_COUNT) {
-        if (s->solved && s->next > SADMM_STAGE_NCP_SOLVE && s->next < SADMM_STAGE_INTEGRATE) s->next = SADMM_STAGE_INTEGRATE;
+        if (s->solved && s->next > SADMM_STAGE_NCP_SOLVE && s->next < SADMM_STAGE_INTEGRATE)
+            s->next = SADMM_STAGE_INTEGRATE;
         const enum sadmm_stage_kind kind = (enum sadmm_stage_kind)s->next++;
         const int count = kind == SADMM_STAGE_ITERATE ? begin_batch(s) : 0;
         if (kind == SADMM_STAGE_BALANCE && !s->batch.last && !s->stopped) s->next = SADMM_STAGE_ITERATE;

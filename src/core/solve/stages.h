@@ -6,8 +6,8 @@
  *     solve = INITIALISE BODIES CONTACTS ROWS PENALTY  iterations  ENERGY_LIMIT SOLUTION
  *     iterations = { ITERATE RESIDUALS CHECK WEIGHTS BALANCE } until the budget is spent or a check is met
  *
- * What the plan and the settings do not ask for is not in the list: no solve where BLOCK_SOLVE and NCP_SOLVE have solved
- * all islands. Whoever executes it goes through it one stage after
+ * What the plan and the settings do not ask for is not in the list: no solve where BLOCK_SOLVE and NCP_SOLVE have
+ * solved all islands. Whoever executes it goes through it one stage after
  * the other: hosts run each stage (schedule.c, world/step.c), the CUDA backend records it into its graph. An executor
  * may begin a stage before its turn where all that the stage reads is there.
  */

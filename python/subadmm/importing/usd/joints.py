@@ -102,7 +102,8 @@ def _law(reader, prim):
         joint = (UsdPhysics.RevoluteJoint if turns else UsdPhysics.PrismaticJoint)(prim)
         kind, index = ("revolute", 5) if turns else ("prismatic", 2)
         names = {"angular" if turns else "linear": index}
-        low, high = (value(a, infinite=True) * _unit(reader, index) for a in (joint.GetLowerLimitAttr(), joint.GetUpperLimitAttr()))
+        low, high = (value(a, infinite=True) * _unit(reader, index)
+                     for a in (joint.GetLowerLimitAttr(), joint.GetUpperLimitAttr()))
         if low > high:
             raise ValueError(f"lowerLimit is above upperLimit: {low:g}, {high:g}")
         coordinates[index] = Coordinate()
@@ -113,7 +114,8 @@ def _law(reader, prim):
             reader.report.add(reader.element(prim), "the limit of its cone is not carried over")
     elif prim.IsA(UsdPhysics.DistanceJoint):
         joint = UsdPhysics.DistanceJoint(prim)
-        low, high = (value(a, infinite=True) * reader.metre for a in (joint.GetMinDistanceAttr(), joint.GetMaxDistanceAttr()))
+        low, high = (value(a, infinite=True) * reader.metre
+                     for a in (joint.GetMinDistanceAttr(), joint.GetMaxDistanceAttr()))
         low, high = max(low, 0.0), high if high >= 0 else np.inf
         if low > high:
             raise ValueError(f"minDistance is above maxDistance: {low:g} m, {high:g} m")

@@ -61,13 +61,14 @@ def _is_like(x, wanted):
     found, like = _numbers_of(x), np.shape(wanted)
     if hasattr(x, "GetReal") or found is None:
         return found is not None
-    return found.ndim == len(like) and found.shape[1:] == like[1:] and (hasattr(wanted, "__len__") and not like[0] or found.shape == like)
+    any_length = hasattr(wanted, "__len__") and not like[0]
+    return found.ndim == len(like) and found.shape[1:] == like[1:] and (any_length or found.shape == like)
 
 
 def value(attribute, infinite=False):
     """At the stage's beginning, where it is animated. infinite: infinities mean something in it, as that there is no
-    limit. Raises ValueError, which names the attribute, where it is of another type than the schema's or has numbers that
-    are not finite. (A file may say anything.)"""
+    limit. Raises ValueError, which names the attribute, where it is of another type than the schema's or has numbers
+    that are not finite. (A file may say anything.)"""
     from pxr import Usd
 
     out, kind = attribute.Get(Usd.TimeCode.EarliestTime()), attribute.GetTypeName()
@@ -83,7 +84,8 @@ def value(attribute, infinite=False):
     if wrong.any():
         place = tuple(int(k) for k in np.argwhere(wrong)[0])
         named = "".join(f"[{k}]" for k in place)
-        raise ValueError(f"{attribute.GetPath()}{named} = {numbers[place]}: must be {'a number' if infinite else 'finite'}")
+        raise ValueError(f"{attribute.GetPath()}{named} = {numbers[place]}: must be "
+                         f"{'a number' if infinite else 'finite'}")
     return out
 
 
