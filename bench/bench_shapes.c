@@ -38,7 +38,7 @@ struct bench {
     int form_count;
     sadmm_hull *hulls[FORMS];
     double *shape_data;
-    size_t shape_data_doubles, shape_data_capacity;
+    size_t shape_data_doubles;
     struct sadmm_shape shapes[2 * PAIRS];
     struct sadmm_geometry geometries[2];
     struct sadmm_collision_body bodies[2 * PAIRS];
@@ -67,8 +67,7 @@ static quat turn_down(const double n[3])
 static sadmm_status append_block(struct bench *b, struct form *form, const double *block, size_t doubles,
                                  struct sadmm_error *error)
 {
-    if (!sadmm_grow(&b->shape_data, &b->shape_data_capacity, b->shape_data_doubles, b->shape_data_doubles + doubles,
-                    sizeof *b->shape_data))
+    if (!SADMM_GROW(b->shape_data, b->shape_data_doubles, b->shape_data_doubles + doubles))
         return sadmm_fail_memory(error, "shape data");
     form->geometry.hull = (uint32_t)b->shape_data_doubles;
     memcpy(b->shape_data + b->shape_data_doubles, block, doubles * sizeof *b->shape_data);
@@ -155,8 +154,7 @@ static void spread(int count, double *points)
 static sadmm_status make_forms(struct bench *b, struct sadmm_error *error)
 {
     double cube[24], ball[3 * 128];
-    if (!sadmm_grow(&b->shape_data, &b->shape_data_capacity, 0, HULL_FIRST_OWN, sizeof *b->shape_data))
-        return sadmm_fail_memory(error, "the hulls");
+    if (!SADMM_GROW(b->shape_data, 0, HULL_FIRST_OWN)) return sadmm_fail_memory(error, "the hulls");
     sadmm_hull_prelude(b->shape_data);
     b->shape_data_doubles = HULL_FIRST_OWN;
     add_form(b, "sphere", SADMM_SHAPE_SPHERE, 1, 0, 0)->below = 1;

@@ -75,8 +75,7 @@ static void write_row(FILE *out, const struct row *r)
 
 bool rows_add(struct rows *rows, const struct row *row)
 {
-    if (!sadmm_grow(&rows->rows, &rows->capacity, rows->count, rows->count + 1, sizeof *rows->rows))
-        return false;
+    if (!SADMM_GROW(rows->rows, rows->count, rows->count + 1)) return false;
     rows->rows[rows->count++] = *row;
     if (rows->csv) write_row(rows->csv, row);
     return true;

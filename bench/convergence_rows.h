@@ -44,7 +44,7 @@ struct row row_start(enum row_kind kind, const char *name, sadmm_method method, 
 
 struct rows {
     struct row *rows;
-    size_t count, capacity;
+    size_t count;
     FILE *csv; /* NULL: not wanted. Every row is written when it is added */
 };
 

@@ -39,8 +39,6 @@ bool lattice_create(struct lattice *lattice, long contacts)
     lattice->contacts.pairs = calloc(2 * bodies, sizeof *lattice->contacts.pairs);
     lattice->contacts.points = calloc(8 * bodies, sizeof *lattice->contacts.points);
     lattice->system.velocity = calloc(6 * bodies, sizeof(double));
-    lattice->contacts.pair_capacity = 2 * bodies;
-    lattice->contacts.point_capacity = 8 * bodies;
     if (!lattice->bodies || !lattice->contacts.pairs || !lattice->contacts.points || !lattice->system.velocity) {
         lattice_destroy(lattice);
         return false;

@@ -158,7 +158,7 @@ static bool add_if_overlapping(struct overlaps *o, const struct solid *solids, i
     if (a->body == b->body || (a->fixed && b->fixed)) return true;
     const double depth = overlap_depth(a, b);
     if (!(depth > 0)) return true;
-    if (!sadmm_grow(&o->pairs, &o->capacity, o->count, o->count + 1, sizeof *o->pairs)) return false;
+    if (!SADMM_GROW(o->pairs, o->count, o->count + 1)) return false;
     o->pairs[o->count++] = (struct overlap){i < j ? i : j, i < j ? j : i, depth};
     return true;
 }
@@ -166,12 +166,7 @@ static bool add_if_overlapping(struct overlaps *o, const struct solid *solids, i
 bool overlaps_find(struct overlaps *o, const struct solid *solids, int count)
 {
     o->count = 0;
-    if (o->interval_capacity < count) {
-        sadmm_free(o->intervals);
-        o->intervals = sadmm_alloc((size_t)count, sizeof *o->intervals);
-        o->interval_capacity = o->intervals ? count : 0;
-        if (!o->intervals) return false;
-    }
+    if (!SADMM_GROW(o->intervals, 0, (size_t)count)) return false;
     for (int i = 0; i < count; ++i) o->intervals[i] = bounds(&solids[i], i);
     qsort(o->intervals, (size_t)count, sizeof *o->intervals, compare_intervals);
     for (int i = 0; i < count; ++i)

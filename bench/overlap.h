@@ -38,9 +38,8 @@ struct overlap {
 /* All pairs that overlap, by sweeping along x, and what the sweep keeps from call to call; starts zeroed. */
 struct overlaps {
     struct overlap *pairs;
-    size_t count, capacity;
+    size_t count;
     struct interval *intervals;
-    int interval_capacity;
 };
 
 /* False: out of memory. */

@@ -20,7 +20,7 @@ struct built_body *problem_builder_box(struct problem_builder *builder, double m
 {
     static struct built_body lost; /* written, never read: finish refuses what is incomplete */
     size_t n = builder->body_count;
-    if (!sadmm_grow(&builder->bodies, &builder->body_capacity, n, n + 1, sizeof *builder->bodies)) {
+    if (!SADMM_GROW(builder->bodies, n, n + 1)) {
         builder->out_of_memory = true;
         return &lost;
     }
@@ -44,8 +44,7 @@ void problem_builder_contact(struct problem_builder *builder, int32_t body, int3
                              double friction)
 {
     size_t n = builder->contact_count;
-    if (builder->out_of_memory ||
-        !sadmm_grow(&builder->contacts, &builder->contact_capacity, n, n + 1, sizeof *builder->contacts)) {
+    if (builder->out_of_memory || !SADMM_GROW(builder->contacts, n, n + 1)) {
         builder->out_of_memory = true;
         return;
     }
@@ -77,8 +76,7 @@ static void ball_rows(double sign, vec3 r, double jacobian[36])
 void problem_builder_ball(struct problem_builder *builder, int32_t a, int32_t b, vec3 point)
 {
     size_t n = builder->joint_count;
-    if (builder->out_of_memory ||
-        !sadmm_grow(&builder->joints, &builder->joint_capacity, n, n + 1, sizeof *builder->joints)) {
+    if (builder->out_of_memory || !SADMM_GROW(builder->joints, n, n + 1)) {
         builder->out_of_memory = true;
         return;
     }

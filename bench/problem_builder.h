@@ -23,7 +23,7 @@ struct problem_builder {
     struct built_body *bodies;
     sadmm_problem_contact *contacts;
     sadmm_problem_block *joints;
-    size_t body_count, contact_count, joint_count, body_capacity, contact_capacity, joint_capacity;
+    size_t body_count, contact_count, joint_count;
     bool out_of_memory; /* what is added after it is lost; problem_builder_finish says so */
 };
 

@@ -115,8 +115,8 @@ static inline struct sadmm_cuda_contacts both_find(struct both *b, const struct 
 
 static inline void copy_set(struct sadmm_contact_set *to, const struct sadmm_contact_set *from)
 {
-    ck_assert(sadmm_grow((void **)&to->pairs, &to->pair_capacity, 0, from->pair_count, sizeof *to->pairs));
-    ck_assert(sadmm_grow((void **)&to->points, &to->point_capacity, 0, from->point_count, sizeof *to->points));
+    ck_assert(SADMM_GROW(to->pairs, 0, from->pair_count));
+    ck_assert(SADMM_GROW(to->points, 0, from->point_count));
     if (from->pair_count) memcpy(to->pairs, from->pairs, from->pair_count * sizeof *to->pairs);
     if (from->point_count) memcpy(to->points, from->points, from->point_count * sizeof *to->points);
     to->pair_count = from->pair_count;

@@ -122,14 +122,13 @@ static const struct sadmm_contact_pair *pair_of(const struct scene *s, int32_t a
 static void copy_set(struct sadmm_contact_set *to, const struct sadmm_contact_set *from)
 {
     memset(to, 0, sizeof *to);
-    ck_assert(sadmm_grow((void **)&to->pairs, &to->pair_capacity, 0, from->pair_count + 1, sizeof *to->pairs));
-    ck_assert(sadmm_grow((void **)&to->points, &to->point_capacity, 0, from->point_count + 1, sizeof *to->points));
+    ck_assert(SADMM_GROW(to->pairs, 0, from->pair_count + 1));
+    ck_assert(SADMM_GROW(to->points, 0, from->point_count + 1));
     if (from->pair_count) memcpy(to->pairs, from->pairs, from->pair_count * sizeof *to->pairs);
     if (from->point_count) memcpy(to->points, from->points, from->point_count * sizeof *to->points);
     to->pair_count = from->pair_count;
     to->point_count = from->point_count;
-    ck_assert(sadmm_grow((void **)&to->migrations, &to->migration_capacity, 0, from->point_count + 1,
-                         sizeof *to->migrations));
+    ck_assert(SADMM_GROW(to->migrations, 0, from->point_count + 1));
     for (size_t k = 0; k < from->point_count; ++k)
         if (from->points[k].migrates) to->migrations[k] = from->migrations[k];
     to->migrating = from->migrating;

@@ -201,7 +201,7 @@ START_TEST(changes_of_a_body_do_not_pile_up)
     }
     ck_assert_uint_eq(world->resident.dirty_count, 3);
     step_world(world, 1);
-    ck_assert_uint_le(world->resident.update_capacity, 64);
+    ck_assert_uint_le(SADMM_ROOM(world->resident.updates), 64);
     ck_assert_uint_eq(world->resident.dirty_count, 0);
     sadmm_world_destroy(world);
 }

@@ -1,5 +1,5 @@
-/* Lists that stay quick wherever things come and go: key trees, sets of slots, tables of pairs, against plain
- * arrays. */
+/* Growable arrays; and lists that stay quick wherever things come and go: key trees, sets of slots, tables of pairs,
+ * against plain arrays. */
 #include <check.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -23,6 +23,54 @@ static int below(int n)
 
 /* Key k, all over the 64 bits. */
 static uint64_t key_of(int k) { return (uint64_t)k << 55 | (uint64_t)k; }
+
+/* Elements that are kept stay, room beyond them is zero, and blocks begin where vectors may. */
+static void check_array(const int *array, size_t used, size_t room)
+{
+    ck_assert_uint_eq((uintptr_t)array % 64, 0);
+    size_t wrong = 0;
+    for (size_t k = 0; k < room; ++k) wrong += array[k] != (k < used ? (int)k + 1 : 0);
+    ck_assert_uint_eq(wrong, 0);
+}
+
+START_TEST(arrays)
+{
+    int *array = NULL;
+    size_t used = 0;
+    ck_assert_uint_eq(SADMM_ROOM(array), 0);
+    ck_assert(SADMM_GROW(array, 0, 0) && !array);
+    while (used < 5000) {
+        const size_t before = SADMM_ROOM(array);
+        ck_assert(SADMM_GROW(array, used, used + 1));
+        const size_t room = SADMM_ROOM(array);
+        if (used < before) ck_assert_uint_eq(room, before);
+        else {
+            ck_assert_uint_ge(room, used + 1);
+            ck_assert_uint_le(room, used + used / 2 + 16);
+            check_array(array, used, room);
+        }
+        array[used] = (int)used + 1;
+        ++used;
+    }
+    const int *const block = array;
+    const size_t room = SADMM_ROOM(array);
+    sadmm_test_fail_allocations_after(0); /* nothing changes then */
+    ck_assert(!SADMM_GROW(array, used, room + 1) && !SADMM_GROW(array, 0, SIZE_MAX));
+    sadmm_test_fail_allocations_after(-1);
+    ck_assert(!SADMM_GROW(array, 0, SIZE_MAX / 2) && array == block && SADMM_ROOM(array) == room);
+    check_array(array, used, used);
+    ck_assert(SADMM_GROW(array, 10, room + 1) && SADMM_ROOM(array) > room);
+    check_array(array, 10, SADMM_ROOM(array));
+    sadmm_free(array);
+
+    array = (int *)sadmm_alloc(7, sizeof *array); /* a block grows as well */
+    for (int k = 0; k < 7; ++k) array[k] = k + 1;
+    ck_assert_uint_eq(SADMM_ROOM(array), 7);
+    ck_assert(SADMM_GROW(array, 7, (8 << 20) / sizeof *array)); /* to one of large pages */
+    check_array(array, 7, SADMM_ROOM(array));
+    sadmm_free(array);
+}
+END_TEST
 
 static void compare_tree(const struct sadmm_key_tree *tree, const double values[KEYS])
 {
@@ -158,6 +206,7 @@ int main(void)
 {
     Suite *suite = suite_create("lists");
     TCase *cases = tcase_create("lists");
+    tcase_add_test(cases, arrays);
     tcase_add_test(cases, key_trees);
     tcase_add_test(cases, slots);
     tcase_add_test(cases, pairs);

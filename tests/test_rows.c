@@ -271,7 +271,7 @@ START_TEST(blocks_become_rows)
     sadmm_row_motor(&rows, 3, 2, 5);
     ck_assert(rows.bias[3] == -2 && rows.lo[3] == -5 && rows.hi[3] == 5);
 
-    const size_t capacity = rows.row_capacity;
+    const size_t capacity = SADMM_ROOM(rows.gain);
     for (size_t k = rows.row_count; k < capacity; ++k) ck_assert_int_ge(sadmm_rows_add(&rows, 1, 0, -1), 0);
     for (long left = 0; left < 9; ++left) { /* of nine arrays; the first one may have capacity left */
         sadmm_test_fail_allocations_after(left);

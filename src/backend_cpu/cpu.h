@@ -150,30 +150,25 @@ struct sadmm_context {
     int32_t *general_of, *general_bodies;
     uint32_t *general_lanes;
     real *b, *A_columns, *H_columns; /* of general bodies: rows; 6 rows (columns of A, of (A + beta C)^-1) a body */
-    real *momentum_residuals;                   /* and rows, fast */
-    size_t general_of_capacity, general_body_capacity, general_lane_capacity;
-    size_t state_capacity, A_capacity, C_capacity, beta_capacity, trapezoid_capacity, body_block_capacity, b_capacity,
-        A_column_capacity, H_column_capacity, momentum_residual_capacity;
+    real *momentum_residuals;        /* and rows, fast */
 
     /* Geometric contacts */
     struct pair_block *pair_blocks;
     void *slots; /* point_slot or normal_slot */
-    size_t pair_block_count, slot_count, pair_block_capacity, slot_capacity;
+    size_t pair_block_count, slot_count;
     int32_t *pair_order; /* scratch */
-    size_t pair_order_capacity;
 
     /* Constraints given by rows: blocks of cones first */
     struct row_block *row_blocks;
     struct row_slot *row_slots;
     int32_t *row_order;             /* scratch */
     struct row_weight *row_weights; /* fast; rows of the system */
-    size_t row_block_count, row_slot_count, row_block_capacity, row_slot_capacity, row_order_capacity,
-        row_weight_capacity;
+    size_t row_block_count, row_slot_count;
 
     /* Wrench rows: record_count rows on a, then as many on b; record: pair lane, or row lane after all pair lanes.
      * `change` holds J^T (lambda - lambda_prev) after a measured iteration, when `wrenches` holds J^T lambda. */
     real *wrenches, *change;
-    size_t record_count, wrench_capacity, change_capacity;
+    size_t record_count;
     bool step1_done;   /* Step 1 ran: bodies without constraints are at A^-1 b and need no more */
     bool measured;     /* wrenches are split: the next Step 1 uses wrenches + ratio * change */
     double ratio;
@@ -181,7 +176,6 @@ struct sadmm_context {
 
     /* Body -> its wrench rows: offsets (bodies + 2), incident: row index */
     int32_t *offsets, *incident;
-    size_t offsets_capacity, incident_capacity;
 
     /* Islands; without constraints and limits of worlds in the method `paper`: none */
     int32_t *label;             /* bodies: the smallest body of its island */
@@ -190,8 +184,6 @@ struct sadmm_context {
     struct cpu_floating *floating;
     int32_t *floating_bodies, *floating_pairs; /* by island, ascending; of pairs the static ones */
     int32_t floating_count;
-    size_t label_capacity, touch_capacity, floating_of_capacity, floating_capacity, floating_body_capacity,
-        floating_pair_capacity;
 
     /* fast */
     bool fast;
@@ -203,11 +195,8 @@ struct sadmm_context {
     int weight_updates;         /* in this solve */
     int exact_since;            /* iterations since the momentum residuals were taken */
     double *body_sums;          /* bodies x BODY_SUMS: terms of the islands' sums */
-    size_t body_sum_capacity, island_capacity, A_inverse_capacity, pair_response_capacity,
-        pair_weight_capacity, pair_violation_capacity, pair_arm_capacity;
 
     double *thread_max; /* one cache line a thread */
-    size_t thread_max_capacity;
 };
 
 enum { THREAD_MAX_STRIDE = 8 };

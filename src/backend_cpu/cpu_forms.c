@@ -49,9 +49,8 @@ bool CPU(find_forms)(struct sadmm_context *c)
 {
     const size_t n = (size_t)c->bodies, rows = sadmm_row_constraint_count(c->system);
     c->general_count = 0;
-    if (!sadmm_grow(&c->general_of, &c->general_of_capacity, 0, n, sizeof *c->general_of) ||
-        !sadmm_grow(&c->general_bodies, &c->general_body_capacity, 0, n, sizeof *c->general_bodies) ||
-        !sadmm_grow(&c->general_lanes, &c->general_lane_capacity, 0, c->body_block_count, sizeof *c->general_lanes))
+    if (!SADMM_GROW(c->general_of, 0, n) || !SADMM_GROW(c->general_bodies, 0, n) ||
+        !SADMM_GROW(c->general_lanes, 0, c->body_block_count))
         return false;
     for (size_t block = 0; block < c->body_block_count; ++block) c->general_lanes[block] = 0;
     cpu_parallel(c, classify_share, c);

@@ -77,19 +77,16 @@ bool CPU(find_islands)(struct sadmm_context *c)
     const size_t n = (size_t)c->bodies;
     c->floating_count = 0;
     if (!c->fast && !c->plan.momentum) return true;
-    if (!sadmm_grow_empty(&c->label, &c->label_capacity, n, sizeof(int32_t))) return false;
+    if (!SADMM_GROW(c->label, 0, n)) return false;
     sadmm_islands(c->system, c->label);
     if (!c->plan.momentum) return true;
-    if (!sadmm_grow_empty(&c->touch, &c->touch_capacity, n, sizeof(int32_t)) ||
-        !sadmm_grow_empty(&c->floating_of, &c->floating_of_capacity, n, sizeof(int32_t)))
-        return false;
+    if (!SADMM_GROW(c->touch, 0, n) || !SADMM_GROW(c->floating_of, 0, n)) return false;
     const size_t pairs = mark_anchored(c);
     for (size_t i = 0; i < n; ++i)
         if (c->label[i] == (int32_t)i && c->floating_of[i] == TOUCHED) c->floating_of[i] = c->floating_count++;
     if (c->floating_count == 0) return true;
-    if (!sadmm_grow_empty(&c->floating, &c->floating_capacity, (size_t)c->floating_count, sizeof *c->floating) ||
-        !sadmm_grow_empty(&c->floating_bodies, &c->floating_body_capacity, n, sizeof(int32_t)) ||
-        !sadmm_grow_empty(&c->floating_pairs, &c->floating_pair_capacity, pairs, sizeof(int32_t)))
+    if (!SADMM_GROW(c->floating, 0, (size_t)c->floating_count) || !SADMM_GROW(c->floating_bodies, 0, n) ||
+        !SADMM_GROW(c->floating_pairs, 0, pairs))
         return false;
     for (int32_t k = 0; k < c->floating_count; ++k) c->floating[k].end_body = c->floating[k].end_pair = 0;
     list_members(c);

@@ -106,48 +106,29 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
     size_t rows = c->body_block_count * (size_t)LANES + 1, general = c->general_count;
     c->kinematic_row = rows;
     if (system->kinematic_count > 0) rows += c->pair_block_count * (size_t)LANES;
-    bool ok = sadmm_grow_empty(&c->state, &c->state_capacity, rows * ROW, sizeof(real)) &&
-              sadmm_grow_empty(&c->A, &c->A_capacity, n * PACKED6, sizeof(double)) &&
-              sadmm_grow_empty(&c->C, &c->C_capacity, n * PACKED6, sizeof(double)) &&
-              sadmm_grow_empty(&c->beta, &c->beta_capacity, n, sizeof(double)) &&
-              sadmm_grow_empty(&c->trapezoids, &c->trapezoid_capacity, plan->rigid ? n + 1 : 0,
-                               sizeof *c->trapezoids) &&
-              sadmm_grow_empty(&c->body_blocks, &c->body_block_capacity, general < n ? c->body_block_count : 0,
-                   sizeof *c->body_blocks) &&
-              sadmm_grow_empty(&c->b, &c->b_capacity, general * ROW, sizeof(real)) &&
-              sadmm_grow_empty(&c->A_columns, &c->A_column_capacity, general * 6 * ROW, sizeof(real)) &&
-              sadmm_grow_empty(&c->H_columns, &c->H_column_capacity, general * 6 * ROW, sizeof(real)) &&
-              sadmm_grow_empty(&c->momentum_residuals, &c->momentum_residual_capacity, c->fast ? general * ROW : 0,
-                               sizeof(real)) &&
-              sadmm_grow_empty(&c->pair_order, &c->pair_order_capacity, (size_t)plan->pairs, sizeof(int32_t)) &&
-              sadmm_grow_empty(&c->pair_blocks, &c->pair_block_capacity, c->pair_block_count, sizeof *c->pair_blocks) &&
-              sadmm_grow_empty(&c->wrenches, &c->wrench_capacity, 2 * c->record_count * ROW, sizeof(real)) &&
-              (!plan->residuals || c->fast ||
-               sadmm_grow_empty(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&
-              sadmm_grow_empty(&c->offsets, &c->offsets_capacity, n + 2, sizeof(int32_t)) &&
-              sadmm_grow_empty(&c->incident, &c->incident_capacity, 2 * c->record_count, sizeof(int32_t)) &&
-              (!(c->fast || plan->momentum) ||
-               (sadmm_grow_empty(&c->islands, &c->island_capacity, n, sizeof *c->islands) &&
-                sadmm_grow_empty(&c->body_sums, &c->body_sum_capacity, BODY_SUMS * n, sizeof(double)) &&
-                sadmm_grow_empty(&c->A_inverse, &c->A_inverse_capacity, n * PACKED6, sizeof(double)))) &&
-              (!c->fast || (sadmm_grow_empty(&c->pair_response, &c->pair_response_capacity, c->record_count,
-                                             sizeof(double)) &&
-                            sadmm_grow_empty(&c->pair_weight, &c->pair_weight_capacity, c->record_count,
-                                             sizeof(double)) &&
-                            sadmm_grow_empty(&c->pair_violation, &c->pair_violation_capacity, c->record_count,
-                                             sizeof(double)) &&
-                            sadmm_grow_empty(&c->pair_arms, &c->pair_arm_capacity,
-                                             plan->contact_rows == 3 ? 2 * cpu_pair_records(c) : 0,
-                                             sizeof *c->pair_arms))) &&
-              sadmm_grow_empty(&c->thread_max, &c->thread_max_capacity, (size_t)plan->threads * THREAD_MAX_STRIDE,
-                               sizeof(double));
+    bool ok =
+        SADMM_GROW(c->state, 0, rows * ROW) && SADMM_GROW(c->A, 0, n * PACKED6) && SADMM_GROW(c->C, 0, n * PACKED6) &&
+        SADMM_GROW(c->beta, 0, n) && SADMM_GROW(c->trapezoids, 0, plan->rigid ? n + 1 : 0) &&
+        SADMM_GROW(c->body_blocks, 0, general < n ? c->body_block_count : 0) && SADMM_GROW(c->b, 0, general * ROW) &&
+        SADMM_GROW(c->A_columns, 0, general * 6 * ROW) && SADMM_GROW(c->H_columns, 0, general * 6 * ROW) &&
+        SADMM_GROW(c->momentum_residuals, 0, c->fast ? general * ROW : 0) &&
+        SADMM_GROW(c->pair_order, 0, (size_t)plan->pairs) && SADMM_GROW(c->pair_blocks, 0, c->pair_block_count) &&
+        SADMM_GROW(c->wrenches, 0, 2 * c->record_count * ROW) &&
+        (!plan->residuals || c->fast || SADMM_GROW(c->change, 0, 2 * c->record_count * ROW)) &&
+        SADMM_GROW(c->offsets, 0, n + 2) && SADMM_GROW(c->incident, 0, 2 * c->record_count) &&
+        (!(c->fast || plan->momentum) || (SADMM_GROW(c->islands, 0, n) && SADMM_GROW(c->body_sums, 0, BODY_SUMS * n) &&
+                                          SADMM_GROW(c->A_inverse, 0, n * PACKED6))) &&
+        (!c->fast ||
+         (SADMM_GROW(c->pair_response, 0, c->record_count) && SADMM_GROW(c->pair_weight, 0, c->record_count) &&
+          SADMM_GROW(c->pair_violation, 0, c->record_count) &&
+          SADMM_GROW(c->pair_arms, 0, plan->contact_rows == 3 ? 2 * cpu_pair_records(c) : 0))) &&
+        SADMM_GROW(c->thread_max, 0, (size_t)plan->threads * THREAD_MAX_STRIDE);
     if (!ok) return sadmm_fail_memory(error, "the cpu backend's step");
     order_pairs(c);
     count_slots(c);
     size_t slot_size = plan->contact_rows == 1 ? sizeof(struct normal_slot) : sizeof(struct point_slot);
     size_t slot_bytes = c->slot_count * slot_size;
-    if (!sadmm_grow_empty(&c->slots, &c->slot_capacity, slot_bytes, 1))
-        return sadmm_fail_memory(error, "the cpu backend's contacts");
+    if (!sadmm_grow(&c->slots, 0, slot_bytes, 1)) return sadmm_fail_memory(error, "the cpu backend's contacts");
     list_incident(c);
     if (!CPU(find_islands)(c)) return sadmm_fail_memory(error, "the cpu backend's islands");
     return SADMM_OK;

@@ -50,10 +50,8 @@ bool CPU(lay_out_rows)(struct sadmm_context *c)
     for (size_t k = 0; k < count; ++k) cones += constraint_of(c, (int32_t)k)->cone;
     const size_t padded = whole_lanes(cones) + whole_lanes(count - cones);
     c->row_block_count = padded / (size_t)LANES;
-    if (!sadmm_grow(&c->row_order, &c->row_order_capacity, 0, padded + count, sizeof *c->row_order) ||
-        !sadmm_grow(&c->row_blocks, &c->row_block_capacity, 0, c->row_block_count, sizeof *c->row_blocks) ||
-        (c->fast && !sadmm_grow(&c->row_weights, &c->row_weight_capacity, 0, c->system->rows->row_count,
-                                sizeof *c->row_weights)))
+    if (!SADMM_GROW(c->row_order, 0, padded + count) || !SADMM_GROW(c->row_blocks, 0, c->row_block_count) ||
+        (c->fast && !SADMM_GROW(c->row_weights, 0, c->system->rows->row_count)))
         return false;
     order_rows(c, cones, count - cones);
     for (size_t k = 0; k < c->row_block_count; ++k) {
@@ -69,7 +67,7 @@ bool CPU(lay_out_rows)(struct sadmm_context *c)
         }
         c->row_slot_count += (size_t)block->slots;
     }
-    return sadmm_grow(&c->row_slots, &c->row_slot_capacity, 0, c->row_slot_count, sizeof *c->row_slots);
+    return SADMM_GROW(c->row_slots, 0, c->row_slot_count);
 }
 
 /* A row that is not there: its equation, x = 0 with x = 0, has the solution 0. */

@@ -27,8 +27,7 @@ static sadmm_status begin(struct sadmm_context *c, const struct sadmm_system *sy
 {
     size_t bodies = (size_t)system->body_count;
     size_t constraints = system->contacts->point_count + sadmm_row_constraint_count(system);
-    if (!sadmm_grow(&c->bodies, &c->body_capacity, 0, bodies, sizeof *c->bodies) ||
-        !sadmm_grow(&c->constraints, &c->constraint_capacity, 0, constraints, sizeof *c->constraints))
+    if (!SADMM_GROW(c->bodies, 0, bodies) || !SADMM_GROW(c->constraints, 0, constraints))
         return sadmm_fail_memory(error, "the literal backend");
     c->system = system;
     c->plan = plan;

@@ -68,9 +68,8 @@ struct sadmm_context {
     const struct sadmm_plan *plan;
     const struct sadmm_settings *settings;
     struct ref_body *bodies;
-    size_t body_capacity;
     struct ref_constraint *constraints; /* contact points in order, then constraints given by rows */
-    size_t constraint_capacity, constraint_count;
+    size_t constraint_count;
     bool step1_done;                 /* fast: Step 1 ran */
     int weight_updates;              /* fast: in this solve */
     double primal;                   /* fast: of the last iteration */

@@ -47,8 +47,7 @@ bool run_record_step(struct run_record *record, sadmm_world *world)
     }
     const double ms[RUN_PHASES] = {r->ms.total, r->ms.collide, r->ms.assemble, r->ms.solve, r->ms.finish};
     for (int k = 0; k < RUN_PHASES; ++k) {
-        if (!sadmm_grow(&record->ms[k], &record->capacity[k], record->steps, record->steps + 1,
-                        sizeof(double))) {
+        if (!SADMM_GROW(record->ms[k], record->steps, record->steps + 1)) {
             cli_error(CLI_FAILED, "out of memory for the times of %zu steps", record->steps + 1);
             return false;
         }

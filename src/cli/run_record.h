@@ -17,7 +17,6 @@ struct run_record {
     struct run_body *bodies; /* the dynamic ones */
     size_t body_count;
     double *ms[RUN_PHASES];  /* (steps) */
-    size_t capacity[RUN_PHASES];
     size_t steps;            /* done */
     double contacts_sum;
     int32_t contacts_max;

@@ -72,9 +72,7 @@ static int thread_count(const struct sadmm_collision_input *input, size_t pairs)
 static bool reserve_parts(struct sadmm_collision *collision, size_t count)
 {
     if (count <= collision->part_count) return true;
-    if (!sadmm_grow(&collision->parts, &collision->part_capacity, collision->part_count, count,
-                    sizeof *collision->parts))
-        return false;
+    if (!SADMM_GROW(collision->parts, collision->part_count, count)) return false;
     memset(collision->parts + collision->part_count, 0, (count - collision->part_count) * sizeof *collision->parts);
     collision->part_count = count;
     return true;
@@ -123,8 +121,7 @@ static bool append_parts(struct sadmm_contact_set *set, struct sadmm_team *team,
         points += parts[t].point_count;
         migrating += parts[t].migrating;
     }
-    if (!sadmm_grow(&set->pairs, &set->pair_capacity, set->pair_count, pairs, sizeof *set->pairs) ||
-        !sadmm_grow(&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points) ||
+    if (!SADMM_GROW(set->pairs, set->pair_count, pairs) || !SADMM_GROW(set->points, set->point_count, points) ||
         (migrating > 0 && !sadmm_contact_set_reserve_migrations(set, points)))
         return false;
     struct appending appending = {set, parts, count};

@@ -10,9 +10,8 @@
 bool sadmm_triplets_add(struct sadmm_triplets *m, int32_t row, int32_t column, double value)
 {
     size_t used = m->count, needed = used + 1;
-    if (!sadmm_grow(&m->row, &m->capacity[0], used, needed, sizeof *m->row) ||
-        !sadmm_grow(&m->column, &m->capacity[1], used, needed, sizeof *m->column) ||
-        !sadmm_grow(&m->value, &m->capacity[2], used, needed, sizeof *m->value))
+    if (!SADMM_GROW(m->row, used, needed) || !SADMM_GROW(m->column, used, needed) ||
+        !SADMM_GROW(m->value, used, needed))
         return false;
     m->row[used] = row;
     m->column[used] = column;

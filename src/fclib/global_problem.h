@@ -26,7 +26,7 @@ extern "C" {
 /* A sparse matrix as a list of entries; entries at the same place add up. */
 struct sadmm_triplets {
     int32_t rows, columns;
-    size_t count, capacity[3];
+    size_t count;
     int32_t *row, *column; /* (count) */
     double *value;         /* (count) */
 };

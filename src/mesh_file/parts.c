@@ -29,8 +29,7 @@ sadmm_status sadmm_mesh_file_add_vertex(struct mesh_parts *parts, size_t line, c
 {
     if (parts->vertex_count >= MESH_MOST_VERTICES)
         return sadmm_mesh_file_fail(parts, line, SADMM_ERROR_LIMIT, "more than %d vertices", MESH_MOST_VERTICES);
-    if (!sadmm_grow(&parts->vertices, &parts->vertex_capacity, parts->vertex_count, parts->vertex_count + 1,
-                    3 * sizeof *parts->vertices))
+    if (!sadmm_grow(&parts->vertices, parts->vertex_count, parts->vertex_count + 1, 3 * sizeof *parts->vertices))
         return sadmm_fail_memory(NULL, "the vertices of a mesh file");
     for (int k = 0; k < 3; ++k) {
         const double m = x[k] * parts->scale;
@@ -55,8 +54,7 @@ sadmm_status sadmm_mesh_file_add_corner(struct mesh_parts *parts, size_t line, i
     if (parts->corner_count >= MESH_MOST_CORNERS)
         return sadmm_mesh_file_fail(parts, line, SADMM_ERROR_LIMIT, "faces have more than %zu corners",
                                     MESH_MOST_CORNERS);
-    if (!sadmm_grow(&parts->corners, &parts->corner_capacity, parts->corner_count, parts->corner_count + 1,
-                    sizeof *parts->corners))
+    if (!SADMM_GROW(parts->corners, parts->corner_count, parts->corner_count + 1))
         return sadmm_fail_memory(NULL, "the faces of a mesh file");
     parts->corners[parts->corner_count++] = (int32_t)vertex;
     return SADMM_OK;
@@ -70,8 +68,7 @@ sadmm_status sadmm_mesh_file_end_face(struct mesh_parts *parts, bool wanted)
         parts->corner_count = parts->face_begin;
         return SADMM_OK;
     }
-    if (!sadmm_grow(&parts->face_size, &parts->face_capacity, parts->face_count, parts->face_count + 1,
-                    sizeof *parts->face_size))
+    if (!SADMM_GROW(parts->face_size, parts->face_count, parts->face_count + 1))
         return sadmm_fail_memory(NULL, "the faces of a mesh file");
     parts->face_size[parts->face_count++] = (int32_t)size;
     parts->face_begin = parts->corner_count;

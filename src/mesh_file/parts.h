@@ -18,7 +18,6 @@ struct mesh_parts {
     int32_t *corners;   /* of all faces, one after the other */
     int32_t *face_size; /* corners of each face */
     size_t vertex_count, corner_count, face_count;
-    size_t vertex_capacity, corner_capacity, face_capacity;
     size_t face_begin; /* the first corner of the face that is being made */
     sadmm_mesh_file_info info;
 };

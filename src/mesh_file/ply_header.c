@@ -93,7 +93,7 @@ static sadmm_status read_element(struct ply *p)
             return FAIL(p, SADMM_ERROR_LIMIT, "%lld vertices: at most %d", (long long)count, MESH_MOST_VERTICES);
         p->vertex_count = element.count;
     }
-    if (!sadmm_grow(&p->elements, &p->element_capacity, p->element_count, p->element_count + 1, sizeof *p->elements))
+    if (!SADMM_GROW(p->elements, p->element_count, p->element_count + 1))
         return sadmm_fail_memory(NULL, "the elements of a PLY file");
     p->elements[p->element_count++] = element;
     return SADMM_OK;
@@ -139,8 +139,7 @@ static sadmm_status read_property(struct ply *p)
         if (has_role(p, element, property.role))
             return REFUSE(p, "property %s: there is one already", sadmm_word_quote(name, quote));
     }
-    if (!sadmm_grow(&p->properties, &p->property_capacity, p->property_count, p->property_count + 1,
-                    sizeof *p->properties))
+    if (!SADMM_GROW(p->properties, p->property_count, p->property_count + 1))
         return sadmm_fail_memory(NULL, "the properties of a PLY file");
     p->properties[p->property_count++] = property;
     ++element->properties;

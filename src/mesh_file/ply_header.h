@@ -32,7 +32,7 @@ struct ply {
     enum ply_encoding encoding;
     struct ply_element *elements;
     struct ply_property *properties;
-    size_t element_count, element_capacity, property_count, property_capacity;
+    size_t element_count, property_count;
     size_t vertex_count; /* that the header says */
 };
 

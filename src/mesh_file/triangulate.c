@@ -24,7 +24,6 @@ struct outline {
     struct point *points;
     int32_t *next, *previous;
     bool *no_ear;
-    size_t point_capacity, next_capacity, previous_capacity, flag_capacity;
 };
 
 /* Twice the area of a b c; > 0: they turn left. */
@@ -37,10 +36,8 @@ static bool same(struct point a, struct point b) { return a.u == b.u && a.v == b
 
 static bool grow(struct outline *o, size_t size)
 {
-    return sadmm_grow_empty(&o->points, &o->point_capacity, size, sizeof *o->points) &&
-           sadmm_grow_empty(&o->next, &o->next_capacity, size, sizeof *o->next) &&
-           sadmm_grow_empty(&o->previous, &o->previous_capacity, size, sizeof *o->previous) &&
-           sadmm_grow_empty(&o->no_ear, &o->flag_capacity, size, sizeof *o->no_ear);
+    return SADMM_GROW(o->points, 0, size) && SADMM_GROW(o->next, 0, size) && SADMM_GROW(o->previous, 0, size) &&
+           SADMM_GROW(o->no_ear, 0, size);
 }
 
 /* Into the plane, so that the area is positive. False: it is zero. */

@@ -14,7 +14,7 @@ enum { MOST_ITERATIONS = 1000000, PAPER_ITERATIONS = 100 };
 
 struct text {
     char *bytes;
-    size_t length, capacity;
+    size_t length;
 };
 
 /* Up to its end, whatever the file is: a pipe has no size. */
@@ -25,9 +25,9 @@ static sadmm_status read_stream(FILE *stream, const char *path, struct text *tex
     while (!feof(stream)) {
         if (text->length >= most)
             return sadmm_fail(error, SADMM_ERROR_LIMIT, "%.200s: a scene file may have 4 GiB, this one has more", path);
-        if (!sadmm_grow(&text->bytes, &text->capacity, text->length, text->length + piece, 1))
+        if (!SADMM_GROW(text->bytes, text->length, text->length + piece))
             return sadmm_fail_memory(error, "a scene file");
-        text->length += fread(text->bytes + text->length, 1, text->capacity - text->length, stream);
+        text->length += fread(text->bytes + text->length, 1, SADMM_ROOM(text->bytes) - text->length, stream);
         if (ferror(stream))
             return sadmm_fail(error, SADMM_ERROR_IO, "%.200s: could not be read: %s", path, strerror(errno));
     }

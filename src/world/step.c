@@ -79,8 +79,7 @@ static sadmm_status keep_start(sadmm_world *world, double *depth)
 {
     const size_t count = world->contacts.point_count;
     struct start_keeping keeping;
-    if (!sadmm_grow(&world->start.impulse, &world->start.impulse_capacity, 0, 3 * count,
-                    sizeof *world->start.impulse))
+    if (!SADMM_GROW(world->start.impulse, 0, 3 * count))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     keeping.world = world;
     const int ran = sadmm_parallel(&world->team, sadmm_pass_threads(world->plan.threads, count), keep_share, &keeping);

@@ -96,8 +96,7 @@ static sadmm_status list_shapes(struct sadmm_cuda_collision *c, const struct sad
 {
     struct collision_view *v = &c->view;
     size_t leaves = 0, planes = 0;
-    if (!sadmm_grow_empty(&c->present, &c->present_capacity, input->shape_count, sizeof *c->present) ||
-        !sadmm_grow_empty(&c->radii, &c->radius_capacity, input->shape_count, sizeof *c->radii))
+    if (!SADMM_GROW(c->present, 0, input->shape_count) || !SADMM_GROW(c->radii, 0, input->shape_count))
         return sadmm_fail_memory(error, "collision's list of shapes");
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
         if (!sadmm_shape_collides(&input->shapes[slot]) || geometry_of(input, slot).type == SADMM_SHAPE_PLANE) continue;
@@ -107,8 +106,7 @@ static sadmm_status list_shapes(struct sadmm_cuda_collision *c, const struct sad
     for (size_t slot = 0; slot < input->shape_count; ++slot)
         if (sadmm_shape_collides(&input->shapes[slot]) && geometry_of(input, slot).type == SADMM_SHAPE_PLANE)
             c->present[leaves + planes++] = (uint32_t)slot;
-    if (!sadmm_grow_empty(&c->planes, &c->plane_capacity, planes, sizeof *c->planes))
-        return sadmm_fail_memory(error, "collision's list of planes");
+    if (!SADMM_GROW(c->planes, 0, planes)) return sadmm_fail_memory(error, "collision's list of planes");
     v->leaf_count = (int32_t)leaves;
     v->plane_count = (int32_t)planes;
     v->large = HUGE_VAL;

@@ -126,7 +126,6 @@ struct sadmm_cuda_collision {
     uint32_t *present;
     uint64_t *planes;
     double *radii;
-    size_t present_capacity, plane_capacity, radius_capacity;
 };
 
 #define CUDA_CALL(c, call, what)                                                 \

@@ -187,10 +187,8 @@ extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void
     TRY(copy(c, in<void>(c, PINNED_PAIRS), from.pairs, pairs * sizeof *contacts->pairs, false, error));
     TRY(copy(c, in<void>(c, PINNED_POINTS), from.points, points * sizeof *contacts->points, false, error));
     TRY(wait(c, error));
-    if (!sadmm_grow(&contacts->pairs, &contacts->pair_capacity, contacts->pair_count, pairs,
-                    sizeof *contacts->pairs) ||
-        !sadmm_grow(&contacts->points, &contacts->point_capacity, contacts->point_count, points,
-                    sizeof *contacts->points))
+    if (!SADMM_GROW(contacts->pairs, contacts->pair_count, pairs) ||
+        !SADMM_GROW(contacts->points, contacts->point_count, points))
         return sadmm_fail_memory(error, "contacts");
     size_t migrating;
     TRY(download_migrations(c, points, contacts, &migrating, error));

@@ -27,7 +27,7 @@ struct sadmm_broad_entry {
 /* Pairs found, as (low slot << 32) | high slot. */
 struct sadmm_pair_list {
     uint64_t *keys;
-    size_t count, capacity;
+    size_t count;
 };
 
 struct sadmm_broad_phase; /* a kind's own */

@@ -17,9 +17,8 @@ struct interval {
 
 struct sadmm_broad_phase {
     struct interval *own, *shared; /* groups >= 0; group -1 */
-    size_t own_count, own_capacity, shared_count, shared_capacity;
+    size_t own_count, shared_count;
     struct interval *scratch;
-    size_t scratch_capacity;
 };
 
 static sadmm_status sweep_create(struct sadmm_broad_phase **out, struct sadmm_error *error)
@@ -51,9 +50,8 @@ static sadmm_status sweep_update(struct sadmm_broad_phase *bp, const struct sadm
             else ++own;
         }
     bp->own_count = bp->shared_count = 0;
-    if (!sadmm_grow(&bp->own, &bp->own_capacity, 0, own, sizeof *bp->own) ||
-        !sadmm_grow(&bp->shared, &bp->shared_capacity, 0, shared, sizeof *bp->shared) ||
-        !sadmm_grow(&bp->scratch, &bp->scratch_capacity, 0, own > shared ? own : shared, sizeof *bp->scratch))
+    if (!SADMM_GROW(bp->own, 0, own) || !SADMM_GROW(bp->shared, 0, shared) ||
+        !SADMM_GROW(bp->scratch, 0, own > shared ? own : shared))
         return sadmm_fail_memory(error, "sort-and-sweep intervals");
     for (i = 0; i < entry_count; ++i)
         if (entries[i].present) {

@@ -5,9 +5,7 @@
 
 bool sadmm_pair_list_add(struct sadmm_pair_list *list, uint32_t a, uint32_t b)
 {
-    if (list->count == list->capacity &&
-        !sadmm_grow(&list->keys, &list->capacity, list->count, list->count + 1, sizeof *list->keys))
-        return false;
+    if (!SADMM_GROW(list->keys, list->count, list->count + 1)) return false;
     list->keys[list->count++] = unordered_key(a, b);
     return true;
 }

@@ -61,9 +61,7 @@ static bool choose_axis(struct sadmm_box_row *row, const struct sadmm_candidates
 
 static bool reserve(struct sadmm_box_row *row, size_t slots)
 {
-    return sadmm_grow(&row->keys, &row->key_capacity, 0, 2 * slots, sizeof *row->keys) &&
-           sadmm_grow(&row->beside, &row->beside_capacity, 0, slots, sizeof *row->beside) &&
-           sadmm_grow(&row->out, &row->out_capacity, 0, slots, sizeof *row->out);
+    return SADMM_GROW(row->keys, 0, 2 * slots) && SADMM_GROW(row->beside, 0, slots) && SADMM_GROW(row->out, 0, slots);
 }
 
 bool sadmm_box_row_make(struct sadmm_box_row *row, const struct sadmm_candidates *c)

@@ -17,7 +17,7 @@ struct sadmm_box_row {
     uint64_t *keys;     /* (where it begins, rounded down << 32) | slot, sorted; then room to sort them */
     uint32_t *beside;   /* slots that are tested one by one: planes, what is much wider than most, what was moved */
     unsigned char *out; /* by slot: it is beside */
-    size_t count, beside_count, key_capacity, beside_capacity, out_capacity;
+    size_t count, beside_count;
 };
 
 void sadmm_box_row_free(struct sadmm_box_row *row);

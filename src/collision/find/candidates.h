@@ -52,14 +52,14 @@ struct sadmm_candidates {
     struct sadmm_broad_entry *entries;
     struct sadmm_seen *seen;
     unsigned char *state; /* SLOT_ flags of the step */
-    size_t slot_count, proxy_capacity, box_capacity, entry_capacity, seen_capacity, state_capacity;
+    size_t slot_count;
 
     uint32_t *changed;
-    size_t changed_count, changed_capacity;
+    size_t changed_count;
     uint64_t *movers; /* (group << 32) | slot of what moves, sorted: planes look up their group here */
-    size_t mover_count, mover_capacity;
+    size_t mover_count;
     uint32_t *planes;
-    size_t plane_count, plane_capacity;
+    size_t plane_count;
 
     /* (slot of a << 32) | slot of b, sorted; a: lower (type, slot) */
     struct sadmm_pair_list list;

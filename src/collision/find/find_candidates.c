@@ -43,14 +43,10 @@ void sadmm_candidates_free(struct sadmm_candidates *c)
 static bool reserve_slots(struct sadmm_candidates *c, size_t slots)
 {
     /* entries and seen remember the last step */
-    return sadmm_grow(&c->proxies, &c->proxy_capacity, 0, slots, sizeof *c->proxies) &&
-           sadmm_grow(&c->boxes, &c->box_capacity, 0, slots, sizeof *c->boxes) &&
-           sadmm_grow(&c->entries, &c->entry_capacity, c->slot_count, slots, sizeof *c->entries) &&
-           sadmm_grow(&c->seen, &c->seen_capacity, c->slot_count, slots, sizeof *c->seen) &&
-           sadmm_grow(&c->state, &c->state_capacity, 0, slots, sizeof *c->state) &&
-           sadmm_grow(&c->changed, &c->changed_capacity, 0, slots, sizeof *c->changed) &&
-           sadmm_grow(&c->movers, &c->mover_capacity, 0, 2 * slots, sizeof *c->movers) &&
-           sadmm_grow(&c->planes, &c->plane_capacity, 0, slots, sizeof *c->planes);
+    return SADMM_GROW(c->proxies, 0, slots) && SADMM_GROW(c->boxes, 0, slots) &&
+           SADMM_GROW(c->entries, c->slot_count, slots) && SADMM_GROW(c->seen, c->slot_count, slots) &&
+           SADMM_GROW(c->state, 0, slots) && SADMM_GROW(c->changed, 0, slots) && SADMM_GROW(c->movers, 0, 2 * slots) &&
+           SADMM_GROW(c->planes, 0, slots);
 }
 
 struct slot_update {
@@ -72,7 +68,7 @@ static bool sort_pairs(struct sadmm_pair_list *list, struct sadmm_pair_list *scr
 {
     int bits = bits_of(slots);
     uint64_t mask = (UINT64_C(1) << bits) - 1;
-    if (!sadmm_grow(&scratch->keys, &scratch->capacity, 0, list->count, sizeof *scratch->keys)) return false;
+    if (!SADMM_GROW(scratch->keys, 0, list->count)) return false;
     for (size_t i = 0; i < list->count; ++i)
         list->keys[i] = (list->keys[i] >> 32) << bits | (list->keys[i] & UINT32_MAX);
     sadmm_radix_sort(list->keys, scratch->keys, list->count, 2 * bits);
@@ -148,8 +144,7 @@ static bool merge_found(struct sadmm_candidates *c)
 {
     size_t i = 0, j = 0, n = 0;
     struct sadmm_pair_list swap;
-    if (!sadmm_grow(&c->merged.keys, &c->merged.capacity, 0, c->list.count + c->found.count, sizeof *c->merged.keys))
-        return false;
+    if (!SADMM_GROW(c->merged.keys, 0, c->list.count + c->found.count)) return false;
     for (; i < c->list.count; ++i) {
         uint64_t key = c->list.keys[i];
         if ((c->state[key >> 32] | c->state[key & UINT32_MAX]) & SLOT_LEFT) continue;

@@ -86,22 +86,21 @@ SADMM_ALWAYS_INLINE void emit(const struct sadmm_candidates *c, const struct sad
 /* For one more manifold. */
 static bool has_capacity(const struct sadmm_contact_set *set)
 {
-    return set->pair_count < set->pair_capacity && set->point_count + SADMM_MANIFOLD_POINTS <= set->point_capacity;
+    return set->pair_count < SADMM_ROOM(set->pairs) &&
+           set->point_count + SADMM_MANIFOLD_POINTS <= SADMM_ROOM(set->points);
 }
 
 /* The same of migrations, where there may be some. */
 static bool has_migrations(struct sadmm_contact_set *set)
 {
-    return set->point_count + SADMM_MANIFOLD_POINTS <= set->migration_capacity ||
+    return set->point_count + SADMM_MANIFOLD_POINTS <= SADMM_ROOM(set->migrations) ||
            sadmm_contact_set_reserve_migrations(set, set->point_count + SADMM_MANIFOLD_POINTS);
 }
 
 static bool add_capacity(struct sadmm_contact_set *set)
 {
-    return sadmm_grow(&set->pairs, &set->pair_capacity, set->pair_count, set->pair_count + 1,
-                      sizeof *set->pairs) &&
-           sadmm_grow(&set->points, &set->point_capacity, set->point_count,
-                      set->point_count + SADMM_MANIFOLD_POINTS, sizeof *set->points);
+    return SADMM_GROW(set->pairs, set->pair_count, set->pair_count + 1) &&
+           SADMM_GROW(set->points, set->point_count, set->point_count + SADMM_MANIFOLD_POINTS);
 }
 
 /* What a range of candidates is worked on with. */

@@ -15,7 +15,7 @@ struct sadmm_collision {
     struct sadmm_box_row row; /* of their boxes, made when it is asked for (swept_bodies.h) */
     /* One a thread beyond the first; its first thread writes to the new set itself. */
     struct sadmm_contact_set *parts;
-    size_t part_count, part_capacity;
+    size_t part_count;
 };
 
 #endif

@@ -110,8 +110,7 @@ static int64_t list_entries(struct sadmm_seams *seams, const struct sadmm_collis
             ++count;
         }
         if (count == 0) return 0;
-        if (pass == 0 && !sadmm_grow(&seams->entries, &seams->entry_capacity, 0, count, sizeof *seams->entries))
-            return -1;
+        if (pass == 0 && !SADMM_GROW(seams->entries, 0, count)) return -1;
     }
     qsort(seams->entries, count, sizeof *seams->entries, compare_entries);
     return (int64_t)count;
@@ -184,14 +183,14 @@ struct seam_found {
 };
 struct seam_list {
     struct seam_found *found;
-    size_t count, capacity;
+    size_t count;
 };
 
 static bool add_neighbour(const struct sadmm_collision_input *input, const struct seam_entry *a,
                           const struct seam_entry *b, struct seam_list *list)
 {
     if (!may_hide(input, a, b)) return true;
-    if (!sadmm_grow(&list->found, &list->capacity, list->count, list->count + 1, sizeof *list->found)) return false;
+    if (!SADMM_GROW(list->found, list->count, list->count + 1)) return false;
     list->found[list->count].owner = a->slot;
     box_of_neighbour(input, a, b, &list->found[list->count++].neighbour);
     return true;
@@ -223,8 +222,7 @@ static int compare_found(const void *left, const void *right)
 
 static bool store_found(struct sadmm_seams *seams, const struct sadmm_collision_input *input, struct seam_list *list)
 {
-    if (!sadmm_grow(&seams->neighbours, &seams->neighbour_capacity, 0, list->count, sizeof *seams->neighbours))
-        return false;
+    if (!SADMM_GROW(seams->neighbours, 0, list->count)) return false;
     for (size_t i = 0; i < list->count; ++i) { /* until they are sorted: where they begin */
         const struct sadmm_shape *owner = &input->shapes[list->found[i].owner];
         struct seam_neighbour *n = &list->found[i].neighbour;
@@ -250,10 +248,10 @@ bool sadmm_seams_find(struct sadmm_seams *seams, const struct sadmm_collision_in
 {
     const uint64_t disabled = hash_of_disabled(input);
     const size_t room = (input->shape_count > input->body_count ? input->shape_count : input->body_count) + 1;
-    struct seam_list list = {NULL, 0, 0};
+    struct seam_list list = {NULL, 0};
     if (!changed && disabled == seams->disabled && seams->slot_count == input->shape_count) return true;
     seams->neighbour_count = seams->slot_count = 0;
-    if (!sadmm_grow(&seams->first, &seams->first_capacity, 0, room, sizeof *seams->first)) return false;
+    if (!SADMM_GROW(seams->first, 0, room)) return false;
     const int64_t count = list_entries(seams, input);
     bool made = count >= 0 && find_pairs(input, seams->entries, (size_t)count, &list);
     if (made && list.count > 0) made = store_found(seams, input, &list);

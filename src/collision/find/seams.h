@@ -12,9 +12,8 @@ extern "C" {
 struct sadmm_seams {
     uint32_t *first;                   /* slots + 1, where `neighbour_count` is not 0 */
     struct seam_neighbour *neighbours; /* of a slot by lo along its seam_axis, then by slot */
-    size_t first_capacity, neighbour_capacity, slot_count, neighbour_count;
+    size_t slot_count, neighbour_count;
     struct seam_entry *entries; /* scratch */
-    size_t entry_capacity;
     uint64_t disabled; /* of which pairs of bodies the neighbours know that they do not meet */
 };
 

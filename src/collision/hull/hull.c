@@ -71,7 +71,6 @@ struct making {
     double *vertices, *planes; /* of the mesh */
     int32_t *rank;
     double merge, convex_radius;
-    size_t vertex_capacity, plane_capacity, rank_capacity;
 };
 
 static void free_making(struct making *m)
@@ -127,9 +126,8 @@ static sadmm_status leave_out_inner(struct making *m, struct sadmm_error *error)
 static bool place_vertices(struct making *m)
 {
     const size_t vertices = (size_t)m->mesh.vertex_count, faces = (size_t)m->mesh.face_count;
-    if (!sadmm_grow_empty(&m->vertices, &m->vertex_capacity, 3 * vertices, sizeof *m->vertices) ||
-        !sadmm_grow_empty(&m->planes, &m->plane_capacity, 4 * faces, sizeof *m->planes) ||
-        !sadmm_grow_empty(&m->rank, &m->rank_capacity, vertices, sizeof *m->rank))
+    if (!SADMM_GROW(m->vertices, 0, 3 * vertices) || !SADMM_GROW(m->planes, 0, 4 * faces) ||
+        !SADMM_GROW(m->rank, 0, vertices))
         return false;
     for (int32_t v = 0; v < m->mesh.vertex_count; ++v) {
         m->rank[v] = v;

@@ -107,14 +107,13 @@ static void archive_lists(struct sadmm_archive *archive, struct sadmm_hull *hull
 {
     const size_t vertices = (size_t)hull->vertex_count, faces = (size_t)hull->face_count,
                  corners = 2 * (size_t)hull->edge_count;
-    size_t none[4] = {0};
     if (archive->reading &&
         !(sadmm_archive_expect(archive, counts_fit(hull) && hull->doubles <= archive->size / sizeof(double),
                                "a hull") &&
-          sadmm_archive_room(archive, &hull->block, &none[0], hull->doubles, sizeof *hull->block) &&
-          sadmm_archive_room(archive, &hull->vertices, &none[1], 3 * vertices, sizeof *hull->vertices) &&
-          sadmm_archive_room(archive, &hull->face_first, &none[2], faces + 1, sizeof *hull->face_first) &&
-          sadmm_archive_room(archive, &hull->corners, &none[3], corners, sizeof *hull->corners)))
+          sadmm_archive_room(archive, &hull->block, hull->doubles, sizeof *hull->block) &&
+          sadmm_archive_room(archive, &hull->vertices, 3 * vertices, sizeof *hull->vertices) &&
+          sadmm_archive_room(archive, &hull->face_first, faces + 1, sizeof *hull->face_first) &&
+          sadmm_archive_room(archive, &hull->corners, corners, sizeof *hull->corners)))
         return;
     sadmm_archive_bytes(archive, hull->block, hull->doubles * sizeof *hull->block);
     sadmm_archive_bytes(archive, hull->vertices, 3 * vertices * sizeof *hull->vertices);

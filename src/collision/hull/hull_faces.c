@@ -20,7 +20,6 @@ struct job {
     int32_t count, most;
     struct hull_mesh *mesh;
     int32_t *corners; /* of a face; room for all points */
-    size_t corner_capacity;
     bool without_memory, too_many;
 };
 
@@ -40,7 +39,7 @@ static bool add_face(struct job *job, facetT *facet)
     vertexT *vertex, **vertexp;
     const int32_t count = qh_setsize(&job->qh, vertices);
     int32_t k = 0;
-    if (!sadmm_grow_empty(&job->corners, &job->corner_capacity, (size_t)count, sizeof *job->corners)) return false;
+    if (!SADMM_GROW(job->corners, 0, (size_t)count)) return false;
     FOREACHvertex_(vertices) {
         job->corners[qh_ORIENTclock ? k : count - 1 - k] = qh_pointid(&job->qh, vertex->point);
         ++k;

@@ -23,9 +23,8 @@ static int32_t corner_count(const struct hull_mesh *mesh)
 bool sadmm_hull_mesh_add(struct hull_mesh *mesh, const int32_t *points, int32_t count)
 {
     const size_t faces = (size_t)mesh->face_count, corners = (size_t)corner_count(mesh);
-    if (!sadmm_grow(&mesh->face_first, &mesh->face_capacity, faces ? faces + 1 : 0, faces + 2,
-                    sizeof *mesh->face_first) ||
-        !sadmm_grow(&mesh->corner, &mesh->corner_capacity, corners, corners + (size_t)count, sizeof *mesh->corner))
+    if (!SADMM_GROW(mesh->face_first, faces ? faces + 1 : 0, faces + 2) ||
+        !SADMM_GROW(mesh->corner, corners, corners + (size_t)count))
         return false;
     memcpy(mesh->corner + corners, points, (size_t)count * sizeof *points);
     mesh->face_first[++mesh->face_count] = (int32_t)corners + count;
@@ -67,7 +66,7 @@ static bool number_vertices(struct hull_mesh *mesh, int32_t *uses, int32_t point
 {
     int32_t vertices = 0;
     for (int32_t p = 0; p < point_count; ++p) vertices += uses[p] >= 3;
-    if (!sadmm_grow_empty(&mesh->point, &mesh->point_capacity, (size_t)vertices, sizeof *mesh->point)) return false;
+    if (!SADMM_GROW(mesh->point, 0, (size_t)vertices)) return false;
     mesh->vertex_count = 0;
     for (int32_t p = 0; p < point_count; ++p) {
         if (uses[p] < 3) continue;
@@ -125,9 +124,8 @@ static enum hull_mesh_is link_edges(struct hull_mesh *mesh)
     struct half_edge *list = (struct half_edge *)sadmm_alloc((size_t)count, sizeof *list);
     int32_t *other = (int32_t *)sadmm_alloc((size_t)count, sizeof *other);
     mesh->edge_count = 0;
-    if (list && other &&
-        sadmm_grow_empty(&mesh->corner_edge, &mesh->corner_edge_capacity, (size_t)count, sizeof *mesh->corner_edge) &&
-        sadmm_grow_empty(&mesh->edge_corner, &mesh->edge_capacity, (size_t)count, sizeof *mesh->edge_corner)) {
+    if (list && other && SADMM_GROW(mesh->corner_edge, 0, (size_t)count) &&
+        SADMM_GROW(mesh->edge_corner, 0, (size_t)count)) {
         list_half_edges(mesh, list);
         qsort(list, (size_t)count, sizeof *list, compare_half_edges);
         is = pair_half_edges(mesh, list, other) ? HULL_MESH_CLOSED : HULL_MESH_OPEN;

@@ -14,7 +14,6 @@ struct hull_mesh {
     /* Edges, once sadmm_hull_mesh_link has run; their order is that in which the corners come to them. */
     int32_t *corner_edge; /* the edge that leaves a corner */
     int32_t *edge_corner; /* 2 an edge: the corners that it leaves, in its own direction and in the other */
-    size_t point_capacity, face_capacity, corner_capacity, corner_edge_capacity, edge_capacity;
 };
 
 void sadmm_hull_mesh_free(struct hull_mesh *mesh);

@@ -73,7 +73,7 @@ static size_t numbers_given(const struct sadmm_mesh_header *header)
 
 void sadmm_mesh_archive(struct sadmm_archive *archive, sadmm_mesh **mesh)
 {
-    size_t none[3] = {0}, sources = 0, given = 0;
+    size_t sources = 0, given = 0;
     if (archive->reading) {
         *mesh = (sadmm_mesh *)sadmm_alloc(1, sizeof **mesh);
         if (!*mesh) {
@@ -86,12 +86,12 @@ void sadmm_mesh_archive(struct sadmm_archive *archive, sadmm_mesh **mesh)
     SADMM_ARCHIVE(archive, m->half);
     SADMM_ARCHIVE(archive, m->middle);
     SADMM_ARCHIVE(archive, m->left_out);
-    sadmm_archive_array(archive, &m->block, &m->doubles, &none[0], sizeof *m->block, INT32_MAX);
+    sadmm_archive_array(archive, &m->block, &m->doubles, sizeof *m->block, INT32_MAX);
     const struct sadmm_mesh_header *header = (const struct sadmm_mesh_header *)m->block;
     if (!archive->reading && m->source) sources = (size_t)header->triangles;
     if (!archive->reading && m->given) given = numbers_given(header);
-    sadmm_archive_array(archive, &m->source, &sources, &none[1], sizeof *m->source, INT32_MAX);
-    sadmm_archive_array(archive, &m->given, &given, &none[2], sizeof *m->given, INT32_MAX);
+    sadmm_archive_array(archive, &m->source, &sources, sizeof *m->source, INT32_MAX);
+    sadmm_archive_array(archive, &m->given, &given, sizeof *m->given, INT32_MAX);
     if (!archive->reading || archive->status != SADMM_OK) return;
     if (!sadmm_archive_expect(archive, mesh_fits(m), "a mesh")) return;
     header = (const struct sadmm_mesh_header *)m->block;

@@ -20,8 +20,7 @@ void sadmm_query_tree_free(struct sadmm_query_tree *tree)
 sadmm_status sadmm_query_tree_reserve(struct sadmm_query_tree *tree, size_t shapes, struct sadmm_error *error)
 {
     /* one at least, so that there is an array */
-    if (!sadmm_grow_empty(&tree->shapes, &tree->shape_capacity, 2 * shapes + 1, sizeof *tree->shapes) ||
-        !sadmm_grow_empty(&tree->boxes, &tree->box_capacity, shapes + 1, sizeof *tree->boxes))
+    if (!SADMM_GROW(tree->shapes, 0, 2 * shapes + 1) || !SADMM_GROW(tree->boxes, 0, shapes + 1))
         return sadmm_fail_memory(error, "a query");
     return SADMM_OK;
 }

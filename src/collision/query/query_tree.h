@@ -14,7 +14,6 @@ struct sadmm_query_tree {
     struct box_tree tree;
     double cost;             /* of walks through it, when it was made */
     struct float_box *boxes; /* of the shapes in it, in their order */
-    size_t shape_capacity, box_capacity;
 };
 
 void sadmm_query_tree_free(struct sadmm_query_tree *tree);

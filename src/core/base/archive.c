@@ -51,19 +51,18 @@ void sadmm_archive_count32(struct sadmm_archive *archive, int32_t *count, size_t
     if (archive->reading) *count = (int32_t)n;
 }
 
-bool sadmm_archive_room(struct sadmm_archive *archive, void *array, size_t *capacity, size_t count, size_t size)
+bool sadmm_archive_room(struct sadmm_archive *archive, void *array, size_t count, size_t size)
 {
-    if (archive->status == SADMM_OK && !sadmm_grow(array, capacity, 0, count, size))
+    if (archive->status == SADMM_OK && !sadmm_grow(array, 0, count, size))
         archive->status = sadmm_fail_memory(archive->error, "the state of a world");
     return archive->status == SADMM_OK;
 }
 
-void sadmm_archive_array(struct sadmm_archive *archive, void *array, size_t *count, size_t *capacity, size_t size,
-                         size_t most)
+void sadmm_archive_array(struct sadmm_archive *archive, void *array, size_t *count, size_t size, size_t most)
 {
     void *block;
     sadmm_archive_count(archive, count, size, most);
-    if (archive->reading && !sadmm_archive_room(archive, array, capacity, *count, size)) {
+    if (archive->reading && !sadmm_archive_room(archive, array, *count, size)) {
         *count = 0;
         return;
     }

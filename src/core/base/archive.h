@@ -30,11 +30,10 @@ void sadmm_archive_count(struct sadmm_archive *archive, size_t *count, size_t un
 /* The same of a count that is an int32_t in memory. */
 void sadmm_archive_count32(struct sadmm_archive *archive, int32_t *count, size_t unit, int32_t most);
 /* A growable array of *count elements of `size` bytes, as of SADMM_ARCHIVE; `array`: the address of its pointer. */
-void sadmm_archive_array(struct sadmm_archive *archive, void *array, size_t *count, size_t *capacity, size_t size,
-                         size_t most);
+void sadmm_archive_array(struct sadmm_archive *archive, void *array, size_t *count, size_t size, size_t most);
 /* What was read is not what can have been written, unless `fine`. Returns `fine` and no earlier failure. */
 bool sadmm_archive_expect(struct sadmm_archive *archive, bool fine, const char *what);
 /* Room for `count` elements, zeroed, of an array that is empty; false after a failure. */
-bool sadmm_archive_room(struct sadmm_archive *archive, void *array, size_t *capacity, size_t count, size_t size);
+bool sadmm_archive_room(struct sadmm_archive *archive, void *array, size_t count, size_t size);
 
 #endif

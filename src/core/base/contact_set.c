@@ -6,10 +6,9 @@
 
 bool sadmm_contact_set_reserve_migrations(struct sadmm_contact_set *contacts, size_t points)
 {
-    const size_t there = contacts->point_count < contacts->migration_capacity ? contacts->point_count
-                                                                              : contacts->migration_capacity;
-    return sadmm_grow(&contacts->migrations, &contacts->migration_capacity, contacts->migrating > 0 ? there : 0,
-                      points, sizeof *contacts->migrations);
+    const size_t room = SADMM_ROOM(contacts->migrations),
+                 there = contacts->point_count < room ? contacts->point_count : room;
+    return SADMM_GROW(contacts->migrations, contacts->migrating > 0 ? there : 0, points);
 }
 
 void sadmm_contact_set_free(struct sadmm_contact_set *contacts)

@@ -89,7 +89,7 @@ struct sadmm_contact_set {
     struct sadmm_contact_pair *pairs;
     struct sadmm_contact_point *points;
     struct sadmm_contact_migration *migrations; /* as points; where there are none of a set, it may be shorter */
-    size_t pair_count, pair_capacity, point_count, point_capacity, migration_capacity;
+    size_t pair_count, point_count;
     size_t migrating; /* points that have one */
     double dt; /* of the step that its impulses are for, s; 0: of none */
 };

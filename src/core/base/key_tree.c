@@ -31,8 +31,7 @@ bool sadmm_key_tree_reserve(struct sadmm_key_tree *tree)
 {
     const size_t used = tree->used > 0 ? tree->used : 1;
     if (tree->spare) return true;
-    if (used >= UINT32_MAX || !sadmm_grow(&tree->nodes, &tree->capacity, tree->used, used + 1, sizeof *tree->nodes))
-        return false;
+    if (used >= UINT32_MAX || !SADMM_GROW(tree->nodes, tree->used, used + 1)) return false;
     tree->used = used;
     return true;
 }

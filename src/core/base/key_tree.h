@@ -18,7 +18,7 @@ struct sadmm_key_node {
 /* All 0: empty. */
 struct sadmm_key_tree {
     struct sadmm_key_node *nodes; /* the first one stands for none */
-    size_t capacity, used;
+    size_t used;
     uint32_t root, spare; /* spare: removed nodes, a list by below[0] */
 };
 

@@ -1,9 +1,10 @@
-/* Allocation: growable arrays, 64-byte aligned, with failure injection for the tests. */
+/* Allocation: blocks and growable arrays, 64-byte aligned, with failure injection for the tests. */
 #ifndef SADMM_CORE_BASE_MEMORY_H
 #define SADMM_CORE_BASE_MEMORY_H
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <string.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -21,14 +22,25 @@ static inline size_t sadmm_grown_capacity(size_t capacity, size_t needed, size_t
     return wanted > least ? wanted : least;
 }
 
-/* Grow *array (`array`: the address of a pointer of any type; elements of `size` bytes) to hold at least `needed`,
- * keeping `used` elements and zeroing the rest; false, with nothing changed, when memory runs out. */
-bool sadmm_grow(void *array, size_t *capacity, size_t used, size_t needed, size_t size);
-/* The same where nothing is kept. */
-static inline bool sadmm_grow_empty(void *array, size_t *capacity, size_t needed, size_t size)
+/* A growable array is a pointer, NULL at first: its block knows how large it is. Room is what it may hold. */
+static inline size_t sadmm_room(const void *block, size_t size)
 {
-    return sadmm_grow(array, capacity, 0, needed, size);
+    return block ? ((const size_t *)block)[-1] / size : 0; /* bytes, in front of what was given out */
 }
+
+/* Room for at least `needed` elements of `size` bytes in *array (`array`: the address of a pointer of any type). Where
+ * the block has to be another one, `used` elements are kept and the rest is zeroed. False, with nothing changed, when
+ * memory runs out. */
+bool sadmm_grow_block(void *array, size_t used, size_t needed, size_t size);
+static inline bool sadmm_grow(void *array, size_t used, size_t needed, size_t size)
+{
+    void *block;
+    memcpy(&block, array, sizeof block);
+    return needed <= sadmm_room(block, size) || sadmm_grow_block(array, used, needed, size);
+}
+
+#define SADMM_ROOM(array)               sadmm_room(array, sizeof *(array))
+#define SADMM_GROW(array, used, needed) sadmm_grow(&(array), used, needed, sizeof *(array))
 
 /* Tests: on this thread, let `successes` allocations pass and fail the following ones; negative: never fail. */
 void sadmm_test_fail_allocations_after(long successes);

@@ -18,18 +18,13 @@ bool sadmm_rows_reserve(struct sadmm_rows *rows, size_t constraints, size_t row_
 {
     double **numbers[] = {&rows->gain, &rows->bias, &rows->compliance, &rows->lo, &rows->hi, &rows->lambda};
     double **jacobians[] = {&rows->jacobian_a, &rows->jacobian_b};
-    if (!sadmm_grow(&rows->constraints, &rows->constraint_capacity, rows->constraint_count, constraints,
-                    sizeof *rows->constraints))
-        return false;
-    if (row_count <= rows->row_capacity) return true;
-    size_t wanted = 0;
-    for (int k = 0; k < 8; ++k) { /* capacities from the old one, so that all end at the same */
+    if (!SADMM_GROW(rows->constraints, rows->constraint_count, constraints)) return false;
+    if (6 * row_count <= SADMM_ROOM(rows->jacobian_b)) return true; /* it is the last one to grow */
+    for (int k = 0; k < 8; ++k) {
         double **array = k < 6 ? numbers[k] : jacobians[k - 6];
         size_t width = k < 6 ? 1 : 6;
-        wanted = rows->row_capacity;
-        if (!sadmm_grow(array, &wanted, rows->row_count, row_count, width * sizeof **array)) return false;
+        if (!sadmm_grow(array, rows->row_count, row_count, width * sizeof **array)) return false;
     }
-    rows->row_capacity = wanted;
     return true;
 }
 

@@ -35,7 +35,7 @@ struct sadmm_rows {
     double *jacobian_a, *jacobian_b; /* (rows x 6), on (linear, angular); 0 where the body is static */
     double *gain, *bias, *compliance, *lo, *hi; /* the law of each row */
     double *lambda;                  /* start in, solution out */
-    size_t constraint_count, row_count, constraint_capacity, row_capacity;
+    size_t constraint_count, row_count;
 };
 
 /* Forget all constraints, keep the memory. */

@@ -49,11 +49,8 @@ static bool same_graph(const struct solving *s)
 static bool make_tree_room(struct sadmm_articulations *j, size_t members, size_t columns)
 {
     const size_t rows = SADMM_MAX_ROWS * columns;
-    return sadmm_grow_empty(&j->nodes, &j->nodes_capacity, members, sizeof *j->nodes) &&
-           sadmm_grow_empty(&j->tree_numbers, &j->tree_number_capacity, 3 * members + columns + rows,
-                            sizeof *j->tree_numbers) &&
-           sadmm_grow_empty(&j->roles, &j->role_capacity, 3 * rows, sizeof *j->roles) &&
-           sadmm_grow_empty(&j->directions, &j->direction_capacity, 6 * (rows + members), sizeof *j->directions);
+    return SADMM_GROW(j->nodes, 0, members) && SADMM_GROW(j->tree_numbers, 0, 3 * members + columns + rows) &&
+           SADMM_GROW(j->roles, 0, 3 * rows) && SADMM_GROW(j->directions, 0, 6 * (rows + members));
 }
 
 /* Where the tree's arrays are of a part that comes after so many bodies and columns of all. */
@@ -84,13 +81,9 @@ static bool make_parts(struct sadmm_articulations *j, size_t bodies)
         members += (size_t)s.bodies;
         columns += (size_t)s.columns;
     }
-    if (!sadmm_grow_empty(&j->parts, &j->parts_capacity, parts, sizeof *j->parts) ||
-        !sadmm_grow_empty(&j->work, &j->work_capacity, work, sizeof *j->work) ||
-        !sadmm_grow_empty(&j->kept_states, &j->kept_states_capacity, SADMM_MAX_ROWS * columns,
-                          sizeof *j->kept_states) ||
-        !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 12 * members, sizeof *j->impulse) ||
-        !sadmm_grow_empty(&j->kept_velocity, &j->kept_velocity_capacity, 6 * members, sizeof *j->kept_velocity) ||
-        !make_tree_room(j, members, columns))
+    if (!SADMM_GROW(j->parts, 0, parts) || !SADMM_GROW(j->work, 0, work) ||
+        !SADMM_GROW(j->kept_states, 0, SADMM_MAX_ROWS * columns) || !SADMM_GROW(j->impulse, 0, 12 * members) ||
+        !SADMM_GROW(j->kept_velocity, 0, 6 * members) || !make_tree_room(j, members, columns))
         return false;
     for (size_t i = 0; i < bodies; ++i) j->part[i] = -1;
     const size_t all = members, all_columns = columns;
@@ -125,9 +118,7 @@ static bool find_order(const struct solving *s)
     const size_t n = s->slot_count, bodies = (size_t)s->system->body_count;
     if (same_graph(s)) return true;
     j->constraints = 0;
-    if (!sadmm_grow_empty(&j->bodies, &j->bodies_capacity, 2 * n, sizeof *j->bodies) ||
-        !sadmm_grow_empty(&j->part, &j->part_capacity, bodies, sizeof *j->part) ||
-        !sadmm_grow_empty(&j->entry, &j->entry_capacity, bodies, sizeof *j->entry))
+    if (!SADMM_GROW(j->bodies, 0, 2 * n) || !SADMM_GROW(j->part, 0, bodies) || !SADMM_GROW(j->entry, 0, bodies))
         return false;
     for (size_t k = 0; k < n; ++k) {
         j->bodies[2 * k] = s->slots[k].body_a;
@@ -250,8 +241,7 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
                                        struct sadmm_error *error)
 {
     const struct solving s = {articulations, system, slots, slot_count, settings};
-    if (!find_order(&s) || !sadmm_grow_empty(&articulations->kept_lambda, &articulations->kept_lambda_capacity,
-                                             system->rows->row_count, sizeof *articulations->kept_lambda))
+    if (!find_order(&s) || !SADMM_GROW(articulations->kept_lambda, 0, system->rows->row_count))
         return sadmm_fail_memory(error, "articulations");
     const bool kept = after && articulations->kept; /* by the same contacts */
     bool solves = !kept;

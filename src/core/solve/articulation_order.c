@@ -184,7 +184,7 @@ static void take_level(struct graph *g, int32_t *order, int32_t *taken)
 struct columns {
     int32_t *order, *column, *level; /* column -> constraint of the part, and back; column -> its level */
     int32_t *first, *rows;          /* columns + 1; as they were found: constraints of the part */
-    size_t row_count, row_capacity;
+    size_t row_count;
     int32_t columns, levels;
     int64_t updates;
 };
@@ -207,7 +207,7 @@ static bool find_columns(struct graph *g, struct columns *c)
         const int32_t begin = taken;
         take_level(g, c->order, &taken);
         for (int32_t at = begin; at < taken; ++at) {
-            if (!sadmm_grow(&c->rows, &c->row_capacity, c->row_count, c->row_count + n, sizeof *c->rows)) return false;
+            if (!SADMM_GROW(c->rows, c->row_count, c->row_count + n)) return false;
             c->column[c->order[at]] = at;
             c->level[at] = c->levels;
             EACH_NEAR(g, c->order[at], j) c->rows[c->row_count++] = j;
@@ -229,7 +229,7 @@ struct writer {
 static int32_t *add(struct writer *w, size_t count)
 {
     struct sadmm_articulation_order *o = w->order;
-    if (!sadmm_grow(&o->numbers, &o->numbers_capacity, w->end, w->end + count + 1, sizeof *o->numbers)) return NULL;
+    if (!SADMM_GROW(o->numbers, w->end, w->end + count + 1)) return NULL;
     int32_t *to = o->numbers + w->end;
     memset(to, 0, count * sizeof *to);
     w->end += count;

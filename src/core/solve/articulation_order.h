@@ -13,7 +13,6 @@ struct sadmm_articulation_order {
     int32_t parts;
     size_t *first;    /* (parts + 1) where a part's structure begins in */
     int32_t *numbers; /* structures */
-    size_t numbers_capacity;
 };
 
 /* bodies: two a constraint, < 0: not solved for. Left out, so that the iteration alone solves them, are constraints of

@@ -216,9 +216,8 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
                             struct sadmm_error *error)
 {
     size_t count = (size_t)system->body_count;
-    if (!sadmm_grow(&workspace->values, &workspace->capacity, 0, BODY_SIZE * count, sizeof(double)) ||
-        !sadmm_grow(&workspace->contact_errors, &workspace->contact_capacity, 0, system->contacts->point_count,
-                    sizeof(double)))
+    if (!SADMM_GROW(workspace->values, 0, BODY_SIZE * count) ||
+        !SADMM_GROW(workspace->contact_errors, 0, system->contacts->point_count))
         return sadmm_fail_memory(error, "the certificate");
     double *bodies = workspace->values;
     double A[36], b[6];
@@ -265,8 +264,7 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
         out.siconos = relative(&tally, residual2, keep_max(b2, keep_max(Av2, Jl2))) +
                       relative(&tally, tally.map2, keep_max(tally.u2, tally.r2));
     if (settings && settings->certificate_tolerance > 0) {
-        if (!sadmm_grow(&workspace->labels, &workspace->label_capacity, 0, count, sizeof *workspace->labels))
-            return sadmm_fail_memory(error, "the certificate");
+        if (!SADMM_GROW(workspace->labels, 0, count)) return sadmm_fail_memory(error, "the certificate");
         sadmm_islands(system, workspace->labels);
         out.islands_above = count_islands_above(bodies, count, workspace->labels, settings, scale);
     }

@@ -35,7 +35,6 @@ struct sadmm_certificate_workspace {
     double *values;
     int32_t *labels;
     double *contact_errors; /* natural map of each contact point, m/s, of the last certificate */
-    size_t capacity, label_capacity, contact_capacity;
 };
 sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, const struct sadmm_system *system,
                                 const struct sadmm_settings *settings, sadmm_certificate *certificate,

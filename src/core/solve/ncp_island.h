@@ -47,11 +47,7 @@ struct sadmm_ncp {
     int32_t *passed_counts;
     bool known;                /* the lists are of this (sub-)step, from before its iterations; then */
     double *kept;              /* velocities, multipliers of rows, impulses at that time */
-    size_t kept_capacity, first_node_capacity, passed_capacity, passed_at_capacity, passed_count_capacity;
     uint8_t *states;           /* SADMM_MAX_ROWS a column, of the parts one after the other: those that G is for */
-    size_t label_capacity, number_capacity, body_list_capacity, points_capacity, first_capacity, kind_capacity,
-        pair_list_capacity, body_capacity, contact_capacity, law_capacity, part_capacity, numbers_capacity,
-        row_capacity, state_capacity;
 };
 
 /* Of islands: they have rows; are the iterations'; are solved. */

@@ -81,31 +81,22 @@ static bool make_room(struct sadmm_ncp *d, const struct sadmm_articulations *art
         if ((size_t)articulations->parts[k].tree.depth > depth) depth = (size_t)articulations->parts[k].tree.depth;
     }
     const size_t size = 3 * points + MOST_ACTIVE;
-    return sadmm_grow_empty(&d->bodies, &d->body_capacity, n, sizeof *d->bodies) &&
-           sadmm_grow_empty(&d->contacts, &d->contact_capacity, points, sizeof *d->contacts) &&
-           sadmm_grow_empty(&d->laws, &d->law_capacity, points + MOST_ACTIVE, sizeof *d->laws) &&
-           sadmm_grow_empty(&d->parts, &d->part_capacity, (size_t)articulations->order.parts, sizeof *d->parts) &&
-           sadmm_grow_empty(&d->numbers, &d->numbers_capacity,
-                            3 * size + size * size + ncp_work_size(size) + 6 * n, sizeof *d->numbers) &&
-           sadmm_grow_empty(&d->first_node, &d->first_node_capacity, (size_t)articulations->order.parts + 1,
-                            sizeof *d->first_node) &&
-           sadmm_grow_empty(&d->passed, &d->passed_capacity, 2 * depth * size, sizeof *d->passed) &&
-           sadmm_grow_empty(&d->passed_at, &d->passed_at_capacity, 2 * n, sizeof *d->passed_at) &&
-           sadmm_grow_empty(&d->passed_counts, &d->passed_count_capacity, size, sizeof *d->passed_counts) &&
-           sadmm_grow_empty(&d->rows, &d->row_capacity, system->rows->row_count, sizeof *d->rows) &&
-           sadmm_grow_empty(&d->states, &d->state_capacity, 2 * states, sizeof *d->states);
+    return SADMM_GROW(d->bodies, 0, n) && SADMM_GROW(d->contacts, 0, points) &&
+           SADMM_GROW(d->laws, 0, points + MOST_ACTIVE) &&
+           SADMM_GROW(d->parts, 0, (size_t)articulations->order.parts) &&
+           SADMM_GROW(d->numbers, 0, 3 * size + size * size + ncp_work_size(size) + 6 * n) &&
+           SADMM_GROW(d->first_node, 0, (size_t)articulations->order.parts + 1) &&
+           SADMM_GROW(d->passed, 0, 2 * depth * size) && SADMM_GROW(d->passed_at, 0, 2 * n) &&
+           SADMM_GROW(d->passed_counts, 0, size) && SADMM_GROW(d->rows, 0, system->rows->row_count) &&
+           SADMM_GROW(d->states, 0, 2 * states);
 }
 
 bool sadmm_ncp_make_lists(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, const struct sadmm_system *system)
 {
     const size_t n = (size_t)system->body_count, pairs = system->contacts->pair_count;
-    if (!sadmm_grow_empty(&d->label, &d->label_capacity, n, sizeof *d->label) ||
-        !sadmm_grow_empty(&d->number, &d->number_capacity, n, sizeof *d->number) ||
-        !sadmm_grow_empty(&d->next_body, &d->body_list_capacity, n, sizeof *d->next_body) ||
-        !sadmm_grow_empty(&d->points, &d->points_capacity, n, sizeof *d->points) ||
-        !sadmm_grow_empty(&d->first_pair, &d->first_capacity, n, sizeof *d->first_pair) ||
-        !sadmm_grow_empty(&d->kind, &d->kind_capacity, n, sizeof *d->kind) ||
-        !sadmm_grow_empty(&d->next_pair, &d->pair_list_capacity, pairs, sizeof *d->next_pair))
+    if (!SADMM_GROW(d->label, 0, n) || !SADMM_GROW(d->number, 0, n) || !SADMM_GROW(d->next_body, 0, n) ||
+        !SADMM_GROW(d->points, 0, n) || !SADMM_GROW(d->first_pair, 0, n) || !SADMM_GROW(d->kind, 0, n) ||
+        !SADMM_GROW(d->next_pair, 0, pairs))
         return false;
     sadmm_islands(system, d->label);
     list_islands(d, system);
@@ -153,7 +144,7 @@ bool sadmm_ncp_keep(struct sadmm_ncp *d, const struct sadmm_system *system)
 {
     const size_t numbers = 6 * (size_t)system->body_count, rows = system->rows->row_count,
                  points = system->contacts->point_count;
-    if (!sadmm_grow_empty(&d->kept, &d->kept_capacity, numbers + rows + 3 * points, sizeof *d->kept)) return false;
+    if (!SADMM_GROW(d->kept, 0, numbers + rows + 3 * points)) return false;
     memcpy(d->kept, system->velocity, numbers * sizeof *d->kept);
     memcpy(d->kept + numbers, system->rows->lambda, rows * sizeof *d->kept);
     for (size_t k = 0; k < points; ++k)

@@ -119,7 +119,7 @@ static sadmm_status reserve_saved(sadmm_problem *problem, int32_t bodies, size_t
                                   struct sadmm_error *error)
 {
     size_t needed = 6 * (size_t)bodies + 3 * points + rows;
-    if (sadmm_grow(&problem->saved, &problem->saved_capacity, 0, needed, sizeof(double))) return SADMM_OK;
+    if (SADMM_GROW(problem->saved, 0, needed)) return SADMM_OK;
     return sadmm_fail_memory(error, "the problem's saved values");
 }
 
@@ -268,7 +268,7 @@ sadmm_status sadmm_problem_set_contacts(sadmm_problem *problem, int32_t count, c
         sadmm_free(kinematic);
         return sadmm_fail_memory(error, "the problem's contacts");
     }
-    set.pair_capacity = set.point_capacity = set.point_count = (size_t)count;
+    set.point_count = (size_t)count;
     kinematic_count = 0;
     for (int32_t k = 0; k < count; ++k) {
         struct sadmm_contact_pair next;

@@ -24,8 +24,7 @@ struct sadmm_problem {
     sadmm_problem_block *blocks; /* as given, to be read back */
     struct sadmm_rows rows;      /* what they mean: a constraint a block, in their order */
 
-    double *saved;               /* velocity, impulses (points x 3), multipliers (rows) before a solve */
-    size_t saved_capacity;
+    double *saved; /* velocity, impulses (points x 3), multipliers (rows) before a solve */
     int device;
     struct sadmm_context *contexts[SADMM_BACKEND_COUNT][2];
     const struct sadmm_kernels *tables[SADMM_BACKEND_COUNT][2];

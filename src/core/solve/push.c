@@ -23,7 +23,6 @@ struct sadmm_push {
     int32_t *index;          /* all bodies: among those that are pushed, -1: none of them */
     struct push_share *sums; /* all bodies, at labels: of islands */
     struct push_pair *pairs; /* all pairs */
-    size_t label_capacity, index_capacity, sum_capacity, pair_capacity;
 
     /* Those that are, ascending: the second problem. */
     struct sadmm_system system;
@@ -33,9 +32,7 @@ struct sadmm_push {
     double *velocity, *support_motion; /* x 6 */
     double *way;                       /* x 6: v_1 - v_0 */
     struct push_island *islands;
-    bool *free;                 /* its island is in the air */
-    size_t body_capacity, first_capacity, rigid_capacity, velocity_capacity, support_motion_capacity, way_capacity,
-        island_capacity, free_capacity;
+    bool *free; /* its island is in the air */
 };
 
 struct sadmm_push *sadmm_push_create(void) { return (struct sadmm_push *)sadmm_alloc(1, sizeof(struct sadmm_push)); }
@@ -108,15 +105,9 @@ static sadmm_status number_bodies(struct sadmm_push *p, int32_t all, struct sadm
     p->system.body_count = count;
     if (count == 0) return SADMM_OK;
     const size_t n = (size_t)count;
-    if (!sadmm_grow_empty(&p->index, &p->index_capacity, (size_t)all, sizeof *p->index) ||
-        !sadmm_grow_empty(&p->bodies, &p->body_capacity, n, sizeof *p->bodies) ||
-        !sadmm_grow_empty(&p->first, &p->first_capacity, n, sizeof *p->first) ||
-        !sadmm_grow_empty(&p->free, &p->free_capacity, n, sizeof *p->free) ||
-        !sadmm_grow_empty(&p->rigid, &p->rigid_capacity, n, sizeof *p->rigid) ||
-        !sadmm_grow_empty(&p->velocity, &p->velocity_capacity, 6 * n, sizeof *p->velocity) ||
-        !sadmm_grow_empty(&p->support_motion, &p->support_motion_capacity, 6 * n, sizeof *p->support_motion) ||
-        !sadmm_grow_empty(&p->way, &p->way_capacity, 6 * n, sizeof *p->way) ||
-        !sadmm_grow_empty(&p->islands, &p->island_capacity, n, sizeof *p->islands)) {
+    if (!SADMM_GROW(p->index, 0, (size_t)all) || !SADMM_GROW(p->bodies, 0, n) || !SADMM_GROW(p->first, 0, n) ||
+        !SADMM_GROW(p->free, 0, n) || !SADMM_GROW(p->rigid, 0, n) || !SADMM_GROW(p->velocity, 0, 6 * n) ||
+        !SADMM_GROW(p->support_motion, 0, 6 * n) || !SADMM_GROW(p->way, 0, 6 * n) || !SADMM_GROW(p->islands, 0, n)) {
         p->system.body_count = 0;
         return sadmm_fail_memory(error, "bodies that overlap");
     }
@@ -158,9 +149,7 @@ sadmm_status sadmm_push_choose(struct sadmm_push *p, struct sadmm_system *system
     const size_t n = (size_t)system->body_count, pairs = system->contacts->pair_count;
     struct choosing choosing = {p, system, settings, size3(settings->gravity)};
     p->system.body_count = 0;
-    if (!sadmm_grow_empty(&p->label, &p->label_capacity, n, sizeof *p->label) ||
-        !sadmm_grow_empty(&p->sums, &p->sum_capacity, n, sizeof *p->sums) ||
-        !sadmm_grow_empty(&p->pairs, &p->pair_capacity, pairs, sizeof *p->pairs))
+    if (!SADMM_GROW(p->label, 0, n) || !SADMM_GROW(p->sums, 0, n) || !SADMM_GROW(p->pairs, 0, pairs))
         return sadmm_fail_memory(error, "bodies that overlap");
     sadmm_islands(system, p->label);
     system->islands = p->label;
@@ -188,8 +177,7 @@ static sadmm_status gather_contacts(struct sadmm_push *p, const struct sadmm_con
         ++pairs;
         points += (size_t)from->pairs[k].count;
     }
-    if (!sadmm_grow_empty(&to->pairs, &to->pair_capacity, pairs, sizeof *to->pairs) ||
-        !sadmm_grow_empty(&to->points, &to->point_capacity, points, sizeof *to->points))
+    if (!SADMM_GROW(to->pairs, 0, pairs) || !SADMM_GROW(to->points, 0, points))
         return sadmm_fail_memory(error, "contacts that overlap");
     to->pair_count = to->point_count = 0;
     to->dt = from->dt;

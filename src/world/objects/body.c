@@ -134,8 +134,7 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *give
     const size_t slot = sadmm_slots_free(&world->bodies_taken);
     if (slot >= (size_t)1 << 27)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: a world holds at most 2^27", world->body_count);
-    if (!sadmm_grow(&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies) ||
-        !sadmm_slots_reserve(&world->bodies_taken, slot + 1))
+    if (!SADMM_GROW(world->bodies, world->body_slots, slot + 1) || !sadmm_slots_reserve(&world->bodies_taken, slot + 1))
         return sadmm_fail_memory(error, "a body");
     TRY(copy_name(def->name, &name, error));
 

@@ -106,8 +106,7 @@ sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_d
     made.def = *def;
     q_store(frame.orientation, made.def.orientation);
     const size_t slot = sadmm_slots_free(&world->couplings_taken);
-    if (!sadmm_grow(&world->couplings, &world->coupling_capacity, world->coupling_slots, slot + 1,
-                    sizeof *world->couplings) ||
+    if (!SADMM_GROW(world->couplings, world->coupling_slots, slot + 1) ||
         !sadmm_slots_reserve(&world->couplings_taken, slot + 1))
         return sadmm_fail_memory(error, "a coupling");
     const struct sadmm_world_joint joint = joint_of(&made.def, frame, slot);

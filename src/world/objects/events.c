@@ -92,8 +92,7 @@ static sadmm_event *push(sadmm_world *world, sadmm_event_type type, const struct
 
 static bool add(sadmm_world *world, struct sadmm_touches *touches, int32_t a, int32_t b, size_t pair)
 {
-    if (!sadmm_grow(&touches->list, &touches->capacity, touches->count, touches->count + 1, sizeof *touches->list))
-        return false;
+    if (!SADMM_GROW(touches->list, touches->count, touches->count + 1)) return false;
     touches->list[touches->count++] = (struct sadmm_touch){
         sadmm_world_shape_id(world, a), sadmm_world_shape_id(world, b),
         sadmm_world_body_id(world, world->shapes[a].body), sadmm_world_body_id(world, world->shapes[b].body), pair};
@@ -106,8 +105,7 @@ static sadmm_status list_pairs(sadmm_world *world, size_t *count)
     const struct sadmm_contact_set *contacts = &world->contacts;
     const bool behind = world->resident.contacts_behind;
     *count = behind ? (size_t)world->report.pairs : contacts->pair_count;
-    if (!sadmm_grow_empty(&world->events.pairs, &world->events.pair_capacity, *count, sizeof *world->events.pairs))
-        return sadmm_fail_memory(&world->error, "events");
+    if (!SADMM_GROW(world->events.pairs, 0, *count)) return sadmm_fail_memory(&world->error, "events");
     if (behind) return sadmm_world_read_touching(world, world->events.pairs);
     for (size_t p = 0; p < *count; ++p)
         world->events.pairs[p] = sadmm_touching_of(&contacts->pairs[p], contacts->points + contacts->pairs[p].first);

@@ -120,8 +120,7 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *give
     const size_t slot = sadmm_slots_free(&world->gears_taken);
     if (slot >= MOST_GEARS)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d gears: a world holds at most 2^24", world->gear_count);
-    if (!sadmm_grow(&world->gears, &world->gear_capacity, world->gear_slots, slot + 1, sizeof *world->gears) ||
-        !sadmm_slots_reserve(&world->gears_taken, slot + 1))
+    if (!SADMM_GROW(world->gears, world->gear_slots, slot + 1) || !sadmm_slots_reserve(&world->gears_taken, slot + 1))
         return sadmm_fail_memory(error, "a gear");
     if (slot < world->gear_slots) made.generation = world->gears[slot].generation;
     else ++world->gear_slots;

@@ -189,8 +189,8 @@ static void remove_pair(sadmm_world *world, const struct sadmm_world_joint *join
 
 bool sadmm_world_reserve_joints(sadmm_world *world, size_t slots)
 {
-    return sadmm_grow(&world->joints, &world->joint_capacity, world->joint_slots, slots, sizeof *world->joints) &&
-           sadmm_slots_reserve(&world->joints_taken, slots) && sadmm_slots_reserve(&world->own_joints, slots);
+    return SADMM_GROW(world->joints, world->joint_slots, slots) && sadmm_slots_reserve(&world->joints_taken, slots) &&
+           sadmm_slots_reserve(&world->own_joints, slots);
 }
 
 static sadmm_status new_slot(sadmm_world *world, size_t *slot)

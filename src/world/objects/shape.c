@@ -55,8 +55,7 @@ static sadmm_status add_block(sadmm_world *world, size_t slot, const sadmm_shape
                               struct sadmm_error *error)
 {
     const struct sadmm_shape_data_owner owner = block_owner(def);
-    if (!sadmm_grow(&world->block_shapes, &world->block_shape_capacity, world->block_shape_slots, slot + 1,
-                    sizeof *world->block_shapes))
+    if (!SADMM_GROW(world->block_shapes, world->block_shape_slots, slot + 1))
         return sadmm_fail_memory(error, "a shape");
     TRY(sadmm_shape_data_add(&world->shape_data, &owner, offset, error));
     if (slot >= world->block_shape_slots) world->block_shape_slots = slot + 1;
@@ -78,11 +77,8 @@ static struct sadmm_link *link_at(sadmm_world *world, uint32_t name) { return &w
 bool sadmm_world_reserve_shapes(sadmm_world *world, size_t slots)
 {
     const size_t used = world->shape_slots;
-    return sadmm_grow(&world->shapes, &world->shape_capacity, used, slots, sizeof *world->shapes) &&
-           sadmm_grow(&world->shape_generations, &world->shape_generation_capacity, used, slots,
-                      sizeof *world->shape_generations) &&
-           sadmm_grow(&world->geometries, &world->geometry_capacity, used, slots, sizeof *world->geometries) &&
-           sadmm_grow(&world->shape_links, &world->shape_link_capacity, used, slots, sizeof *world->shape_links) &&
+    return SADMM_GROW(world->shapes, used, slots) && SADMM_GROW(world->shape_generations, used, slots) &&
+           SADMM_GROW(world->geometries, used, slots) && SADMM_GROW(world->shape_links, used, slots) &&
            sadmm_slots_reserve(&world->shapes_taken, slots);
 }
 

@@ -124,8 +124,7 @@ sadmm_status sadmm_world_cast_ray_all(sadmm_world *world, const sadmm_ray *ray, 
     TRY(sadmm_world_take_filter(world, filter, &taken, &given));
     TRY(sadmm_world_place_shapes(world));
     const int32_t room = capacity < world->shape_count ? capacity : world->shape_count;
-    if (!sadmm_grow_empty(&world->query.hits, &world->query.hit_capacity, (size_t)room, sizeof *world->query.hits))
-        return sadmm_fail_memory(error, "a query");
+    if (!SADMM_GROW(world->query.hits, 0, (size_t)room)) return sadmm_fail_memory(error, "a query");
     const struct sadmm_ray_line line = line_of(ray, &given);
     *count = sadmm_query_tree_cast(&world->query.tree, &line, &taken, false, room, world->query.hits);
     for (int32_t i = 0; i < *count && i < room; ++i) give_hit(world, &line, &world->query.hits[i], &hits[i]);

@@ -82,8 +82,7 @@ sadmm_status sadmm_world_list_overlaps(sadmm_world *world, const struct sadmm_bo
                                        size_t *count)
 {
     const size_t most = (size_t)world->shape_count;
-    if (!sadmm_grow_empty(&world->query.slots, &world->query.slot_capacity, most, sizeof *world->query.slots) ||
-        !sadmm_grow_empty(&world->query.spare, &world->query.spare_capacity, most, sizeof *world->query.spare))
+    if (!SADMM_GROW(world->query.slots, 0, most) || !SADMM_GROW(world->query.spare, 0, most))
         return sadmm_fail_memory(&world->error, "a query");
     const struct sadmm_placed *other;
     struct sadmm_query_walk walk = {0};

@@ -109,8 +109,7 @@ static void put_update(const sadmm_world *world, struct sadmm_resident_update *u
 static sadmm_status list_updates(sadmm_world *world, size_t *count)
 {
     *count = 0;
-    if (!sadmm_grow(&world->resident.updates, &world->resident.update_capacity, 0,
-                    SADMM_BODY_UPDATES * world->resident.dirty_count, sizeof *world->resident.updates))
+    if (!SADMM_GROW(world->resident.updates, 0, SADMM_BODY_UPDATES * world->resident.dirty_count))
         return sadmm_fail_memory(&world->error, "changes of bodies");
     for (size_t k = 0; k < world->resident.dirty_count; ++k) {
         const struct sadmm_world_body *body = &world->bodies[world->resident.dirty[k]];
@@ -133,9 +132,7 @@ static void begin_updates(struct sadmm_world_body *body)
 /* Which bodies joints hold. */
 static sadmm_status list_held(sadmm_world *world)
 {
-    if (!sadmm_grow(&world->resident.held, &world->resident.held_capacity, 0, world->body_slots,
-                    sizeof *world->resident.held))
-        return sadmm_fail_memory(&world->error, "hits");
+    if (!SADMM_GROW(world->resident.held, 0, world->body_slots)) return sadmm_fail_memory(&world->error, "hits");
     if (world->body_slots > 0) memset(world->resident.held, 0, world->body_slots);
     sadmm_world_mark_held(world, world->resident.held, 1);
     return SADMM_OK;
@@ -149,10 +146,8 @@ static sadmm_status load(sadmm_world *world)
     sadmm_status status = sadmm_world_gather(world);
     sadmm_world_swap_starts(world);
     TRY(status);
-    if (!sadmm_grow(&world->resident.extrapolation, &world->resident.extrapolation_capacity, 0, n + 1,
-                    sizeof *world->resident.extrapolation) ||
-        !sadmm_grow(&world->resident.dirty, &world->resident.dirty_capacity, 0, n + kinematic + 1,
-                    sizeof *world->resident.dirty))
+    if (!SADMM_GROW(world->resident.extrapolation, 0, n + 1) ||
+        !SADMM_GROW(world->resident.dirty, 0, n + kinematic + 1))
         return sadmm_fail_memory(&world->error, "the step");
     for (size_t i = 0; i < n; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
@@ -281,10 +276,9 @@ static sadmm_status download_hits(sadmm_world *world)
     size_t count, first;
     if (!world->resident.hits_behind) return SADMM_OK;
     for (;;) {
-        TRY(backend->read_hits(world->context, start->hits, start->hit_capacity, &count, &first, &world->error));
-        if (count <= start->hit_capacity) break;
-        if (!sadmm_grow(&start->hits, &start->hit_capacity, 0, count, sizeof *start->hits))
-            return sadmm_fail_memory(&world->error, "hits");
+        TRY(backend->read_hits(world->context, start->hits, SADMM_ROOM(start->hits), &count, &first, &world->error));
+        if (count <= SADMM_ROOM(start->hits)) break;
+        if (!SADMM_GROW(start->hits, 0, count)) return sadmm_fail_memory(&world->error, "hits");
     }
     start->hit_count = count;
     start->hit_first = first;
@@ -348,9 +342,8 @@ static sadmm_status download_contacts(sadmm_world *world)
     if (!world->resident.contacts_behind) return SADMM_OK;
     size_t count = (size_t)world->report.contacts, n = (size_t)world->dynamic_count;
     struct sadmm_step_start *start = &world->start;
-    if (!sadmm_grow(&start->rigid, &start->rigid_capacity, 0, n + 1, sizeof *start->rigid) ||
-        !sadmm_grow(&start->velocity, &start->velocity_capacity, 0, 6 * (n + 1), sizeof *start->velocity) ||
-        !sadmm_grow(&start->impulse, &start->impulse_capacity, 0, 3 * count, sizeof *start->impulse))
+    if (!SADMM_GROW(start->rigid, 0, n + 1) || !SADMM_GROW(start->velocity, 0, 6 * (n + 1)) ||
+        !SADMM_GROW(start->impulse, 0, 3 * count))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     TRY(backend->read_start(world->context, start->rigid, start->velocity, start->impulse, &world->error));
     TRY(sadmm_world_read_kinematic_start(world));

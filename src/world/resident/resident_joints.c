@@ -29,9 +29,7 @@ static bool list_tables(sadmm_world *world, const struct sadmm_world_joint *join
     for (int k = 0; k < JOINT_COORDINATES; ++k) {
         const size_t at = world->resident.table_numbers, numbers = 2 * (size_t)joint->table_count[k];
         if (!joint->table[k]) continue;
-        if (!sadmm_grow(&world->resident.tables, &world->resident.table_capacity, at, at + numbers,
-                        sizeof *world->resident.tables))
-            return false;
+        if (!SADMM_GROW(world->resident.tables, at, at + numbers)) return false;
         memcpy(world->resident.tables + at, joint->table[k], numbers * sizeof *world->resident.tables);
         out->table[k] = (int32_t)at;
         out->points[k] = joint->table_count[k];
@@ -50,16 +48,9 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
     if (world->table_count > INT32_MAX / (2 * SADMM_MOST_SPRING_POINTS))
         return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d tables of springs: a backend holds at most %d",
                           world->table_count, INT32_MAX / (2 * SADMM_MOST_SPRING_POINTS));
-    if (!sadmm_grow_empty(&world->resident.joints, &world->resident.joint_capacity, count,
-                          sizeof *world->resident.joints) ||
-        !sadmm_grow_empty(&world->resident.memory, &world->resident.memory_capacity, count,
-                          sizeof *world->resident.memory) ||
-        !sadmm_grow_empty(&world->resident.coupling_memory, &world->resident.coupling_memory_capacity,
-                          (size_t)world->coupling_count, sizeof *world->resident.coupling_memory) ||
-        !sadmm_grow_empty(&world->resident.joint_slots, &world->resident.joint_slot_capacity, count,
-                          sizeof *world->resident.joint_slots) ||
-        !sadmm_grow_empty(&world->resident.dirty_joints, &world->resident.dirty_joint_capacity, count,
-                          sizeof *world->resident.dirty_joints))
+    if (!SADMM_GROW(world->resident.joints, 0, count) || !SADMM_GROW(world->resident.memory, 0, count) ||
+        !SADMM_GROW(world->resident.coupling_memory, 0, (size_t)world->coupling_count) ||
+        !SADMM_GROW(world->resident.joint_slots, 0, count) || !SADMM_GROW(world->resident.dirty_joints, 0, count))
         return sadmm_fail_memory(&world->error, "joints for the backend");
     for (size_t slot = 0; i < count && slot < world->joint_slots; ++slot) {
         struct sadmm_world_joint *joint = &world->joints[slot];
@@ -107,10 +98,7 @@ sadmm_status sadmm_world_list_gears(sadmm_world *world)
 {
     const size_t count = (size_t)world->gear_count;
     size_t g = 0;
-    if (!sadmm_grow_empty(&world->resident.gears, &world->resident.gear_capacity, count,
-                          sizeof *world->resident.gears) ||
-        !sadmm_grow_empty(&world->resident.gear_force, &world->resident.gear_force_capacity, count,
-                          sizeof *world->resident.gear_force))
+    if (!SADMM_GROW(world->resident.gears, 0, count) || !SADMM_GROW(world->resident.gear_force, 0, count))
         return sadmm_fail_memory(&world->error, "gears for the backend");
     for (size_t slot = 0; g < count && slot < world->gear_slots; ++slot) {
         struct sadmm_world_gear *gear = &world->gears[slot];
@@ -213,9 +201,8 @@ static void put_target(const struct sadmm_rigid *target, double values[SADMM_UPD
 sadmm_status sadmm_world_list_joint_updates(sadmm_world *world, size_t *count)
 {
     const size_t gears = world->resident.gears_dirty ? (size_t)world->resident.gear_count : 0;
-    if (!sadmm_grow(&world->resident.updates, &world->resident.update_capacity, *count,
-                    *count + SADMM_JOINT_UPDATES * world->resident.dirty_joint_count + gears,
-                    sizeof *world->resident.updates))
+    if (!SADMM_GROW(world->resident.updates, *count,
+                    *count + SADMM_JOINT_UPDATES * world->resident.dirty_joint_count + gears))
         return sadmm_fail_memory(&world->error, "changes of joints");
     for (size_t k = 0; k < world->resident.dirty_joint_count; ++k) {
         const struct sadmm_world_joint *joint = &world->joints[world->resident.dirty_joints[k]];
@@ -274,11 +261,8 @@ sadmm_status sadmm_world_read_rows(sadmm_world *world)
     const size_t constraints = (size_t)world->resident.joint_constraints, most = SADMM_MAX_ROWS * constraints;
     sadmm_rows_clear(rows);
     if (world->resident.joint_count == 0) return SADMM_OK;
-    if (!sadmm_rows_reserve(rows, constraints, most) ||
-        !sadmm_grow_empty(&world->resident.solution, &world->resident.solution_capacity, most,
-                          sizeof *world->resident.solution) ||
-        !sadmm_grow_empty(&world->start.multiplier, &world->start.multiplier_capacity, most,
-                          sizeof *world->start.multiplier))
+    if (!sadmm_rows_reserve(rows, constraints, most) || !SADMM_GROW(world->resident.solution, 0, most) ||
+        !SADMM_GROW(world->start.multiplier, 0, most))
         return sadmm_fail_memory(&world->error, "the joints' rows");
     TRY(world->kernels->resident->read_rows(world->context, rows, world->resident.solution, world->velocity,
                                               &world->error));

@@ -9,10 +9,7 @@
 sadmm_status sadmm_world_list_kinematic(sadmm_world *world)
 {
     const size_t n = (size_t)world->kinematic_count;
-    if (!sadmm_grow_empty(&world->resident.kinematic, &world->resident.kinematic_capacity, n,
-                          sizeof *world->resident.kinematic) ||
-        !sadmm_grow_empty(&world->resident.kinematic_wrench, &world->resident.kinematic_wrench_capacity, 6 * n,
-                          sizeof *world->resident.kinematic_wrench))
+    if (!SADMM_GROW(world->resident.kinematic, 0, n) || !SADMM_GROW(world->resident.kinematic_wrench, 0, 6 * n))
         return sadmm_fail_memory(&world->error, "kinematic bodies");
     for (size_t k = 0; k < n; ++k) {
         const struct sadmm_world_body *body = &world->bodies[world->kinematic_slots[k]];
@@ -52,8 +49,7 @@ sadmm_status sadmm_world_read_kinematic_start(sadmm_world *world)
     const size_t n = (size_t)world->kinematic_count;
     start->kinematic_count = 0;
     if (n == 0) return SADMM_OK;
-    if (!sadmm_grow_empty(&start->kinematic, &start->kinematic_capacity, 6 * n, sizeof *start->kinematic))
-        return sadmm_fail_memory(&world->error, "kinematic bodies");
+    if (!SADMM_GROW(start->kinematic, 0, 6 * n)) return sadmm_fail_memory(&world->error, "kinematic bodies");
     TRY(world->kernels->resident->read_kinematic(world->context, NULL, NULL, start->kinematic, &world->error));
     start->kinematic_count = world->kinematic_count;
     return SADMM_OK;

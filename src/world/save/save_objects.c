@@ -50,8 +50,8 @@ static void archive_pair_table(struct sadmm_archive *archive, struct sadmm_pair_
         return;
     }
     values = count;
-    sadmm_archive_array(archive, &table->keys, &count, &table->key_capacity, sizeof *table->keys, SIZE_MAX);
-    sadmm_archive_array(archive, &table->values, &values, &table->value_capacity, sizeof *table->values, SIZE_MAX);
+    sadmm_archive_array(archive, &table->keys, &count, sizeof *table->keys, SIZE_MAX);
+    sadmm_archive_array(archive, &table->values, &values, sizeof *table->values, SIZE_MAX);
     if (!archive->reading ||
         !sadmm_archive_expect(archive, values == count && pairs_fit(table, count, slots), "pairs of bodies or shapes"))
         return;
@@ -108,9 +108,9 @@ static void archive_def(struct sadmm_archive *archive, sadmm_world_def *def)
 
 static void archive_name(struct sadmm_archive *archive, char **name)
 {
-    size_t length = archive->reading || !*name ? 0 : strlen(*name), none = 0;
+    size_t length = archive->reading || !*name ? 0 : strlen(*name);
     sadmm_archive_count(archive, &length, 1, SADMM_NAME_SIZE - 1);
-    if (archive->reading && (length == 0 || !sadmm_archive_room(archive, name, &none, length + 1, 1))) return;
+    if (archive->reading && (length == 0 || !sadmm_archive_room(archive, name, length + 1, 1))) return;
     if (length > 0) sadmm_archive_bytes(archive, *name, length);
     if (archive->reading && length > 0 && archive->status == SADMM_OK)
         sadmm_archive_expect(archive, sadmm_utf8_fit(*name, length) == length, "the name of a body");
@@ -181,7 +181,7 @@ static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size
 struct owners {
     const void **of; /* writing: sadmm_hull or sadmm_mesh; reading: likewise, new ones */
     bool *is_mesh;
-    size_t count, capacity, mesh_capacity;
+    size_t count;
     struct sadmm_key_tree numbers; /* writing: by address */
 };
 
@@ -209,10 +209,8 @@ static void list_owners(struct sadmm_archive *archive, const sadmm_world *world,
         if (!has_owner(world, slot)) continue;
         const void *owner = owner_of(world, slot);
         if (find_owner(owners, owner)) continue;
-        if (!sadmm_key_tree_reserve(&owners->numbers) ||
-            !sadmm_grow(&owners->of, &owners->capacity, owners->count, owners->count + 1, sizeof *owners->of) ||
-            !sadmm_grow(&owners->is_mesh, &owners->mesh_capacity, owners->count, owners->count + 1,
-                        sizeof *owners->is_mesh)) {
+        if (!sadmm_key_tree_reserve(&owners->numbers) || !SADMM_GROW(owners->of, owners->count, owners->count + 1) ||
+            !SADMM_GROW(owners->is_mesh, owners->count, owners->count + 1)) {
             fail_memory(archive);
             return;
         }
@@ -227,9 +225,8 @@ static void archive_owners(struct sadmm_archive *archive, const sadmm_world *wor
     if (!archive->reading) list_owners(archive, world, owners);
     size_t count = owners->count;
     sadmm_archive_count(archive, &count, 64, MOST_SLOTS);
-    if (archive->reading && !(sadmm_archive_room(archive, &owners->of, &owners->capacity, count, sizeof *owners->of) &&
-                              sadmm_archive_room(archive, &owners->is_mesh, &owners->mesh_capacity, count,
-                                                 sizeof *owners->is_mesh)))
+    if (archive->reading && !(sadmm_archive_room(archive, &owners->of, count, sizeof *owners->of) &&
+                              sadmm_archive_room(archive, &owners->is_mesh, count, sizeof *owners->is_mesh)))
         return;
     for (size_t k = 0; k < count && archive->status == SADMM_OK; ++k) {
         sadmm_hull *hull = archive->reading ? NULL : (sadmm_hull *)owners->of[k];
@@ -380,11 +377,9 @@ static void archive_joint_memory(struct sadmm_archive *archive, struct sadmm_joi
 static void archive_table(struct sadmm_archive *archive, sadmm_world *world, struct sadmm_world_joint *joint, int k)
 {
     int32_t *count = &joint->table_count[k];
-    size_t none = 0;
     sadmm_archive_count32(archive, count, 2 * sizeof(double), SADMM_MOST_SPRING_POINTS);
     const size_t numbers = 2 * (size_t)*count;
-    if (archive->reading &&
-        (numbers == 0 || !sadmm_archive_room(archive, &joint->table[k], &none, numbers, sizeof(double)))) {
+    if (archive->reading && (numbers == 0 || !sadmm_archive_room(archive, &joint->table[k], numbers, sizeof(double)))) {
         *count = 0;
         return;
     }
@@ -490,9 +485,8 @@ static void archive_gears(struct sadmm_archive *archive, sadmm_world *world)
 {
     size_t slots = world->gear_slots;
     sadmm_archive_count(archive, &slots, 5, MOST_SLOTS);
-    if (archive->reading &&
-        !(sadmm_archive_room(archive, &world->gears, &world->gear_capacity, slots, sizeof *world->gears) &&
-          sadmm_slots_reserve(&world->gears_taken, slots))) {
+    if (archive->reading && !(sadmm_archive_room(archive, &world->gears, slots, sizeof *world->gears) &&
+                              sadmm_slots_reserve(&world->gears_taken, slots))) {
         fail_memory(archive);
         return;
     }
@@ -546,9 +540,8 @@ static void archive_couplings(struct sadmm_archive *archive, sadmm_world *world)
 {
     size_t slots = world->coupling_slots, of_couplings = 0;
     sadmm_archive_count(archive, &slots, 5, MOST_SLOTS);
-    if (archive->reading &&
-        !(sadmm_archive_room(archive, &world->couplings, &world->coupling_capacity, slots, sizeof *world->couplings) &&
-          sadmm_slots_reserve(&world->couplings_taken, slots))) {
+    if (archive->reading && !(sadmm_archive_room(archive, &world->couplings, slots, sizeof *world->couplings) &&
+                              sadmm_slots_reserve(&world->couplings_taken, slots))) {
         fail_memory(archive);
         return;
     }
@@ -567,9 +560,8 @@ void sadmm_archive_objects(struct sadmm_archive *archive, sadmm_world *world)
     size_t slots = world->body_slots;
     archive_def(archive, &world->def);
     sadmm_archive_count(archive, &slots, 5, MOST_SLOTS);
-    if (archive->reading &&
-        !(sadmm_archive_room(archive, &world->bodies, &world->body_capacity, slots, sizeof *world->bodies) &&
-          sadmm_slots_reserve(&world->bodies_taken, slots))) {
+    if (archive->reading && !(sadmm_archive_room(archive, &world->bodies, slots, sizeof *world->bodies) &&
+                              sadmm_slots_reserve(&world->bodies_taken, slots))) {
         fail_memory(archive);
         return;
     }

@@ -83,8 +83,8 @@ static void archive_contacts(struct sadmm_archive *archive, sadmm_world *world)
 {
     struct sadmm_contact_set *set = &world->contacts;
     _Static_assert(sizeof *set->pairs == 80 && sizeof *set->points == 96, "no padding");
-    sadmm_archive_array(archive, &set->pairs, &set->pair_count, &set->pair_capacity, sizeof *set->pairs, INT32_MAX);
-    sadmm_archive_array(archive, &set->points, &set->point_count, &set->point_capacity, sizeof *set->points, INT32_MAX);
+    sadmm_archive_array(archive, &set->pairs, &set->pair_count, sizeof *set->pairs, INT32_MAX);
+    sadmm_archive_array(archive, &set->points, &set->point_count, sizeof *set->points, INT32_MAX);
     SADMM_ARCHIVE(archive, set->dt);
     archive_migrations(archive, set);
     if (archive->reading && archive->status == SADMM_OK)
@@ -110,7 +110,7 @@ static void archive_hits(struct sadmm_archive *archive, sadmm_world *world)
 {
     struct sadmm_step_start *start = &world->start;
     _Static_assert(sizeof *start->hits == 168, "no padding");
-    sadmm_archive_array(archive, &start->hits, &start->hit_count, &start->hit_capacity, sizeof *start->hits, INT32_MAX);
+    sadmm_archive_array(archive, &start->hits, &start->hit_count, sizeof *start->hits, INT32_MAX);
     SADMM_ARCHIVE(archive, start->hit_first);
     if (archive->reading && archive->status == SADMM_OK) sadmm_archive_expect(archive, hits_fit(world), "hits");
 }
@@ -138,8 +138,7 @@ static void archive_rows(struct sadmm_archive *archive, sadmm_world *world)
     sadmm_archive_count(archive, &constraints, 25, INT32_MAX);
     sadmm_archive_count(archive, &count, 19 * sizeof(double), INT32_MAX);
     if (archive->reading && archive->status == SADMM_OK) {
-        if (!sadmm_rows_reserve(rows, constraints, count) ||
-            !sadmm_grow_empty(&world->start.multiplier, &world->start.multiplier_capacity, count, sizeof(double))) {
+        if (!sadmm_rows_reserve(rows, constraints, count) || !SADMM_GROW(world->start.multiplier, 0, count)) {
             archive->status = sadmm_fail_memory(archive->error, "the state of a world");
             return;
         }
@@ -233,17 +232,17 @@ void sadmm_archive_step(struct sadmm_archive *archive, sadmm_world *world)
            kinematic = 6 * (size_t)start->kinematic_count;
     if (archive->reading)
         sadmm_archive_expect(archive, world->plan.bodies >= 0, "the plan of a step"); /* bodies may have come since */
-    sadmm_archive_array(archive, &start->kinematic, &kinematic, &start->kinematic_capacity, sizeof(double), INT32_MAX);
+    sadmm_archive_array(archive, &start->kinematic, &kinematic, sizeof(double), INT32_MAX);
     start->kinematic_count = (int32_t)(kinematic / 6);
     /* Without contacts that can be read nothing of this can. */
-    sadmm_archive_array(archive, &start->rigid, &bodies, &start->rigid_capacity, sizeof *start->rigid, INT32_MAX);
-    sadmm_archive_array(archive, &start->velocity, &numbers, &start->velocity_capacity, sizeof(double), INT32_MAX);
+    sadmm_archive_array(archive, &start->rigid, &bodies, sizeof *start->rigid, INT32_MAX);
+    sadmm_archive_array(archive, &start->velocity, &numbers, sizeof(double), INT32_MAX);
     if (archive->reading)
         sadmm_archive_expect(archive, numbers == 6 * bodies && (!readable || bodies == (size_t)world->plan.bodies),
                              "the start of a step");
     archive_contacts(archive, world);
     numbers = readable ? 3 * world->contacts.point_count : 0;
-    sadmm_archive_array(archive, &start->impulse, &numbers, &start->impulse_capacity, sizeof(double), INT32_MAX);
+    sadmm_archive_array(archive, &start->impulse, &numbers, sizeof(double), INT32_MAX);
     if (archive->reading)
         sadmm_archive_expect(archive, !readable || numbers == 3 * world->contacts.point_count, "the start of a step");
     archive_hits(archive, world);

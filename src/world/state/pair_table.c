@@ -73,8 +73,7 @@ sadmm_status sadmm_pair_table_list(struct sadmm_pair_table *table, struct sadmm_
 {
     const size_t count = sadmm_pair_table_count(table);
     if (table->listed) return SADMM_OK;
-    if (!sadmm_grow_empty(&table->keys, &table->key_capacity, count, sizeof *table->keys) ||
-        !sadmm_grow_empty(&table->values, &table->value_capacity, count, sizeof *table->values))
+    if (!SADMM_GROW(table->keys, 0, count) || !SADMM_GROW(table->values, 0, count))
         return sadmm_fail_memory(error, "pair overrides");
     list_below(table, table->pairs.root, 0);
     table->listed = true;

@@ -14,8 +14,7 @@ struct sadmm_pair_table {
     struct sadmm_key_tree pairs, mirrored; /* mirrored: by high slot << 32 | low slot */
     uint64_t *keys; /* sorted, with their values: as they were listed last */
     double *values;
-    bool listed;    /* they are as in `pairs` */
-    size_t key_capacity, value_capacity;
+    bool listed; /* they are as in `pairs` */
 };
 
 size_t sadmm_pair_table_count(const struct sadmm_pair_table *table);

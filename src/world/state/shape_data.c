@@ -17,8 +17,7 @@ static struct sadmm_shape_data_entry *find(const struct sadmm_shape_data *data, 
 /* Room for `end` doubles, and the first blocks. */
 static sadmm_status reserve(struct sadmm_shape_data *data, size_t end, struct sadmm_error *error)
 {
-    if (!sadmm_grow(&data->blocks, &data->block_capacity, data->doubles, end, sizeof *data->blocks))
-        return sadmm_fail_memory(error, "the hull or mesh of a shape");
+    if (!SADMM_GROW(data->blocks, data->doubles, end)) return sadmm_fail_memory(error, "the hull or mesh of a shape");
     if (data->doubles == 0) sadmm_hull_prelude(data->blocks);
     return SADMM_OK;
 }
@@ -32,8 +31,7 @@ sadmm_status sadmm_shape_data_add(struct sadmm_shape_data *data, const struct sa
         if (end > INT32_MAX)
             return sadmm_fail(error, SADMM_ERROR_LIMIT, "hulls and meshes of %zu numbers: a world has room for 2^31",
                               end);
-        if (!sadmm_grow(&data->entries, &data->capacity, data->count, data->count + 1, sizeof *data->entries) ||
-            !sadmm_key_tree_reserve(&data->places))
+        if (!SADMM_GROW(data->entries, data->count, data->count + 1) || !sadmm_key_tree_reserve(&data->places))
             return sadmm_fail_memory(error, "the hull or mesh of a shape");
         TRY(reserve(data, end, error));
         memcpy(data->blocks + begin, of->block, of->doubles * sizeof *data->blocks);

@@ -26,10 +26,10 @@ struct sadmm_shape_data_entry {
 
 struct sadmm_shape_data {
     struct sadmm_shape_data_entry *entries; /* in any order */
-    size_t count, capacity;
+    size_t count;
     struct sadmm_key_tree places;    /* from the owner's address to the index of its entry */
     double *blocks;                  /* in the order in which they came; none of them without an owner or a hold */
-    size_t doubles, block_capacity;
+    size_t doubles;
     size_t unused;                   /* doubles of what is gone */
     size_t holds;                    /* shapes that need only the first blocks (geometry.h: smooth ones) */
     uint32_t revision;               /* changes whenever the blocks do */

@@ -25,8 +25,7 @@ bool sadmm_slots_reserve(struct sadmm_slot_set *set, size_t slots)
     size_t words = set->words ? set->words : 1;
     while (words * BITS < slots) words *= 2;
     if (words == set->words) return true;
-    if (!sadmm_grow(&set->bits, &set->bit_capacity, set->words, words, sizeof *set->bits) ||
-        !sadmm_grow(&set->sums, &set->sum_capacity, set->words ? set->words + 1 : 0, words + 1, sizeof *set->sums))
+    if (!SADMM_GROW(set->bits, set->words, words) || !SADMM_GROW(set->sums, set->words ? set->words + 1 : 0, words + 1))
         return false;
     /* what is new is empty, but for the sums from the first word on */
     for (size_t i = 2 * set->words; set->words && i <= words; i *= 2) set->sums[i] = set->sums[set->words];

@@ -13,7 +13,6 @@ struct sadmm_slot_set {
     uint64_t *bits;
     uint32_t *sums;     /* sums[i], i >= 1: taken slots in the words [i - (lowest bit of i), i) */
     size_t words;       /* a power of two, or 0 */
-    size_t bit_capacity, sum_capacity;
 };
 
 /* Room for `slots` slots; false, with nothing changed, when memory runs out. */

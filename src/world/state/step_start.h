@@ -11,7 +11,7 @@ struct sadmm_world_hit;
  * would have started with the velocity that they have after it. */
 struct sadmm_step_start {
     struct sadmm_world_hit *hits;              /* of the step, in the order of time within each sub-step */
-    size_t hit_count, hit_capacity, hit_first; /* hit_first: the first one of the last sub-step */
+    size_t hit_count, hit_first;               /* hit_first: the first one of the last sub-step */
     struct sadmm_rigid *rigid; /* dynamic bodies */
     double *velocity;          /* dynamic bodies x 6: the warm start */
     double *impulse;           /* points x 3: the warm start */
@@ -19,7 +19,6 @@ struct sadmm_step_start {
     double *multiplier;        /* rows: the warm start */
     double *kinematic;         /* kinematic bodies x 6: velocities, m/s, rad/s */
     int32_t kinematic_count;
-    size_t kinematic_capacity, rigid_capacity, velocity_capacity, impulse_capacity, multiplier_capacity;
 };
 
 #endif

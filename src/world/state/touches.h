@@ -14,7 +14,7 @@ struct sadmm_touch {
 /* By slots of a, then of b. */
 struct sadmm_touches {
     struct sadmm_touch *list;
-    size_t count, capacity;
+    size_t count;
 };
 
 #endif

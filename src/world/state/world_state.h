@@ -35,7 +35,7 @@ struct sadmm_world {
     struct sadmm_team team;
 
     struct sadmm_world_body *bodies;
-    size_t body_slots, body_capacity;
+    size_t body_slots;
     int32_t body_count, dynamic_count, kinematic_count;
     int32_t *kinematic_slots; /* of these, ascending, as of the last step */
     bool kinematic_listed;    /* none has come or gone since */
@@ -43,35 +43,34 @@ struct sadmm_world {
     struct sadmm_shape *shapes;
     uint32_t *shape_generations;
     struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */
-    size_t shape_slots, shape_capacity, shape_generation_capacity, geometry_capacity;
+    size_t shape_slots;
     int32_t shape_count, sensor_count; /* sensors: of these */
     int32_t bouncing_count; /* shapes with restitution */
     struct sadmm_slot_set shapes_taken;
-    struct sadmm_link *shape_links;    /* by slot: the shapes of a body */
-    size_t shape_link_capacity;
+    struct sadmm_link *shape_links; /* by slot: the shapes of a body */
     uint32_t shape_revisions;
     struct sadmm_shape_data shape_data;
     struct sadmm_world_block_shape *block_shapes; /* by slot, as far as there are hulls or meshes */
-    size_t block_shape_slots, block_shape_capacity;
+    size_t block_shape_slots;
     struct sadmm_pair_table disabled_pairs, friction_pairs;
 
     struct sadmm_world_joint *joints;
-    size_t joint_slots, joint_capacity;
+    size_t joint_slots;
     int32_t joint_count;                  /* live slots, those of couplings among them */
     struct sadmm_slot_set joints_taken, own_joints; /* all; those that are of no coupling */
     int32_t table_count;                  /* tables of springs, of all joints */
     struct sadmm_world_gear *gears;
-    size_t gear_slots, gear_capacity;
+    size_t gear_slots;
     int32_t gear_count;
     struct sadmm_slot_set gears_taken;
     size_t joint_rows;                    /* of the step's rows: the first ones; those of gears follow */
     struct sadmm_world_coupling *couplings;
-    size_t coupling_slots, coupling_capacity;
+    size_t coupling_slots;
     int32_t coupling_count;
     struct sadmm_slot_set couplings_taken;
     struct sadmm_pair_table jointed_pairs; /* bodies that do not meet for their joints; values: how many joints */
     uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
-    size_t filtered_count, filtered_capacity;
+    size_t filtered_count;
     struct sadmm_joint_source *joint_sources; /* of the step's rows */
     double *joint_load;                       /* dynamic bodies x 3: what joints may stiffen them by, N m; */
     struct joint_stiffening *stiffening;      /* by what they do, those that may be; */
@@ -82,23 +81,17 @@ struct sadmm_world {
     uint8_t *folding;                         /* dynamic bodies: of joints that fold; */
     double *row_left;                         /* rows: what is left of them */
     struct joint_closing_cost *closing_costs; /* dynamic bodies: what that costs (joint_close.c) */
-    size_t joint_load_capacity, stiffening_capacity, stiffened_capacity, closing_slot_capacity, opened_capacity,
-        closing_cost_capacity, folding_capacity, row_left_capacity;
     struct sadmm_row_constraint *joint_constraints; /* all that joints may have, in order; most have rows in the step */
-    size_t joint_constraint_count, joint_constraint_capacity;
+    size_t joint_constraint_count;
     struct acting_joint *acting_joints;       /* by slot: in the (sub-)step at hand; */
     struct sadmm_world_joint_side *joint_sides; /* dynamic bodies: theirs, if it is of this number */
     int64_t joint_sides_made;
-    size_t acting_joint_capacity, joint_side_capacity;
     struct sadmm_trapezoid *trapezoids;       /* dynamic bodies, in steps without a solve, and one more; */
     int32_t *touch;                           /* what their contacts say of them */
-    size_t trapezoid_capacity, touch_capacity;
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
     uint16_t *joint_touch;                    /* of islands, at their labels (joint_move.c) */
     int32_t *joint_number;                    /* of bodies of islands whose momentum is restored (joint_momentum.c) */
     struct joint_momentum *joint_momentum;    /* at these numbers */
-    size_t joint_source_capacity, joint_label_capacity, joint_touch_capacity, joint_number_capacity,
-        joint_momentum_capacity;
     int32_t joints_acting, couplings_acting;  /* in the step at hand */
 
     /* The last step: everything freeze, contacts and the next warm start need. */
@@ -115,9 +108,6 @@ struct sadmm_world {
     int32_t *supports, *support_labels;            /* islands, and at their labels what supports them */
     double *wrench_sum;                            /* dynamic bodies x 6, of these; both only where there are several */
     int32_t *slot_of;                              /* dynamic body -> slot */
-    size_t collision_body_capacity, next_capacity, velocity_capacity, wrench_capacity, slot_of_capacity,
-        extrapolation_capacity, wrench_sum_capacity, kinematic_capacity, kinematic_slot_capacity,
-        support_motion_capacity, support_capacity, support_label_capacity;
     struct sadmm_plan plan;
     sadmm_settings step_settings;                  /* of the whole step */
     bool stepped;
@@ -140,8 +130,7 @@ struct sadmm_world {
         struct sadmm_resident_update *updates; /* for the backend, when a step is enqueued */
         unsigned char *held; /* by body slot: joints hold it (hits.c) */
         bool hits_behind;    /* those of the last step are not here yet */
-        size_t held_capacity, extrapolation_capacity, kinematic_capacity, kinematic_wrench_capacity, dirty_count,
-            dirty_capacity, update_capacity;
+        size_t dirty_count;
         struct sadmm_resident_joint *joints; /* as they were loaded; */
         struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
         int32_t *joint_slots;                /* their slots */
@@ -149,15 +138,12 @@ struct sadmm_world {
         double *solution;                    /* of their rows */
         uint32_t *dirty_joints;              /* slots of joints with `dirty`; capacity: all */
         double *tables;                      /* of springs, joint by joint */
-        size_t table_numbers, table_capacity;
+        size_t table_numbers;
         struct sadmm_resident_gear *gears;   /* in slot order */
         double *gear_force;                  /* likewise */
         bool gears_dirty;                    /* some of them */
-        size_t gear_capacity, gear_force_capacity;
         int32_t joint_count, joint_constraints, coupling_count, gear_count;
-        size_t joint_capacity, memory_capacity, coupling_memory_capacity, joint_slot_capacity, solution_capacity,
-            dirty_joint_count,
-            dirty_joint_capacity;
+        size_t dirty_joint_count;
     } resident;
 
     /* What queries search (query_scene.c). */
@@ -168,7 +154,6 @@ struct sadmm_world {
         double *prelude; /* what boxes and the like are to a hull (hull_data.h) */
         struct sadmm_query_hit *hits; /* of a ray */
         uint64_t *slots, *spare;      /* of an overlap */
-        size_t hit_capacity, slot_capacity, spare_capacity;
     } query;
 
     /* What has begun and ended (events.c). */
@@ -180,7 +165,6 @@ struct sadmm_world {
         struct sadmm_touches touching, inside;         /* contacts, sensors, of the last step recorded */
         struct sadmm_touches touching_now, inside_now; /* of the step at hand */
         struct sadmm_touching_shapes *pairs;           /* of its contacts, which of them touch */
-        size_t pair_capacity;
     } events;
 
     struct sadmm_hits *hits; /* made with the first pair that is fast */

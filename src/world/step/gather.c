@@ -93,18 +93,11 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     /* One at least: a system without bodies is still one of rigid bodies. */
     size_t n = (size_t)world->dynamic_count + 1, slots = world->body_slots;
     const size_t several = world->def.settings.substeps > 1 ? n : 0;
-    if (!sadmm_grow_empty(&world->collision_bodies, &world->collision_body_capacity, slots,
-                          sizeof *world->collision_bodies) ||
-        !sadmm_grow_empty(&world->start.rigid, &world->start.rigid_capacity, n, sizeof *world->start.rigid) ||
-        !sadmm_grow_empty(&world->next, &world->next_capacity, n, sizeof *world->next) ||
-        !sadmm_grow_empty(&world->velocity, &world->velocity_capacity, 6 * n, sizeof *world->velocity) ||
-        !sadmm_grow_empty(&world->wrench, &world->wrench_capacity, 6 * n, sizeof *world->wrench) ||
-        !sadmm_grow_empty(&world->start.velocity, &world->start.velocity_capacity, 6 * n,
-                          sizeof *world->start.velocity) ||
-        !sadmm_grow_empty(&world->extrapolation, &world->extrapolation_capacity, several,
-                          sizeof *world->extrapolation) ||
-        !sadmm_grow_empty(&world->wrench_sum, &world->wrench_sum_capacity, 6 * several, sizeof *world->wrench_sum) ||
-        !sadmm_grow_empty(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
+    if (!SADMM_GROW(world->collision_bodies, 0, slots) || !SADMM_GROW(world->start.rigid, 0, n) ||
+        !SADMM_GROW(world->next, 0, n) || !SADMM_GROW(world->velocity, 0, 6 * n) ||
+        !SADMM_GROW(world->wrench, 0, 6 * n) || !SADMM_GROW(world->start.velocity, 0, 6 * n) ||
+        !SADMM_GROW(world->extrapolation, 0, several) || !SADMM_GROW(world->wrench_sum, 0, 6 * several) ||
+        !SADMM_GROW(world->slot_of, 0, n))
         return sadmm_fail_memory(&world->error, "the step");
     struct gathering g;
     g.world = world;

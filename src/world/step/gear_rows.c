@@ -61,9 +61,7 @@ bool sadmm_world_gear_reaches(const sadmm_world *world, const struct sadmm_world
 static bool add_slot(sadmm_world *world, const struct sadmm_row_constraint *constraint)
 {
     const size_t at = world->joint_constraint_count;
-    if (!sadmm_grow(&world->joint_constraints, &world->joint_constraint_capacity, at, at + 1,
-                    sizeof *world->joint_constraints))
-        return false;
+    if (!SADMM_GROW(world->joint_constraints, at, at + 1)) return false;
     world->joint_constraints[world->joint_constraint_count++] = *constraint;
     return true;
 }
@@ -87,10 +85,7 @@ sadmm_status sadmm_world_make_gear_rows(sadmm_world *world, const sadmm_settings
             if (!add_slot(world, &none)) return sadmm_fail_memory(&world->error, "the gears' rows");
             continue;
         }
-        if (!sadmm_grow(&world->joint_sources, &world->joint_source_capacity, r, r + 1,
-                        sizeof *world->joint_sources) ||
-            !sadmm_grow(&world->start.multiplier, &world->start.multiplier_capacity, r, r + 1,
-                        sizeof *world->start.multiplier) ||
+        if (!SADMM_GROW(world->joint_sources, r, r + 1) || !SADMM_GROW(world->start.multiplier, r, r + 1) ||
             sadmm_rows_add(rows, 1, acting.body[a], acting.body[b]) < 0 ||
             !add_slot(world, &rows->constraints[rows->constraint_count - 1]))
             return sadmm_fail_memory(&world->error, "the gears' rows");

@@ -44,8 +44,7 @@ struct sadmm_hits {
     struct foreseen *foreseen;
     int32_t *queue;                     /* a heap of these, the next one first */
     struct sadmm_pair_list fast, pairs; /* of the sub-step; of a shape that was hit */
-    size_t kind_capacity, index_capacity, since_capacity, count, capacity, foreseen_count, foreseen_capacity,
-        queue_count, queue_capacity;
+    size_t count, foreseen_count, queue_count;
 };
 
 /* What a sub-step's hits are worked out with. */
@@ -66,7 +65,7 @@ static bool comes_first(const struct sadmm_hits *h, int32_t x, int32_t y)
 
 static bool add_to_queue(struct sadmm_hits *h, int32_t item)
 {
-    if (!sadmm_grow(&h->queue, &h->queue_capacity, h->queue_count, h->queue_count + 1, sizeof *h->queue)) return false;
+    if (!SADMM_GROW(h->queue, h->queue_count, h->queue_count + 1)) return false;
     size_t at = h->queue_count++;
     for (; at > 0 && comes_first(h, item, h->queue[(at - 1) / 2]); at = (at - 1) / 2)
         h->queue[at] = h->queue[(at - 1) / 2];
@@ -96,7 +95,7 @@ static int32_t swept_body_of(struct taking *t, int32_t slot)
     const sadmm_world *world = t->world;
     const int32_t system = world->collision_bodies[slot].system_body;
     if (h->index[slot] > 0) return h->index[slot] - 1;
-    if (!sadmm_grow(&h->list, &h->capacity, h->count, h->count + 1, sizeof *h->list)) return -1;
+    if (!SADMM_GROW(h->list, h->count, h->count + 1)) return -1;
     struct swept_body *f = &h->list[h->count];
     memset(f, 0, sizeof *f);
     f->slot = slot;
@@ -143,8 +142,7 @@ static bool foresee(struct taking *t, uint64_t key, double from)
     const bool found = sadmm_flight_touch(&pair, from, t->settings.dt, &touch);
     for (int side = 0; pair.lost && side < 2; ++side) give_up(&h->list[number[side]]);
     if (!found) return true;
-    if (!sadmm_grow(&h->foreseen, &h->foreseen_capacity, h->foreseen_count, h->foreseen_count + 1, sizeof *h->foreseen))
-        return false;
+    if (!SADMM_GROW(h->foreseen, h->foreseen_count, h->foreseen_count + 1)) return false;
     h->foreseen[h->foreseen_count] =
         (struct foreseen){key, pair.subshape, {number[0], number[1]}, {a->hits, b->hits}, touch};
     return add_to_queue(h, (int32_t)h->foreseen_count++);
@@ -192,9 +190,7 @@ static bool record(struct taking *t, const struct foreseen *item, const struct h
     struct sadmm_step_start *start = &t->world->start;
     for (int k = 0; k < hit->count; ++k) {
         if (!(hit->impulse[k].x > 0)) continue;
-        if (!sadmm_grow(&start->hits, &start->hit_capacity, start->hit_count, start->hit_count + 1,
-                        sizeof *start->hits))
-            return false;
+        if (!SADMM_GROW(start->hits, start->hit_count, start->hit_count + 1)) return false;
         struct sadmm_world_hit *out = &start->hits[start->hit_count++];
         memset(out, 0, sizeof *out);
         out->shape_a = (int32_t)(item->key >> 32);
@@ -246,9 +242,7 @@ static bool holds(const struct sadmm_hits *h, const struct foreseen *item)
 
 static bool reserve(struct sadmm_hits *h, size_t slots)
 {
-    return sadmm_grow(&h->kinds, &h->kind_capacity, 0, slots, sizeof *h->kinds) &&
-           sadmm_grow(&h->index, &h->index_capacity, 0, slots, sizeof *h->index) &&
-           sadmm_grow(&h->since, &h->since_capacity, 0, slots, sizeof *h->since);
+    return SADMM_GROW(h->kinds, 0, slots) && SADMM_GROW(h->index, 0, slots) && SADMM_GROW(h->since, 0, slots);
 }
 
 static unsigned char swept_kind(const struct sadmm_world_body *body, double dt)

@@ -41,8 +41,7 @@ sadmm_status sadmm_world_integrate(sadmm_world *world, const struct sadmm_system
                                    const sadmm_settings *settings, const int32_t *label)
 {
     const size_t n = (size_t)world->dynamic_count;
-    if (!sadmm_grow_empty(&world->trapezoids, &world->trapezoid_capacity, n + 1, sizeof *world->trapezoids) ||
-        !sadmm_grow_empty(&world->touch, &world->touch_capacity, n, sizeof *world->touch))
+    if (!SADMM_GROW(world->trapezoids, 0, n + 1) || !SADMM_GROW(world->touch, 0, n))
         return sadmm_fail_memory(&world->error, "the motion of bodies");
     find_trapezoids(world, settings, world->trapezoids);
     memset(world->touch, 0, n * sizeof *world->touch);

@@ -36,13 +36,10 @@ static struct joint_side side_of(sadmm_world *world, struct joint_body body, con
 
 bool sadmm_world_begin_acting(sadmm_world *world)
 {
-    const size_t n = has_room(world) ? (size_t)world->dynamic_count : 0, before = world->joint_side_capacity;
-    if (!sadmm_grow_empty(&world->acting_joints, &world->acting_joint_capacity, world->joint_slots,
-                          sizeof *world->acting_joints) ||
-        !sadmm_grow_empty(&world->joint_sides, &world->joint_side_capacity, n, sizeof *world->joint_sides))
-        return false;
-    if (world->joint_side_capacity != before)
-        memset(world->joint_sides, 0, world->joint_side_capacity * sizeof *world->joint_sides);
+    const size_t n = has_room(world) ? (size_t)world->dynamic_count : 0, before = SADMM_ROOM(world->joint_sides);
+    if (!SADMM_GROW(world->acting_joints, 0, world->joint_slots) || !SADMM_GROW(world->joint_sides, 0, n)) return false;
+    if (SADMM_ROOM(world->joint_sides) != before)
+        memset(world->joint_sides, 0, SADMM_ROOM(world->joint_sides) * sizeof *world->joint_sides);
     ++world->joint_sides_made;
     return true;
 }

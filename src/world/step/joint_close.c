@@ -125,12 +125,10 @@ static sadmm_status find_folding(sadmm_world *world, bool *any)
 {
     const size_t n = (size_t)world->dynamic_count, rows = world->start.rows.row_count;
     *any = false;
-    if (!sadmm_grow_empty(&world->folding, &world->folding_capacity, n, sizeof *world->folding))
-        return sadmm_fail_memory(&world->error, "joints that fold");
+    if (!SADMM_GROW(world->folding, 0, n)) return sadmm_fail_memory(&world->error, "joints that fold");
     memset(world->folding, 0, n);
     if (!sadmm_articulations_has_loops(world->articulations)) return SADMM_OK;
-    if (!sadmm_grow_empty(&world->row_left, &world->row_left_capacity, rows, sizeof *world->row_left))
-        return sadmm_fail_memory(&world->error, "joints that fold");
+    if (!SADMM_GROW(world->row_left, 0, rows)) return sadmm_fail_memory(&world->error, "joints that fold");
     memset(world->row_left, 0, rows * sizeof *world->row_left);
     sadmm_articulations_find_left(world->articulations, world->joint_constraints, world->row_left);
     for (size_t r = 0; r < world->joint_rows; ++r) {
@@ -174,9 +172,7 @@ static bool make_rows(sadmm_world *world, const sadmm_settings *settings)
 {
     size_t at = 0;
     sadmm_rows_clear(&world->closing);
-    if (!sadmm_grow_empty(&world->closing_slots, &world->closing_slot_capacity, world->joint_constraint_count,
-                          sizeof *world->closing_slots))
-        return false;
+    if (!SADMM_GROW(world->closing_slots, 0, world->joint_constraint_count)) return false;
     for (size_t k = 0; k < world->joint_constraint_count; ++k) {
         world->closing_slots[k] = world->joint_constraints[k];
         world->closing_slots[k].first = world->closing_slots[k].count = 0;
@@ -249,8 +245,7 @@ sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *
 {
     struct sadmm_system system = sadmm_world_system(world);
     const size_t n = (size_t)world->dynamic_count;
-    if (!sadmm_grow_empty(&world->opened, &world->opened_capacity, n, sizeof *world->opened) ||
-        !sadmm_grow_empty(&world->closing_costs, &world->closing_cost_capacity, n, sizeof *world->closing_costs))
+    if (!SADMM_GROW(world->opened, 0, n) || !SADMM_GROW(world->closing_costs, 0, n))
         return sadmm_fail_memory(&world->error, "joints that close");
     bool any = false, folding = false;
     TRY(find_folding(world, &folding));

@@ -88,13 +88,10 @@ static size_t number_bodies(const sadmm_world *world)
 sadmm_status sadmm_world_restore_articulated(sadmm_world *world, const sadmm_settings *settings)
 {
     const int32_t n = world->dynamic_count;
-    if (!sadmm_grow_empty(&world->joint_number, &world->joint_number_capacity, (size_t)n, sizeof *world->joint_number))
-        return sadmm_fail_memory(&world->error, "islands of joints");
+    if (!SADMM_GROW(world->joint_number, 0, (size_t)n)) return sadmm_fail_memory(&world->error, "islands of joints");
     const size_t count = number_bodies(world);
     if (count == 0) return SADMM_OK;
-    if (!sadmm_grow_empty(&world->joint_momentum, &world->joint_momentum_capacity, count,
-                          sizeof *world->joint_momentum))
-        return sadmm_fail_memory(&world->error, "islands of joints");
+    if (!SADMM_GROW(world->joint_momentum, 0, count)) return sadmm_fail_memory(&world->error, "islands of joints");
     memset(world->joint_momentum, 0, count * sizeof *world->joint_momentum);
     for (size_t k = 0; k < world->contacts.pair_count; ++k) add_pair(world, &world->contacts.pairs[k], settings->dt);
     for (size_t k = 0; k < world->start.rows.constraint_count; ++k)

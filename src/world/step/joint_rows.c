@@ -41,10 +41,8 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
     struct sadmm_rows *rows = &world->start.rows;
     const struct sadmm_world_joint *joint = &world->joints[slot];
     const size_t all = rows->row_count + (size_t)laws->count;
-    if (!sadmm_grow(&world->joint_sources, &world->joint_source_capacity, rows->row_count, all,
-                    sizeof *world->joint_sources) ||
-        !sadmm_grow(&world->start.multiplier, &world->start.multiplier_capacity, rows->row_count, all,
-                    sizeof *world->start.multiplier))
+    if (!SADMM_GROW(world->joint_sources, rows->row_count, all) ||
+        !SADMM_GROW(world->start.multiplier, rows->row_count, all))
         return false;
     double offset[3];
     v3_store(v3_sub(acting->middle.arm_a, acting->middle.arm_b), offset);
@@ -88,9 +86,7 @@ static bool add_slots(sadmm_world *world, const struct sadmm_world_joint *joint,
 {
     const size_t count = (size_t)sadmm_joint_constraints(joint), begin = world->joint_constraint_count;
     const struct sadmm_rows *rows = &world->start.rows;
-    if (!sadmm_grow(&world->joint_constraints, &world->joint_constraint_capacity, begin, begin + count,
-                    sizeof *world->joint_constraints))
-        return false;
+    if (!SADMM_GROW(world->joint_constraints, begin, begin + count)) return false;
     for (size_t k = 0; k < count; ++k)
         world->joint_constraints[begin + k] =
             first + k < rows->constraint_count
@@ -141,7 +137,7 @@ static sadmm_status filter_pairs(sadmm_world *world)
     TRY(sadmm_pair_table_list(jointed, &world->error));
     TRY(sadmm_pair_table_list(&world->friction_pairs, &world->error));
     if (of_jointed == 0) return SADMM_OK;
-    if (!sadmm_grow_empty(&world->filtered_pairs, &world->filtered_capacity, count, sizeof *world->filtered_pairs))
+    if (!SADMM_GROW(world->filtered_pairs, 0, count))
         return sadmm_fail_memory(&world->error, "pairs of jointed bodies");
     for (size_t k = 0, i = 0, j = 0; k < count; ++k) {
         const bool from_own = j == of_jointed || (i < of_own && own->keys[i] < jointed->keys[j]);

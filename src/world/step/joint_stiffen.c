@@ -83,9 +83,8 @@ sadmm_status sadmm_world_stiffen(sadmm_world *world, const sadmm_settings *setti
     bool may = false;
     *any = false;
     if (world->joint_rows == 0) return SADMM_OK;
-    if (!sadmm_grow_empty(&world->joint_load, &world->joint_load_capacity, 3 * n, sizeof *world->joint_load) ||
-        !sadmm_grow_empty(&world->stiffening, &world->stiffening_capacity, n, sizeof *world->stiffening) ||
-        !sadmm_grow_empty(&world->stiffened, &world->stiffened_capacity, n, sizeof *world->stiffened))
+    if (!SADMM_GROW(world->joint_load, 0, 3 * n) || !SADMM_GROW(world->stiffening, 0, n) ||
+        !SADMM_GROW(world->stiffened, 0, n))
         return sadmm_fail_memory(&world->error, "the stiffness of joints");
     memset(world->joint_load, 0, 3 * n * sizeof *world->joint_load);
     each_force(world, settings->dt, add_most);

@@ -19,8 +19,7 @@ static sadmm_status list_kinematic(sadmm_world *world)
 {
     size_t count = 0;
     if (world->kinematic_listed) return SADMM_OK;
-    if (!sadmm_grow_empty(&world->kinematic_slots, &world->kinematic_slot_capacity, (size_t)world->kinematic_count,
-                          sizeof *world->kinematic_slots))
+    if (!SADMM_GROW(world->kinematic_slots, 0, (size_t)world->kinematic_count))
         return sadmm_fail_memory(&world->error, "kinematic bodies");
     for (size_t slot = 0; slot < world->body_slots; ++slot)
         if (world->bodies[slot].alive && world->bodies[slot].type == SADMM_BODY_KINEMATIC)
@@ -43,8 +42,7 @@ sadmm_status sadmm_world_gather_kinematic(sadmm_world *world)
     start->kinematic_count = 0;
     if (n == 0) return SADMM_OK;
     TRY(list_kinematic(world));
-    if (!sadmm_grow_empty(&start->kinematic, &start->kinematic_capacity, 6 * n, sizeof *start->kinematic) ||
-        !sadmm_grow_empty(&world->kinematic, &world->kinematic_capacity, n, sizeof *world->kinematic))
+    if (!SADMM_GROW(start->kinematic, 0, 6 * n) || !SADMM_GROW(world->kinematic, 0, n))
         return sadmm_fail_memory(&world->error, "kinematic bodies");
     for (size_t k = 0; k < n; ++k) {
         const int32_t slot = world->kinematic_slots[k];
@@ -110,10 +108,8 @@ sadmm_status sadmm_world_enter_support_frame(sadmm_world *world, struct sadmm_sy
     const size_t n = (size_t)system->body_count;
     system->support_motion = NULL;
     if (!any_kinematic(system)) return SADMM_OK;
-    if (!sadmm_grow_empty(&world->support_motion, &world->support_motion_capacity, 6 * n,
-                          sizeof *world->support_motion) ||
-        !sadmm_grow_empty(&world->supports, &world->support_capacity, n, sizeof *world->supports) ||
-        !sadmm_grow_empty(&world->support_labels, &world->support_label_capacity, n, sizeof *world->support_labels))
+    if (!SADMM_GROW(world->support_motion, 0, 6 * n) || !SADMM_GROW(world->supports, 0, n) ||
+        !SADMM_GROW(world->support_labels, 0, n))
         return sadmm_fail_memory(&world->error, "supports of bodies");
     if (!find_supports(world, system)) return SADMM_OK;
     for (size_t i = 0; i < n; ++i) {
