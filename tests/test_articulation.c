@@ -4,6 +4,7 @@
 #include "scene_tools.h"
 #include "solvers.h"
 
+#include "core/model/joint_law.h"
 #include "core/solve/articulation_order.h"
 
 static const double UNIT[4] = {1, 0, 0, 0};
@@ -240,7 +241,7 @@ START_TEST(mechanisms_are_solved_by_one_iteration)
         def.body_a = k == 0 ? WORLD : bodies[parent];
         def.body_b = bodies[k];
         MUST(world, sadmm_world_place_joint(world, &def, place, turn));
-        if (kind == SADMM_JOINT_DISTANCE || kind == SADMM_JOINT_SPRING || kind == SADMM_JOINT_LINK) {
+        if (joint_is_radial(def.kind)) {
             def.position_b[0] += 0.3;
             if (kind == SADMM_JOINT_SPRING) def.coordinates[0].spring_stiffness = 200;
         } else if (kind == SADMM_JOINT_REVOLUTE) {

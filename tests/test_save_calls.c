@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "core/base/memory.h"
+#include "core/model/joint_law.h"
 #include "scene_tools.h"
 
 enum { RUNS = 16, CALLS = 400, MOST_BODIES = 14, MOST_JOINTS = 16 };
@@ -256,7 +257,7 @@ static sadmm_status add_joint(struct draw *d, sadmm_world *world)
     vector(d, 1, x, 3);
     turn(d, q);
     if (!rarely(d, 3)) (void)sadmm_world_place_joint(world, &def, x, q);
-    if (def.kind == SADMM_JOINT_DISTANCE || def.kind == SADMM_JOINT_LINK || def.kind == SADMM_JOINT_SPRING) {
+    if (joint_is_radial(def.kind)) {
         vector(d, 0.5, def.position_b, 3);
         if (rarely(d, 4)) def.length = number(d, -0.05, 1);
     }

@@ -1,6 +1,7 @@
 /* What the header says about calls on a world: what stays valid, what a failed step leaves, what may be set. */
 #include <malloc.h>
 
+#include "core/base/settings_fields.h"
 #include "core/math/rigid.h"
 #include "core/model/settings.h"
 #include "scene_tools.h"
@@ -495,15 +496,9 @@ START_TEST(settings_are_compared_by_their_members)
     sadmm_settings a, b;
     memset(&a, 0x00, sizeof a);
     memset(&b, 0xff, sizeof b);
-#define BOTH(member) \
-    memcpy(&a.member, &given.member, sizeof given.member), memcpy(&b.member, &given.member, sizeof given.member)
-    BOTH(dt), BOTH(substeps), BOTH(gravity), BOTH(method), BOTH(iterations), BOTH(relaxation), BOTH(penalty_period);
-    BOTH(penalty_mass_factor), BOTH(penalty_offset), BOTH(penalty_ratio_limit), BOTH(penalty_update_warm),
-        BOTH(warm_start), BOTH(ncp_points);
-    BOTH(residual_tolerance), BOTH(certificate_tolerance), BOTH(certificate_momentum_tolerance), BOTH(check_period);
-    BOTH(measure_residuals), BOTH(certify), BOTH(recover_wrenches), BOTH(correction_factor), BOTH(slop),
-        BOTH(correction_speed);
-    BOTH(restitution_threshold), BOTH(hits), BOTH(threads);
+#define BOTH(X, kind, role, member, ...) \
+    memcpy(&a.member, &given.member, sizeof given.member), memcpy(&b.member, &given.member, sizeof given.member);
+    SADMM_SETTINGS(BOTH, )
     ck_assert(memcmp(&a, &b, sizeof a) != 0); /* there is padding */
     ck_assert(sadmm_settings_equal(&a, &b));
     /* Every other byte belongs to a member, and one changed bit of it makes a difference. */

@@ -271,6 +271,12 @@ template <class E> E named(const char *what, const std::string &name)
     }
     throw nb::value_error((std::string(what) + " = '" + name + "': must be one of " + all).c_str());
 }
+template <class E> nb::tuple all_names()
+{
+    nb::list all;
+    for (int k = 0; k < names_of<E>::count; ++k) all.append(names_of<E>::list[k]);
+    return nb::tuple(all);
+}
 template <class E> std::enable_if_t<(names_of<E>::count > 0), const char *> name_of(E value)
 {
     return (int)value >= 0 && (int)value < names_of<E>::count ? names_of<E>::list[value] : "?";

@@ -77,8 +77,12 @@ NB_MODULE(_core, m)
             return out;
         },
         "What each backend can do in this build and on this machine: a list of dicts with name, f32, f64 (is the "
-        "precision "
-        "available?) and reason.");
+        "precision available?) and reason.");
+    nb::dict names;
+    names["backend"] = all_names<sadmm_backend>();
+    names["precision"] = all_names<sadmm_precision>();
+    names["method"] = all_names<sadmm_method>();
+    m.attr("_names") = names;
 
     bind_settings(m);
     bind_shapes(m);

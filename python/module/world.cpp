@@ -318,8 +318,8 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
     w.def("__init__", &init_world, nb::kw_only(), "backend"_a = "auto", "precision"_a = "f64", "device"_a = 0,
           "contact_margin"_a = 0.02, "settings"_a = nb::none(),
           "backend: 'auto', 'ref', 'cpu' or 'cuda'; precision: 'f64' or 'f32'; device: which accelerator; "
-          "contact_margin: "
-          "speculative margin as a share of the thinner shape's extent; settings: Settings, or the defaults.");
+          "contact_margin: speculative margin as a share of the thinner shape's extent; settings: Settings, or the "
+          "defaults.");
     w.def_prop_rw("settings", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_settings(h); }); },
                   [](world &w, nb::object given) {
                       const sadmm_settings s = read_settings(given);

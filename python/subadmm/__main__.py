@@ -7,6 +7,7 @@ import time
 from contextlib import contextmanager
 
 import subadmm
+from subadmm._core import _names
 from subadmm.convert import MODELS, read_by
 from subadmm.given import real, whole
 from subadmm.output import Output
@@ -24,9 +25,9 @@ def _arguments():
         command.add_argument("scene",
                              help="as 'pile:300', the names: subadmm.scenes(); or a file, .json, .xml, .urdf or "
                                   ".usd...")
-        command.add_argument("--backend", default="auto", choices=["auto", "ref", "cpu", "cuda"])
-        command.add_argument("--precision", choices=["f32", "f64"], help="default: the scene's")
-        command.add_argument("--method", choices=["fast", "paper"], help="default: the scene's")
+        command.add_argument("--backend", default="auto", choices=_names["backend"])
+        command.add_argument("--precision", choices=_names["precision"], help="default: the scene's")
+        command.add_argument("--method", choices=_names["method"], help="default: the scene's")
         command.add_argument("--iterations", type=int, help="a step; default: the scene's")
     for command in (record, picture):
         command.add_argument("-o", "--output", required=True, help="the file to write")

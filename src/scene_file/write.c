@@ -165,11 +165,10 @@ static void write_head(struct sadmm_writer *w, const struct sadmm_scene_about *a
         "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in the body's frame; box: "
         "half extents; capsule: radius, half length along z; plane: half-space z <= 0 of its frame; hull: around the "
         "points of an entry of hulls, in their frame, and what is within convex_radius of that; mesh: an entry of "
-        "meshes, "
-        "in its frame: triangles of vertices, counter-clockwise seen from outside, or heights over a grid of the x-y "
-        "plane with its middle at the origin, rows along x one after the other along y, every cell two triangles "
-        "parted by the diagonal from its lowest x and y to its highest; cylinder, cone: radius, half height along z, "
-        "a cone's apex at +z; ellipsoid: semi-axes";
+        "meshes, in its frame: triangles of vertices, counter-clockwise seen from outside, or heights over a grid of "
+        "the x-y plane with its middle at the origin, rows along x one after the other along y, every cell two "
+        "triangles parted by the diagonal from its lowest x and y to its highest; cylinder, cone: radius, half height "
+        "along z, a cone's apex at +z; ellipsoid: semi-axes";
     json_object_del(w->root, "$schema");
     sadmm_put(w, w->root, "format", json_string(SADMM_SCENE_FORMAT));
     sadmm_put(w, w->root, "format_version", json_integer(SADMM_SCENE_FORMAT_VERSION));

@@ -1,5 +1,4 @@
-/* One scene of the library, as scenes.c sees it. Every family of scenes has a file that defines some of these and is
- * listed in scenes.c. */
+/* One scene of the library, as scenes.c sees it. Every family of scenes has a file that defines some of these. */
 #ifndef SADMM_SCENES_FAMILY_H
 #define SADMM_SCENES_FAMILY_H
 
@@ -23,42 +22,15 @@ struct sadmm_scene_family {
                             struct sadmm_scene_result *result, struct sadmm_error *error);
 };
 
-extern const struct sadmm_scene_family sadmm_family_sliding_cubes;
-extern const struct sadmm_scene_family sadmm_family_vertical_stacks;
-extern const struct sadmm_scene_family sadmm_family_oblique_stacks;
-extern const struct sadmm_scene_family sadmm_family_card_houses;
-extern const struct sadmm_scene_family sadmm_family_pyramid;
-extern const struct sadmm_scene_family sadmm_family_pile;
-extern const struct sadmm_scene_family sadmm_family_mixed_pile;
-extern const struct sadmm_scene_family sadmm_family_sliding_pile;
-extern const struct sadmm_scene_family sadmm_family_settled_pile;
-extern const struct sadmm_scene_family sadmm_family_kicked_cubes;
-extern const struct sadmm_scene_family sadmm_family_burst;
-extern const struct sadmm_scene_family sadmm_family_incline;
-extern const struct sadmm_scene_family sadmm_family_bounce;
-extern const struct sadmm_scene_family sadmm_family_spin_plate;
-extern const struct sadmm_scene_family sadmm_family_rolling;
-extern const struct sadmm_scene_family sadmm_family_rocking;
-extern const struct sadmm_scene_family sadmm_family_two_balls;
-extern const struct sadmm_scene_family sadmm_family_dominoes;
-extern const struct sadmm_scene_family sadmm_family_falling_chain;
-extern const struct sadmm_scene_family sadmm_family_chain;
-extern const struct sadmm_scene_family sadmm_family_four_bar;
-extern const struct sadmm_scene_family sadmm_family_slider_crank;
-extern const struct sadmm_scene_family sadmm_family_bricard;
-extern const struct sadmm_scene_family sadmm_family_grippers;
-extern const struct sadmm_scene_family sadmm_family_hand_demo;
-extern const struct sadmm_scene_family sadmm_family_kapla_tower;
-extern const struct sadmm_scene_family sadmm_family_jenga;
-extern const struct sadmm_scene_family sadmm_family_bridge;
-extern const struct sadmm_scene_family sadmm_family_ragdolls;
-extern const struct sadmm_scene_family sadmm_family_mixer;
-extern const struct sadmm_scene_family sadmm_family_arch;
-extern const struct sadmm_scene_family sadmm_family_dry_stone;
-extern const struct sadmm_scene_family sadmm_family_mesh_pile;
-extern const struct sadmm_scene_family sadmm_family_peg_in_hole;
-extern const struct sadmm_scene_family sadmm_family_terrain;
-extern const struct sadmm_scene_family sadmm_family_nuts_and_bolts;
-extern const struct sadmm_scene_family sadmm_family_marble_run;
+/* The one list of families, in the order in which they are shown: F(name) of sadmm_family_name. */
+#define SADMM_SCENE_FAMILIES(F) \
+    F(sliding_cubes) F(vertical_stacks) F(oblique_stacks) F(card_houses) F(pyramid) F(pile) F(mixed_pile)             \
+    F(sliding_pile) F(settled_pile) F(burst) F(kicked_cubes) F(incline) F(bounce) F(spin_plate) F(rolling) F(rocking) \
+    F(two_balls) F(dominoes) F(falling_chain) F(chain) F(four_bar) F(slider_crank) F(bricard) F(grippers)             \
+    F(hand_demo) F(kapla_tower) F(jenga) F(bridge) F(ragdolls) F(mixer) F(arch) F(dry_stone) F(mesh_pile)             \
+    F(peg_in_hole) F(terrain) F(nuts_and_bolts) F(marble_run)
+
+#define SADMM_DECLARE_FAMILY(name) extern const struct sadmm_scene_family sadmm_family_##name;
+SADMM_SCENE_FAMILIES(SADMM_DECLARE_FAMILY)
 
 #endif

@@ -10,21 +10,8 @@
 #include "family.h"
 #include "scene_file/scene_file.h"
 
-static const struct sadmm_scene_family *const families[] = {
-    &sadmm_family_sliding_cubes, &sadmm_family_vertical_stacks, &sadmm_family_oblique_stacks,
-    &sadmm_family_card_houses,   &sadmm_family_pyramid,         &sadmm_family_pile,
-    &sadmm_family_mixed_pile,    &sadmm_family_sliding_pile,    &sadmm_family_settled_pile,
-    &sadmm_family_burst,         &sadmm_family_kicked_cubes,    &sadmm_family_incline,
-    &sadmm_family_bounce,        &sadmm_family_spin_plate,      &sadmm_family_rolling,
-    &sadmm_family_rocking,       &sadmm_family_two_balls,       &sadmm_family_dominoes,
-    &sadmm_family_falling_chain, &sadmm_family_chain,           &sadmm_family_four_bar,
-    &sadmm_family_slider_crank,  &sadmm_family_bricard,         &sadmm_family_grippers,
-    &sadmm_family_hand_demo,     &sadmm_family_kapla_tower,     &sadmm_family_jenga,
-    &sadmm_family_bridge,        &sadmm_family_ragdolls,        &sadmm_family_mixer,
-    &sadmm_family_arch,          &sadmm_family_dry_stone,       &sadmm_family_mesh_pile,
-    &sadmm_family_peg_in_hole,   &sadmm_family_terrain,
-    &sadmm_family_nuts_and_bolts,  &sadmm_family_marble_run,
-};
+#define ADDRESS(name) &sadmm_family_##name,
+static const struct sadmm_scene_family *const families[] = {SADMM_SCENE_FAMILIES(ADDRESS)};
 
 enum { FAMILY_COUNT = sizeof families / sizeof families[0] };
 

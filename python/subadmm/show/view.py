@@ -4,6 +4,7 @@ import time
 import numpy as np
 
 from .. import Error
+from .._core import _names
 from ..given import whole
 from . import guard
 from .camera import looking_at
@@ -62,7 +63,7 @@ class View:
         buttons = gui.add_button_group("run", ("Run / Pause", "Step", "Reset"))
         speed = gui.add_slider("speed", 0.05, 2.0, 0.05, 1.0)
         with gui.add_folder("Solver"):
-            method = gui.add_dropdown("method", ("fast", "paper"), initial_value=settings.method)
+            method = gui.add_dropdown("method", _names["method"], initial_value=settings.method)
             iterations = gui.add_number("iterations", settings.iterations, min=1, max=1000000, step=1)
             here = session.world.report.backend
             names = tuple(backend["name"] for backend in _backends() if backend["f64"])

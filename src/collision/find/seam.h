@@ -87,39 +87,11 @@ SADMM_INLINE vec3 seam_between(const struct sadmm_proxy *p, const struct sadmm_p
 
 /* ---- what a shape has, and how far it reaches: own frame --------------------------------------------------------- */
 
-/* How far x is outside of a hull's faces at least. */
-SADMM_INLINE real seam_hull_outside(const struct sadmm_geometry *g, const double *hulls, vec3 x)
-{
-    struct polytope p;
-    real most = -SADMM_REAL_MAX;
-    int f;
-    polytope_at(hulls, g->hull, &p);
-    for (f = 0; f < p.faces; ++f) most = real_max(most, v3_dot(polytope_normal(&p, f), x) - polytope_offset(&p, f));
-    return most - p.radius;
-}
-
 /* How far x is outside of the shape, or, negative, inside, as far as that shows whether it has x, to a tolerance. */
 SADMM_INLINE real seam_outside(const struct sadmm_geometry *g, const double *hulls, vec3 x)
 {
-    const vec3 size = v3_load(g->size);
-    const real round = real_sqrt(x.x * x.x + x.y * x.y);
-    switch ((sadmm_shape_type)g->type) {
-    case SADMM_SHAPE_PLANE: return x.z;
-    case SADMM_SHAPE_SPHERE: return v3_norm(x) - size.x;
-    case SADMM_SHAPE_CAPSULE: return v3_norm(v3(x.x, x.y, x.z - real_clamp(x.z, -size.y, size.y))) - size.x;
-    case SADMM_SHAPE_BOX:
-        return real_max(real_abs(x.x) - size.x, real_max(real_abs(x.y) - size.y, real_abs(x.z) - size.z));
-    case SADMM_SHAPE_CYLINDER: return real_max(round - size.x, real_abs(x.z) - size.y);
-    case SADMM_SHAPE_CONE:
-        return real_max(-x.z - size.y, (2 * size.y * round + size.x * (x.z - size.y)) /
-                                           real_sqrt(size.x * size.x + 4 * size.y * size.y));
-    case SADMM_SHAPE_ELLIPSOID:
-        return (v3_norm(v3(x.x / size.x, x.y / size.y, x.z / size.z)) - 1) * real_min(size.x, real_min(size.y, size.z));
-    case SADMM_SHAPE_HULL: return seam_hull_outside(g, hulls, x);
-    case SADMM_SHAPE_MESH:
-    case SADMM_SHAPE_TYPE_COUNT: break;
-    }
-    return SADMM_REAL_MAX;
+    if (g->type == SADMM_SHAPE_PLANE) return x.z;
+    return -geometry_inner_radius(g, hulls, x);
 }
 
 /* Has a mesh the point x, on its surface or behind it by no more than `behind`, and does it reach farther along u

@@ -65,8 +65,7 @@ static sadmm_status take_known(unsigned char *out, size_t known, const unsigned 
         if (given[k])
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                               "%s: a member at byte %zu is set, and must be 0: this library (version %s) is older than "
-                              "the "
-                              "program, and does not have it",
+                              "the program, and does not have it",
                               name, at + k, sadmm_version());
     return SADMM_OK;
 }

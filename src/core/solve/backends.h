@@ -5,8 +5,14 @@
 
 #include "kernels.h"
 
-const struct sadmm_kernels *sadmm_ref_find(sadmm_precision precision, const char **reason);
-const struct sadmm_kernels *sadmm_cpu_find(sadmm_precision precision, const char **reason);
-const struct sadmm_kernels *sadmm_cuda_find(sadmm_precision precision, const char **reason);
+/* The one list: F(value, function) of every backend. */
+#define SADMM_BACKEND_FINDERS(F)           \
+    F(SADMM_BACKEND_REF, sadmm_ref_find)   \
+    F(SADMM_BACKEND_CPU, sadmm_cpu_find)   \
+    F(SADMM_BACKEND_CUDA, sadmm_cuda_find)
+
+#define SADMM_DECLARE_FINDER(value, find) \
+    const struct sadmm_kernels *find(sadmm_precision precision, const char **reason);
+SADMM_BACKEND_FINDERS(SADMM_DECLARE_FINDER)
 
 #endif

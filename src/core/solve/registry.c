@@ -8,13 +8,10 @@
 #include "core/base/growing.h"
 #include "core/base/names.h"
 
-/* The one list: a backend is registered by adding its line here (backends.h declares the functions). */
+#define FINDER(value, find) [value] = find,
 static const struct sadmm_kernels *(*const finders[SADMM_BACKEND_COUNT])(sadmm_precision precision,
                                                                          const char **reason) = {
-    [SADMM_BACKEND_REF] = sadmm_ref_find,
-    [SADMM_BACKEND_CPU] = sadmm_cpu_find,
-    [SADMM_BACKEND_CUDA] = sadmm_cuda_find,
-};
+    SADMM_BACKEND_FINDERS(FINDER)};
 
 const struct sadmm_kernels *sadmm_kernels_find(sadmm_backend backend, sadmm_precision precision, const char **reason)
 {
