@@ -142,7 +142,7 @@ static const struct {
     {"run incline -x", 2, "unknown option '-x'; valid: --backend"},
     {"run incline --steps", 2, "'--steps' needs a value, N"},
     {"run incline --quiet=yes", 2, "'--quiet=yes' takes no value"},
-    {"run incline --backend gpu", 2, "must be auto, ref, cpu or cuda"},
+    {"run incline --backend gpu", 2, "must be auto, ref, cpu"},
     {"run incline --device -1", 2, "must be an integer in [0, 1023]"},
     {"run incline --precision double", 2, "must be f32 or f64"},
     {"run incline --steps 1e3", 2, "must be an integer in [0, 1000000000]"},

@@ -174,8 +174,11 @@ START_TEST(bad_input_is_refused)
             const sadmm_joint_coordinate crossed = {.limited = true, .lower = 2, .upper = 1}, nothing = {0};
             const double zero[4] = {0};
             sadmm_joint_def bad = good;
+            char message[64];
+            snprintf(message, sizeof message, "def->kind = %d: must be in [0, %d]", SADMM_JOINT_KIND_COUNT,
+                     SADMM_JOINT_KIND_COUNT - 1);
             bad.kind = SADMM_JOINT_KIND_COUNT;
-            check_refused(world, bad, "def->kind = 12: must be in [0, 11]");
+            check_refused(world, bad, message);
             bad = good, bad.kind = SADMM_JOINT_CUSTOM, bad.locks = 64;
             check_refused(world, bad, "def->locks = 64: must be in [0, 63]");
             bad = good, bad.body_b = a;

@@ -160,7 +160,8 @@ typedef struct sadmm_residual {
 typedef struct sadmm_certificate {
     double ncp_max;          /* natural map, largest over constraints, m/s */
     double ncp_mean;         /* the same, mean over constraints, m/s */
-    int64_t ncp_worst;       /* index of the worst constraint: contacts first (in contact order), then blocks; -1: none */
+    int64_t ncp_worst;       /* index of the worst constraint: contacts first (in contact order), then blocks; -1:
+                                none */
     double momentum_max;     /* |A v - b - J^T lambda| of the worst body over the largest |b|, |A v|, |J^T lambda|
                                 of any body (infinity norms), dimensionless */
     int64_t momentum_worst;  /* index of that body among the dynamic ones; -1: none */
