@@ -301,17 +301,13 @@ SADMM_INLINE double articulation_regularisation(const struct articulation_view *
     return ARTICULATION_REGULARISATION * articulation_scale(v, r);
 }
 
-/* Where a row that is there is before the first pass. earlier: where a solve of this step has left it, which is mostly
- * where it is still: iterations leave multipliers near bounds on either side. ROW_ABSENT: there was none. hard: the
- * regularisation, if it is a hard one. */
-SADMM_INLINE void articulation_begin_row(const struct articulation_view *v, int32_t r, uint8_t earlier, double hard)
+/* Where a row that is there is before the first pass, its change to its bounds made. earlier: where a solve of this step
+ * has left it, which is mostly where it is still: iterations leave multipliers near bounds on either side. ROW_ABSENT:
+ * there was none. residual: of the row, read where its multiplier is at a bound. */
+SADMM_INLINE void articulation_place_row(const struct articulation_view *v, int32_t r, uint8_t earlier, double residual)
 {
     const struct articulation_row *row = &v->rows[r];
     const double lambda = row->lambda, lo = row->lo, hi = row->hi;
-    double residual;
-    v->regularisation[r] = sadmm_law_is_coupled(row->compliance, lo, hi)
-                               ? hard : row->compliance;
-    v->change[r] = articulation_clamp(lambda, lo, hi) - lambda;
     if (row->gain == 0 || !(hi > lo)) {
         const double fixed = row->compliance > 0 ? -row->bias / row->compliance : lambda;
         v->state[r] = ROW_FIXED;
@@ -322,15 +318,25 @@ SADMM_INLINE void articulation_begin_row(const struct articulation_view *v, int3
         articulation_put_state(v, r, earlier);
         return;
     }
-    residual = lambda > lo && lambda < hi ? 0 : articulation_row_residual(v, r, false, true);
     v->state[r] = lambda <= lo && residual >= 0   ? ROW_AT_LO
                   : lambda >= hi && residual <= 0 ? ROW_AT_HI
                                                   : ROW_INSIDE;
 }
 
-/* After a pass: a row that left its bounds stays at them, one that is at them against its law is released. Did it
- * change? */
-SADMM_INLINE bool articulation_change_row(const struct articulation_view *v, int32_t r)
+/* hard: the regularisation, if it is a hard one. */
+SADMM_INLINE void articulation_begin_row(const struct articulation_view *v, int32_t r, uint8_t earlier, double hard)
+{
+    const struct articulation_row *row = &v->rows[r];
+    const double lambda = row->lambda;
+    v->regularisation[r] = sadmm_law_is_coupled(row->compliance, row->lo, row->hi) ? hard : row->compliance;
+    v->change[r] = articulation_clamp(lambda, row->lo, row->hi) - lambda;
+    articulation_place_row(v, r, earlier,
+                           lambda > row->lo && lambda < row->hi ? 0 : articulation_row_residual(v, r, false, true));
+}
+
+/* After a pass: a row that left its bounds stays at them, one that is at them against its law is released. residual: of
+ * the row, read where it is at a bound. Did it change? */
+SADMM_INLINE bool articulation_settle_row(const struct articulation_view *v, int32_t r, double residual)
 {
     const struct articulation_row *row = &v->rows[r];
     const uint8_t state = v->state[r];
@@ -339,20 +345,23 @@ SADMM_INLINE bool articulation_change_row(const struct articulation_view *v, int
     if (state == ROW_INSIDE) {
         next = lambda < row->lo ? ROW_AT_LO : lambda > row->hi ? ROW_AT_HI : ROW_INSIDE;
     } else if (state == ROW_AT_LO || state == ROW_AT_HI) {
-        const double residual = articulation_row_residual(v, r, true, true),
-                     least = ARTICULATION_SLACK * (1 + fabs(row->bias));
+        const double least = ARTICULATION_SLACK * (1 + fabs(row->bias));
         if (state == ROW_AT_LO ? residual < -least : residual > least) next = ROW_INSIDE;
     }
     if (next == state) return false;
     articulation_put_state(v, r, next);
     return true;
 }
+SADMM_INLINE bool articulation_change_row(const struct articulation_view *v, int32_t r)
+{
+    const bool at_bound = v->state[r] == ROW_AT_LO || v->state[r] == ROW_AT_HI;
+    return articulation_settle_row(v, r, at_bound ? articulation_row_residual(v, r, true, true) : 0);
+}
 
 /* A row without a multiplier of its own that is not met: it goes to the bound that would meet it. Did it? */
-SADMM_INLINE bool articulation_yield_row(const struct articulation_view *v, int32_t r)
+SADMM_INLINE bool articulation_yield_row(const struct articulation_view *v, int32_t r, double residual)
 {
     const struct articulation_row *row = &v->rows[r];
-    const double residual = articulation_row_residual(v, r, true, true);
     const bool down = residual > 0;
     if (!(fabs(residual) > ARTICULATION_SLACK * (1 + fabs(row->bias))) || !isfinite(down ? row->lo : row->hi))
         return false;

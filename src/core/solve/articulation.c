@@ -27,8 +27,7 @@ void sadmm_articulations_destroy(struct sadmm_articulations *j)
     if (!j) return;
     sadmm_articulation_order_free(&j->order);
     void *blocks[] = {j->bodies,        j->parts,       j->part,        j->entry, j->work,         j->impulse,
-                      j->kept_velocity, j->kept_lambda, j->kept_states, j->nodes, j->tree_numbers, j->roles,
-                      j->directions};
+                      j->kept_velocity, j->kept_lambda, j->kept_states, j->nodes, j->tree_numbers, j->tree_rows};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(j);
 }
@@ -49,25 +48,23 @@ static bool same_graph(const struct solving *s)
 static bool make_tree_room(struct sadmm_articulations *j, size_t members, size_t columns)
 {
     const size_t rows = SADMM_MAX_ROWS * columns;
-    return SADMM_GROW(j->nodes, 0, members) && SADMM_GROW(j->tree_numbers, 0, 3 * members + columns + rows) &&
-           SADMM_GROW(j->roles, 0, 3 * rows) && SADMM_GROW(j->directions, 0, 6 * (rows + members));
+    return sadmm_grow_empty(&j->nodes, &j->nodes_capacity, members, sizeof *j->nodes) &&
+           sadmm_grow_empty(&j->tree_numbers, &j->tree_number_capacity, 3 * members + columns + 2 * rows,
+                            sizeof *j->tree_numbers) &&
+           sadmm_grow_empty(&j->tree_rows, &j->tree_row_capacity, rows, sizeof *j->tree_rows);
 }
 
 /* Where the tree's arrays are of a part that comes after so many bodies and columns of all. */
-static struct articulation_tree tree_at(const struct sadmm_articulations *j, const struct articulation_structure *s,
-                                        size_t members, size_t columns, size_t all, size_t all_columns)
+static struct articulation_tree tree_at(const struct sadmm_articulations *j, size_t members, size_t columns, size_t all,
+                                        size_t all_columns)
 {
-    const size_t rows = SADMM_MAX_ROWS * (size_t)s->columns;
-    uint8_t *bytes = j->roles + 3 * SADMM_MAX_ROWS * columns;
+    int32_t *const rows = j->tree_numbers + all + all_columns;
     return (struct articulation_tree){.node = j->nodes + members,
                                       .node_of = j->tree_numbers + members,
                                       .joint = j->tree_numbers + all + columns,
-                                      .soft = j->tree_numbers + all + all_columns + SADMM_MAX_ROWS * columns,
-                                      .total = j->directions + 6 * (SADMM_MAX_ROWS * all_columns + members),
-                                      .role = bytes,
-                                      .own = bytes + rows,
-                                      .factored = bytes + 2 * rows,
-                                      .direction = j->directions + 6 * SADMM_MAX_ROWS * columns};
+                                      .soft = rows + SADMM_MAX_ROWS * columns,
+                                      .row_of = rows + SADMM_MAX_ROWS * (all_columns + columns),
+                                      .row = j->tree_rows + SADMM_MAX_ROWS * columns};
 }
 
 /* Views, and which bodies they have. */
@@ -87,7 +84,7 @@ static bool make_parts(struct sadmm_articulations *j, size_t bodies)
         return false;
     for (size_t i = 0; i < bodies; ++i) j->part[i] = -1;
     const size_t all = members, all_columns = columns;
-    int32_t *const queue = j->tree_numbers + all + (1 + SADMM_MAX_ROWS) * all_columns; /* and parents: members each */
+    int32_t *const queue = j->tree_numbers + all + (1 + 2 * SADMM_MAX_ROWS) * all_columns; /* and parents: members each */
     work = members = columns = 0;
     j->loops = false;
     for (int32_t k = 0; k < j->order.parts; ++k) {
@@ -99,7 +96,8 @@ static bool make_parts(struct sadmm_articulations *j, size_t bodies)
                                                  .kept_velocity = j->kept_velocity + 6 * members,
                                                  .kept_state = j->kept_states + SADMM_MAX_ROWS * columns};
         j->loops = j->loops || j->parts[k].loop;
-        j->parts[k].tree = tree_at(j, &s, members, columns, all, all_columns);
+        j->parts[k].kernels = sadmm_articulation_kernels_best();
+        j->parts[k].tree = tree_at(j, members, columns, all, all_columns);
         sadmm_articulation_tree_make(&s, queue, queue + s.bodies, &j->parts[k].tree);
         for (int32_t e = 0; e < s.bodies; ++e) {
             j->part[s.body[e]] = k;
@@ -177,12 +175,16 @@ static void add_weight(struct articulation_part *part, const struct sadmm_contac
                        int side, size_t entry)
 {
     double *A = part->view.factor + 36 * entry, load = 0;
+    if (!(part->speed > 0)) return;
     for (int32_t p = 0; p < count; ++p) load += v3_norm(v3_load(points[p].impulse));
-    const double B = part->for_ncp ? 0 : articulation_contact_weight(load, count, part->speed);
+    const double B = articulation_contact_weight(load, count, part->speed);
     for (int32_t p = 0; B > 0 && p < count; ++p)
         for (int k = 0; k < 6; ++k)
-            for (int q = 0; q <= k; ++q)
-                A[6 * k + q] += B * articulation_point_entry(arm_of(&points[p], side), k, q);
+            for (int q = 0; q <= k; ++q) {
+                const double more = B * articulation_point_entry(arm_of(&points[p], side), k, q);
+                A[6 * k + q] += more;
+                if (q < k) A[6 * q + k] += more;
+            }
 }
 
 static void find_impulses(const struct solving *s)
@@ -259,6 +261,7 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
         if (part->left || is_solved(part)) continue;
         sadmm_articulation_part_load(part, system, settings, slots);
         part->for_ncp = !after && part->by_tree && part->points <= settings->ncp_points;
+        if (part->points > 0 && !part->for_ncp) sadmm_articulation_part_find_speed(part);
     }
     if (solves) each_contact(&s, add_weight);
     for (int32_t k = 0; k < articulations->order.parts; ++k) {
@@ -321,10 +324,10 @@ static void close_part(const struct solving *s, struct articulation_part *part, 
 {
     const struct articulation_view *v = &part->view;
     memset(part->impulse, 0, 6 * (size_t)v->s.bodies * sizeof *part->impulse);
-    sadmm_articulation_part_load(part, s->system, s->settings, s->slots);
     memset(v->velocity, 0, 6 * (size_t)v->s.bodies * sizeof *v->velocity);
     for (int32_t e = 0; speeds && e < v->s.bodies; ++e)
         memcpy(v->velocity + 6 * (size_t)e, bodies[v->s.body[e]].velocity, 6 * sizeof *v->velocity);
+    sadmm_articulation_part_load_at(part, s->system, s->settings, s->slots);
     leave_to_contacts(v); /* nothing but the errors moves bodies */
     if (!sadmm_articulation_part_solve(part, NULL, true)) return;
     if (speeds) change_speeds(v, bodies);

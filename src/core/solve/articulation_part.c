@@ -15,34 +15,73 @@ static void load_row(const struct sadmm_rows *rows, size_t from, struct articula
     to->lo = rows->lo[from], to->hi = rows->hi[from], to->lambda = rows->lambda[from];
 }
 
+static void load_rows(const struct articulation_view *v, const struct sadmm_rows *rows,
+                      const struct sadmm_row_constraint *slots)
+{
+    const size_t count = (size_t)(SADMM_MAX_ROWS * v->s.columns);
+    memset(v->state, ROW_ABSENT, count);
+    memset(v->change, 0, count * sizeof *v->change);
+    EACH_ARTICULATION_ROW(slots, v, r, from) {
+        load_row(rows, (size_t)from, &v->rows[r]);
+        v->state[r] = ROW_INSIDE;
+    }
+}
+
+/* Numbers of rows that are not there are 0 for the sparse factor. */
+static void clear_absent_rows(const struct articulation_view *v)
+{
+    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) {
+        if (v->state[r] == ROW_ABSENT) memset(&v->rows[r], 0, sizeof v->rows[r]);
+        v->regularisation[r] = 0;
+    }
+}
+
+static void add_row_loads(const struct articulation_part *part, int32_t e)
+{
+    const struct articulation_view *v = &part->view;
+    double *impulse = part->impulse + 6 * (size_t)e, contacts[6];
+    memcpy(contacts, impulse, sizeof contacts);
+    for (int32_t at = v->s.first_around[e]; at < v->s.first_around[e + 1]; ++at)
+        for (int k = 0; k < 6; ++k) impulse[k] += articulation_row_load(v, v->s.around[at], k);
+    for (int k = 0; k < 6; ++k)
+        v->residual[6 * e + k] = articulation_body_residual(v, e, k, part->without[6 * e + k], impulse[k]);
+    for (int k = 0; k < 6; ++k) part->without[6 * e + k] = v->residual[6 * e + k] - contacts[k];
+}
+
 void sadmm_articulation_part_load(struct articulation_part *part, const struct sadmm_system *system,
                                   const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots)
 {
     const struct articulation_view *v = &part->view;
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        memcpy(v->velocity + 6 * (size_t)e, system->velocity + 6 * v->s.body[e], 6 * sizeof *v->velocity);
+    sadmm_articulation_part_load_at(part, system, settings, slots);
+}
+
+void sadmm_articulation_part_load_at(struct articulation_part *part, const struct sadmm_system *system,
+                                     const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots)
+{
+    const struct articulation_view *v = &part->view;
+    load_rows(v, system->rows, slots);
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        sadmm_system_body(system, settings, v->s.body[e], v->factor + 36 * (size_t)e, part->without + 6 * (size_t)e);
+    part->loaded = false;
+    part->by_tree = settings->ncp_points > 0 && part->tree.nodes > 0 &&
+                    part->kernels->load(&part->tree, v, slots, part->impulse, part->without);
+    if (part->by_tree) return;
+    clear_absent_rows(v);
+    for (int32_t e = 0; e < v->s.bodies; ++e) add_row_loads(part, e);
+}
+
+void sadmm_articulation_part_find_speed(struct articulation_part *part)
+{
+    const struct articulation_view *v = &part->view;
     double energy = 0, mass = 0;
-    memset(v->rows, 0, (size_t)(SADMM_MAX_ROWS * v->s.columns) * sizeof *v->rows);
-    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) articulation_put_row(v, r, false);
-    EACH_ARTICULATION_ROW(slots, v, r, from) {
-        load_row(system->rows, (size_t)from, &v->rows[r]);
-        articulation_put_row(v, r, true);
-    }
     for (int32_t e = 0; e < v->s.bodies; ++e) {
-        const size_t i = (size_t)v->s.body[e];
-        double *A = v->factor + 36 * (size_t)e, *impulse = part->impulse + 6 * (size_t)e, b[6], contacts[6];
-        memcpy(contacts, impulse, sizeof contacts);
-        memcpy(v->velocity + 6 * (size_t)e, system->velocity + 6 * i, 6 * sizeof *v->velocity);
-        for (int32_t at = v->s.first_around[e]; at < v->s.first_around[e + 1]; ++at)
-            for (int k = 0; k < 6; ++k) impulse[k] += articulation_row_load(v, v->s.around[at], k);
-        sadmm_system_body(system, settings, (int32_t)i, A, b);
-        for (int k = 0; k < 6; ++k) v->residual[6 * e + k] = articulation_body_residual(v, e, k, b[k], impulse[k]);
-        for (int k = 0; k < 6; ++k) part->without[6 * e + k] = v->residual[6 * e + k] - contacts[k];
-        energy += articulation_energy(A, impulse);
+        const double *A = v->factor + 36 * (size_t)e;
+        energy += articulation_energy(A, part->impulse + 6 * (size_t)e);
         mass += A[0];
     }
     part->speed = articulation_speed(energy, mass);
-    part->loaded = false;
-    part->by_tree = settings->ncp_points > 0 && part->tree.nodes > 0 &&
-                    sadmm_articulation_tree_begin(&part->tree, v, slots);
 }
 
 void sadmm_articulation_part_put_contacts(const struct articulation_part *part, const double *loads)
@@ -66,11 +105,8 @@ static void begin_rows(const struct articulation_part *part, const uint8_t *earl
 {
     const struct articulation_view *v = &part->view;
     for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) {
-        double hard = 0;
-        if (!part->by_tree) {
-            for (int side = 0; side < 2; ++side) articulation_respond(v, r, side);
-            hard = articulation_regularisation(v, r);
-        }
+        for (int side = 0; side < 2; ++side) articulation_respond(v, r, side);
+        const double hard = articulation_regularisation(v, r);
         if (v->state[r] != ROW_ABSENT) articulation_begin_row(v, r, earlier ? earlier[r] : ROW_ABSENT, hard);
     }
 }
@@ -91,24 +127,11 @@ double sadmm_articulation_part_scale(const struct articulation_part *part, int32
     return articulation_scale_of(own[0], own[1]);
 }
 
-/* Rows that left their bounds, or are at them against their law: did any change its state? one: the first of them
- * alone, which comes to an end where all at once go round in circles (Murty, 1974). */
-static bool change_rows(const struct articulation_view *v, bool one)
+/* Rows that left their bounds, or are at them against their law: did any change its state? */
+static bool change_rows(const struct articulation_view *v)
 {
     bool changed = false;
-    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns && !(changed && one); ++r)
-        changed = articulation_change_row(v, r) || changed;
-    return changed;
-}
-
-/* In a tree a row that says what another one says has no multiplier. If it asks for another rate, it goes to the bound
- * that pulls there: friction that a motor moves against. Did any? */
-static bool yield_rows(const struct articulation_part *part)
-{
-    bool changed = false;
-    for (int32_t r = 0; part->by_tree && r < SADMM_MAX_ROWS * part->view.s.columns; ++r)
-        if (sadmm_articulation_tree_leaves(&part->tree, &part->view, r))
-            changed = articulation_yield_row(&part->view, r) || changed;
+    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) changed = articulation_change_row(v, r) || changed;
     return changed;
 }
 
@@ -167,13 +190,13 @@ static void solve_rows(const struct articulation_view *v, bool again)
 
 void sadmm_articulation_part_factorize(struct articulation_part *part)
 {
-    if (part->by_tree) sadmm_articulation_tree_factorize(&part->tree, &part->view);
+    if (part->by_tree) part->kernels->factorize(&part->tree, &part->view);
     else factorize(&part->view);
 }
 
 void sadmm_articulation_part_solve_rows(const struct articulation_part *part, bool again)
 {
-    if (part->by_tree) sadmm_articulation_tree_solve(&part->tree, &part->view, again);
+    if (part->by_tree) (void)part->kernels->solve(&part->tree, &part->view, again);
     else solve_rows(&part->view, again);
 }
 
@@ -193,13 +216,10 @@ static bool is_finite(const struct articulation_view *v)
 }
 
 /* The largest residual of a row inside its bounds, m/s or rad/s. */
-static double largest_residual(const struct articulation_part *part)
+static double largest_residual(const struct articulation_view *v)
 {
-    const struct articulation_view *v = &part->view;
     double most = 0;
-    if (part->by_tree) return sadmm_articulation_tree_residual(&part->tree, v);
-    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r)
-        most = fmax(most, articulation_residual_size(v, r));
+    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) most = fmax(most, articulation_residual_size(v, r));
     return most;
 }
 
@@ -209,37 +229,100 @@ static double largest_residual(const struct articulation_part *part)
 static bool refine(const struct articulation_part *part)
 {
     const struct articulation_view *v = &part->view;
-    double residual = largest_residual(part), last = HUGE_VAL;
+    double residual = largest_residual(v), last = HUGE_VAL;
     for (int pass = 0; pass < ARTICULATION_REFINEMENTS && residual > ARTICULATION_EXACT && residual < last / 2;
          ++pass) {
         last = residual;
-        sadmm_articulation_part_solve_rows(part, true);
-        residual = largest_residual(part);
+        solve_rows(v, true);
+        residual = largest_residual(v);
     }
-    return !change_rows(v, false);
+    return !change_rows(v);
 }
 
-bool sadmm_articulation_part_solve(struct articulation_part *part, const uint8_t *earlier, bool exact)
+static bool solve_sparse(const struct articulation_part *part, const uint8_t *earlier, bool exact)
 {
     const struct articulation_view *v = &part->view;
-    const int passes = part->by_tree ? ARTICULATION_TREE_PASSES : ARTICULATION_PASSES;
     bool solved = false;
-    if (!part->by_tree) free_bodies(v);
+    free_bodies(v);
     begin_rows(part, earlier);
-    for (int pass = 0; pass < passes && !solved; ++pass) {
-        sadmm_articulation_part_factorize(part);
-        sadmm_articulation_part_solve_rows(part, false);
-        if (yield_rows(part)) sadmm_articulation_part_solve_rows(part, false);
-        if (change_rows(v, part->by_tree && pass >= ARTICULATION_TOGETHER)) continue;
+    for (int pass = 0; pass < ARTICULATION_PASSES && !solved; ++pass) {
+        factorize(v);
+        solve_rows(v, false);
+        if (change_rows(v)) continue;
         solved = true;
         if (exact) {
             solved = refine(part);
         } else if (needs_refinement(v)) {
-            sadmm_articulation_part_solve_rows(part, true);
-            solved = !change_rows(v, false);
+            solve_rows(v, true);
+            solved = !change_rows(v);
         }
     }
     return solved && is_finite(v);
+}
+
+/* ---- by its tree ------------------------------------------------------------------------------------------------- */
+
+static void begin_tree_rows(const struct articulation_part *part, const uint8_t *earlier)
+{
+    const struct articulation_view *v = &part->view;
+    for (int32_t at = 0; at < part->tree.rows; ++at) {
+        const struct articulation_tree_row *row = &part->tree.row[at];
+        const struct articulation_row *from = &v->rows[row->r];
+        const double change = articulation_clamp(from->lambda, from->lo, from->hi) - from->lambda;
+        v->change[row->r] = change;
+        articulation_place_row(v, row->r, earlier ? earlier[row->r] : ROW_ABSENT, row->start + row->compliance * change);
+    }
+}
+
+/* change_rows. one: the first of them alone, which comes to an end where all at once go round in circles (Murty, 1974). */
+static bool change_tree_rows(const struct articulation_part *part, bool one)
+{
+    bool changed = false;
+    for (int32_t at = 0; at < part->tree.rows && !(changed && one); ++at) {
+        const struct articulation_tree_row *row = &part->tree.row[at];
+        changed = articulation_settle_row(&part->view, row->r, row->residual) || changed;
+    }
+    return changed;
+}
+
+/* A row that says what another one says has no multiplier. If it asks for another rate, it goes to the bound that pulls
+ * there: friction that a motor moves against. Did any? */
+static bool yield_rows(const struct articulation_part *part)
+{
+    bool changed = false;
+    for (int32_t at = 0; at < part->tree.rows; ++at) {
+        const struct articulation_tree_row *row = &part->tree.row[at];
+        if (row->role == ARTICULATION_LEFT && part->view.state[row->r] == ROW_INSIDE)
+            changed = articulation_yield_row(&part->view, row->r, row->residual) || changed;
+    }
+    return changed;
+}
+
+static bool solve_tree(struct articulation_part *part, const uint8_t *earlier)
+{
+    const struct articulation_view *v = &part->view;
+    const struct sadmm_articulation_kernels *by = part->kernels;
+    double residual = 0, last = HUGE_VAL;
+    begin_tree_rows(part, earlier);
+    for (int pass = 0; pass < ARTICULATION_TREE_PASSES; ++pass) {
+        by->factorize(&part->tree, v);
+        residual = by->solve(&part->tree, v, false);
+        if (yield_rows(part)) residual = by->solve(&part->tree, v, false);
+        if (change_tree_rows(part, pass >= ARTICULATION_TOGETHER)) continue;
+        for (int again = 0; again < ARTICULATION_REFINEMENTS && residual > ARTICULATION_EXACT && residual < last / 2;
+             ++again) {
+            last = residual;
+            residual = by->solve(&part->tree, v, true);
+        }
+        if (last == HUGE_VAL || !change_tree_rows(part, false)) return isfinite(residual);
+        last = HUGE_VAL;
+    }
+    return false;
+}
+
+bool sadmm_articulation_part_solve(struct articulation_part *part, const uint8_t *earlier, bool exact)
+{
+    return part->by_tree ? solve_tree(part, earlier) : solve_sparse(part, earlier, exact);
 }
 
 void sadmm_articulation_part_store(const struct articulation_view *v, const struct sadmm_system *system,

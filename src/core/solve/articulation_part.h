@@ -5,7 +5,7 @@
 #define SADMM_CORE_SOLVE_ARTICULATION_PART_H
 
 #include "articulation_order.h"
-#include "articulation_tree.h"
+#include "articulation_variants.h"
 #include "core/model/articulation.h"
 #include "core/model/system.h"
 
@@ -19,6 +19,7 @@ struct articulation_part {
     double *without;         /* the residual without contacts; */
     double *kept_velocity;   /* that before the iterations */
     struct articulation_tree tree;
+    const struct sadmm_articulation_kernels *kernels; /* of its tree */
     bool by_tree;            /* this call's rows are solved by it; else by the sparse factor */
     bool loop;               /* its joints are more than hang it together */
     double speed;            /* that its impulses change it by; 0: it is not solved */
@@ -41,13 +42,15 @@ struct sadmm_articulations {
     int32_t *part, *entry;  /* bodies: the part, -1: of none; number in it */
     double *work;           /* of all views */
     struct articulation_node *nodes; /* of all trees: bodies of parts */
-    int32_t *tree_numbers;  /* node_of, joint */
-    uint8_t *roles;         /* of rows of columns, and their states in factors */
-    double *directions;     /* x 6 */
+    int32_t *tree_numbers;  /* node_of, joint, soft, row_of */
+    struct articulation_tree_row *tree_rows; /* columns x SADMM_MAX_ROWS */
     double *impulse;        /* bodies of parts x 6; again: without contacts */
     bool kept;              /* velocities and multipliers from before the iterations are in: */
     double *kept_velocity, *kept_lambda; /* bodies of parts x 6; rows */
     uint8_t *kept_states;                /* columns x SADMM_MAX_ROWS of all parts */
+    size_t bodies_capacity, part_capacity, entry_capacity, parts_capacity, work_capacity, impulse_capacity,
+        kept_velocity_capacity, kept_lambda_capacity, kept_states_capacity, nodes_capacity, tree_number_capacity,
+        tree_row_capacity;
 };
 
 /* Goes through the rows of a part: r, which is row `from` of the system; slots as of sadmm_articulations_solve. */
@@ -57,12 +60,19 @@ struct sadmm_articulations {
                      end_ = r + (slots)[(v)->s.constraint[p_]].count;                                   \
              r < end_; ++r, ++from)
 
-/* Rows; velocities; A, and b - A v + J^T lambda + the part's `impulse`; the speed that its impulses change it by. */
+/* Rows; velocities; A, and b - A v + J^T lambda + the part's `impulse`, which has J^T lambda then. */
 void sadmm_articulation_part_load(struct articulation_part *part, const struct sadmm_system *system,
                                   const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots);
 
-/* For G (ncp.h): the sparse factor with rows in their states; multipliers of rows inside their bounds, for what the
- * others are. again: from what they are. */
+/* Velocities are there already. */
+void sadmm_articulation_part_load_at(struct articulation_part *part, const struct sadmm_system *system,
+                                     const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots);
+
+/* The speed that its impulses change it by, once it is loaded. */
+void sadmm_articulation_part_find_speed(struct articulation_part *part);
+
+/* For G (ncp.h): the sparse factor with rows in their states; multipliers of rows inside their bounds, for what the others
+ * are. again: from what they are. */
 void sadmm_articulation_part_factorize(struct articulation_part *part);
 void sadmm_articulation_part_solve_rows(const struct articulation_part *part, bool again);
 

@@ -10,7 +10,9 @@
  *                                                                        what hard rows hold left out
  *     A_parent += X^T (A - U H U^T) X,   p_parent += X^T (p - A s - U q)        U = A S
  *
- * from the leaves to the root with the inertias A and loads p, then back with the velocities. In double. */
+ * from the leaves to the root with the inertias A and loads p, then back with the velocities. A row acts on the parent as on
+ * a point of its node's body: it needs its Jacobian on that body alone. In double; kernels are compiled once per instruction
+ * set (articulation_variants.h). */
 #ifndef SADMM_CORE_SOLVE_ARTICULATION_TREE_H
 #define SADMM_CORE_SOLVE_ARTICULATION_TREE_H
 
@@ -20,9 +22,24 @@
 extern "C" {
 #endif
 
+/* What a row is to its node. */
+enum articulation_role { ARTICULATION_NONE, ARTICULATION_LOCK, ARTICULATION_SOFT, ARTICULATION_HARD, ARTICULATION_LEFT };
+
+/* Six numbers of a body take eight (core/math/six.h). */
+struct articulation_tree_row {
+    double own[8];           /* on its node's body */
+    double along[6];         /* S^T own^T of rows that are no locks */
+    double gain, compliance; /* its law */
+    double start, residual;  /* of it, m/s or rad/s: before anything changes; by the changes so far */
+    double right, found;     /* the rate past the parent that is asked for; the multiplier's change by this solve */
+    int32_t r;               /* of the part */
+    uint8_t role;            /* enum articulation_role; of a row outside its bounds NONE */
+    uint8_t factored;        /* its state in the factor */
+};
+
 /* A hard row along what the locks leave free: a limit that is met, a motor or friction within its bounds. */
 struct articulation_hard_row {
-    int32_t r;
+    int32_t row;
     double response[6]; /* H g before it was held; g: its direction along S */
     double inverse;     /* of g H g */
 };
@@ -31,20 +48,15 @@ enum { ARTICULATION_HARD_ROWS = 12 };
 struct articulation_node {
     int32_t body, parent;  /* of the part; node, -1: none */
     int32_t first, count;  /* of `joint`: constraints between it and its parent, or what is not solved for */
-    bool bound;            /* they have rows */
+    int32_t row, row_end;  /* of `row` */
+    bool bound;            /* there are any */
     int32_t free;          /* directions */
     int32_t locks[2], lock[6]; /* rows that lock translations, then rotations */
-    int32_t soft, soft_end; /* of `soft` */
-    int32_t hard_rows;
-    double offset[3];      /* from the parent's centre of mass */
-    double A[6][6], S[6][6], U[6][6], H[6][6]; /* S, U: a direction after the other */
-    double load[6], velocity[6], met[6], q[6]; /* p, v, s, q */
+    int32_t soft, hard_rows;
+    double offset[4];      /* from the parent's centre of mass */
+    double A[6][8], S[6][8], U[6][8], H[6][6]; /* S, U: a direction after the other */
+    double load[8], velocity[8], total[8], met[8], q[6]; /* p, v, that of all solves so far, s, q */
     struct articulation_hard_row hard[ARTICULATION_HARD_ROWS];
-};
-
-/* What a row is to its node. */
-enum articulation_role {
-    ARTICULATION_NONE, ARTICULATION_LOCK, ARTICULATION_SOFT, ARTICULATION_HARD, ARTICULATION_LEFT
 };
 
 struct articulation_tree {
@@ -53,49 +65,37 @@ struct articulation_tree {
     struct articulation_node *node; /* leaves first */
     int32_t *node_of;               /* (bodies) */
     int32_t *joint;                 /* (columns) 2 column + side of the node's body */
-    int32_t *soft;                  /* rows that act along free directions by a law with compliance, by nodes */
-    double *total;                  /* (bodies x 6) velocities with their changes so far */
-    uint8_t *role;                  /* (rows) enum articulation_role */
-    uint8_t *own;                   /* (rows) side of the node's body */
-    uint8_t *factored;              /* (rows) their states in the factor, where it is known */
-    bool known;
-    double *direction;              /* (rows x 6) S^T J^T */
+    struct articulation_tree_row *row; /* by nodes */
+    int32_t rows;
+    int32_t *row_of;                /* (rows of the part) -> `row` */
+    int32_t *soft;                  /* rows that act along free directions by a law with compliance; a node's from its
+                                       `row` on */
+    bool known;                     /* the factor is that of `factored` */
 };
 
 /* Its nodes, if it is one. `queue`, `parent`: bodies of the part. All arrays have room. */
 void sadmm_articulation_tree_make(const struct articulation_structure *s, int32_t *queue, int32_t *parent,
                                   struct articulation_tree *tree);
 
-/* Of this call's rows. slots: as of sadmm_articulations_solve. False: the tree cannot solve them. Rows are no wrenches
- * at points of space (gears), or locks are not those of one joint. */
-bool sadmm_articulation_tree_begin(struct articulation_tree *tree, const struct articulation_view *v,
-                                   const struct sadmm_row_constraint *slots);
+/* This call's rows and loads: v->residual = b - A v + J^T lambda + impulse. slots: as of sadmm_articulations_solve.
+ * impulse (bodies x 6): of contacts, then J^T lambda besides. without (bodies x 6): b, then the residual without contacts.
+ * False, and both are what they were: the tree cannot solve them. Rows are no wrenches at points of space (gears), or locks
+ * are not those of one joint. */
+typedef bool sadmm_articulation_tree_load(struct articulation_tree *tree, const struct articulation_view *v,
+                                          const struct sadmm_row_constraint *slots, double *impulse, double *without);
 
 /* With rows in their states, inertias in v->factor; nothing where it is known for these. */
-void sadmm_articulation_tree_factorize(struct articulation_tree *tree, const struct articulation_view *v);
+typedef void sadmm_articulation_tree_factorize(struct articulation_tree *tree, const struct articulation_view *v);
 
-/* Is row r inside its bounds, but without a multiplier of its own, since others say what it says? */
-static inline bool sadmm_articulation_tree_leaves(const struct articulation_tree *tree,
-                                                  const struct articulation_view *v, int32_t r)
-{
-    return v->state[r] == ROW_INSIDE && tree->role[r] == ARTICULATION_LEFT;
-}
-
-/* Changes of the velocities, and of the multipliers of rows inside their bounds, for loads v->residual and what the
- * other rows are. again: from what they are, by what is left (iterative refinement). */
-void sadmm_articulation_tree_solve(const struct articulation_tree *tree, const struct articulation_view *v, bool again);
+/* Changes of the velocities, and of the multipliers of rows inside their bounds, for loads v->residual and what the other
+ * rows are. again: from what they are, by what is left (iterative refinement). Returns the largest residual of a row inside
+ * its bounds, m/s or rad/s. */
+typedef double sadmm_articulation_tree_solve(const struct articulation_tree *tree, const struct articulation_view *v,
+                                             bool again);
 
 /* The node whose joint has row r. */
 int32_t sadmm_articulation_tree_node(const struct articulation_tree *tree, const struct articulation_view *v,
                                      int32_t r);
-
-/* The largest residual of a row inside its bounds after that, m/s or rad/s. */
-double sadmm_articulation_tree_residual(const struct articulation_tree *tree, const struct articulation_view *v);
-
-/* A load on its way to the root, at a node. load (6): on its body, with what its child has handed on; then what it
- * hands on to its parent. along: what acts along S besides, NULL: nothing does. z, response: S^T p, and H S^T p. */
-void sadmm_articulation_tree_pass(const struct articulation_node *node, double load[6], const double *along,
-                                  double z[6], double response[6]);
 
 #ifdef __cplusplus
 }

@@ -2,23 +2,33 @@
 #include <math.h>
 #include <string.h>
 
-#include "articulation_tree_rows.h"
+#include "articulation_variants.h"
+#include "core/math/six.h"
 
 /* Of a hard row's response without others, the share under which it says what they say: far above rounding, far below
  * what is left of a row by others that are not along it. */
 static const double DEPENDENT = 1e-10;
 
-/* What rows that are no locks are, in their states. */
-static void find_roles(const struct articulation_tree *tree, struct articulation_node *node,
-                       const struct articulation_view *v)
+/* What rows that are no locks are, in their states. Returns how many are hard. */
+static int find_roles(const struct articulation_tree *tree, struct articulation_node *node,
+                      const struct articulation_view *v)
 {
-    node->soft_end = node->soft;
-    EACH_TREE_ROW(tree, v, node, r) {
-        if (tree->role[r] == ARTICULATION_LOCK) continue;
-        if (v->state[r] != ROW_INSIDE) tree->role[r] = ARTICULATION_NONE;
-        else tree->role[r] = v->rows[r].compliance > 0 ? ARTICULATION_SOFT : ARTICULATION_HARD;
-        if (tree->role[r] == ARTICULATION_SOFT) tree->soft[node->soft_end++] = r;
+    int hard = 0;
+    node->soft = node->hard_rows = 0;
+    for (int32_t at = node->row; at < node->row_end; ++at) {
+        struct articulation_tree_row *row = &tree->row[at];
+        row->factored = v->state[row->r];
+        if (row->role == ARTICULATION_LOCK) continue;
+        if (row->factored != ROW_INSIDE) row->role = ARTICULATION_NONE;
+        else if (row->compliance > 0) {
+            row->role = ARTICULATION_SOFT;
+            tree->soft[node->row + node->soft++] = at;
+        } else {
+            row->role = ARTICULATION_HARD;
+            ++hard;
+        }
     }
+    return hard;
 }
 
 /* H = D^-1 by L D L^T, of which the lower half of `D` is read. */
@@ -44,33 +54,10 @@ static void invert(int n, double D[6][6], double H[6][6])
         for (int i = c + 1; i < n; ++i)
             for (int j = c; j < i; ++j) x[i] -= D[i][j] * x[j];
         for (int i = c; i < n; ++i) x[i] *= inverse[i];
-        for (int i = n - 1; i >= 0; --i)
+        for (int i = n - 1; i >= c; --i)
             for (int j = i + 1; j < n; ++j) x[i] -= D[j][i] * x[j];
-        for (int i = 0; i < n; ++i) H[i][c] = x[i];
+        for (int i = c; i < n; ++i) H[i][c] = H[c][i] = x[i];
     }
-}
-
-/* A hard row leaves its direction out of H. */
-static void hold(const struct articulation_tree *tree, struct articulation_node *node, int32_t r, double alone)
-{
-    const double *g = tree->direction + 6 * r;
-    struct articulation_hard_row *hard = &node->hard[node->hard_rows];
-    double response = 0;
-    const int n = node->free;
-    for (int i = 0; i < n; ++i) {
-        hard->response[i] = 0;
-        for (int j = 0; j < n; ++j) hard->response[i] += node->H[i][j] * g[j];
-        response += g[i] * hard->response[i];
-    }
-    if (!(response > DEPENDENT * alone) || node->hard_rows == ARTICULATION_HARD_ROWS) {
-        tree->role[r] = ARTICULATION_LEFT; /* others say it */
-        return;
-    }
-    hard->r = r;
-    hard->inverse = 1 / response;
-    ++node->hard_rows;
-    for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j) node->H[i][j] -= hard->response[i] * hard->response[j] * hard->inverse;
 }
 
 static double response_along(const struct articulation_node *node, const double *g)
@@ -81,108 +68,104 @@ static double response_along(const struct articulation_node *node, const double 
     return sum;
 }
 
-static void hold_hard_rows(const struct articulation_tree *tree, struct articulation_node *node,
-                           const struct articulation_view *v)
+/* A hard row leaves its direction out of H. alone: its response without others. */
+static void hold(const struct articulation_tree *tree, struct articulation_node *node, int32_t at, double alone)
+{
+    struct articulation_tree_row *row = &tree->row[at];
+    struct articulation_hard_row *hard = &node->hard[node->hard_rows];
+    double response = 0;
+    const int n = node->free;
+    const bool room = node->hard_rows < ARTICULATION_HARD_ROWS;
+    for (int i = 0; room && i < n; ++i) {
+        hard->response[i] = 0;
+        for (int j = 0; j < n; ++j) hard->response[i] += node->H[i][j] * row->along[j];
+        response += row->along[i] * hard->response[i];
+    }
+    if (!(response > DEPENDENT * alone)) {
+        row->role = ARTICULATION_LEFT; /* others say it */
+        return;
+    }
+    hard->row = at;
+    hard->inverse = 1 / response;
+    ++node->hard_rows;
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) node->H[i][j] -= hard->response[i] * hard->response[j] * hard->inverse;
+}
+
+static void hold_hard_rows(const struct articulation_tree *tree, struct articulation_node *node)
 {
     double alone[ARTICULATION_HARD_ROWS];
     int count = 0, k = 0;
-    node->hard_rows = 0;
-    EACH_TREE_ROW(tree, v, node, r) {
-        if (tree->role[r] == ARTICULATION_HARD && count < ARTICULATION_HARD_ROWS)
-            alone[count++] = response_along(node, tree->direction + 6 * r);
-    }
-    if (count == 0) return;
-    EACH_TREE_ROW(tree, v, node, r) {
-        if (tree->role[r] == ARTICULATION_HARD) {
-            hold(tree, node, r, k < count ? alone[k] : HUGE_VAL);
-            ++k;
-        }
+    for (int32_t at = node->row; at < node->row_end && count < ARTICULATION_HARD_ROWS; ++at)
+        if (tree->row[at].role == ARTICULATION_HARD) alone[count++] = response_along(node, tree->row[at].along);
+    for (int32_t at = node->row; at < node->row_end; ++at) {
+        if (tree->row[at].role != ARTICULATION_HARD) continue;
+        hold(tree, node, at, k < count ? alone[k] : HUGE_VAL);
+        ++k;
     }
 }
 
-static void add_soft_rows(const struct articulation_tree *tree, const struct articulation_node *node,
-                          const struct articulation_view *v, double D[6][6])
+static void add_soft_rows(const struct articulation_tree *tree, const struct articulation_node *node, double D[6][6])
 {
-    for (int32_t at = node->soft; at < node->soft_end; ++at) {
-        const int32_t r = tree->soft[at];
-        const double *g = tree->direction + 6 * r, stiffness = v->rows[r].gain / v->rows[r].compliance;
+    for (int32_t at = node->row; at < node->row + node->soft; ++at) {
+        const struct articulation_tree_row *row = &tree->row[tree->soft[at]];
+        const double *g = row->along, stiffness = row->gain / row->compliance;
         for (int i = 0; i < node->free; ++i)
             for (int j = 0; j <= i; ++j) D[i][j] += stiffness * g[i] * g[j];
     }
 }
 
-/* A_parent += X^T M X of the inertia M that its node hands on. */
-static void add_shifted(const double M[6][6], const double r[3], double to[6][6])
-{
-    double B[3][3]; /* M_lw - M_ll [r]x */
-    for (int i = 0; i < 3; ++i) {
-        B[i][0] = M[i][3] - (M[i][1] * r[2] - M[i][2] * r[1]);
-        B[i][1] = M[i][4] - (M[i][2] * r[0] - M[i][0] * r[2]);
-        B[i][2] = M[i][5] - (M[i][0] * r[1] - M[i][1] * r[0]);
-    }
-    for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3, k = (i + 2) % 3;
-        for (int c = 0; c < 3; ++c) {
-            to[i][c] += M[i][c];
-            to[i][3 + c] += B[i][c];
-            to[3 + c][i] += B[i][c];
-        }
-        /* M_ww - M_wl [r]x + [r]x B */
-        const double *wl = M[3 + i];
-        to[3 + i][3] += wl[3] - (wl[1] * r[2] - wl[2] * r[1]) + (r[j] * B[k][0] - r[k] * B[j][0]);
-        to[3 + i][4] += wl[4] - (wl[2] * r[0] - wl[0] * r[2]) + (r[j] * B[k][1] - r[k] * B[j][1]);
-        to[3 + i][5] += wl[5] - (wl[0] * r[1] - wl[1] * r[0]) + (r[j] * B[k][2] - r[k] * B[j][2]);
-    }
-}
-
-/* What its node hands on: A - U H U^T. */
+/* A_parent += X^T M X of the inertia M = A - U H U^T that its node hands on. */
 static void hand_on_inertia(const struct articulation_node *node, struct articulation_node *parent)
 {
-    double M[6][6];
-    memcpy(M, node->A, sizeof M);
+    const three r = *(const three *)node->offset;
+    six M[6];
+    for (int k = 0; k < 6; ++k) M[k] = six_at(node->A[k]);
     for (int i = 0; i < node->free; ++i) {
-        double HU[6] = {0};
-        for (int j = 0; j < node->free; ++j)
-            for (int c = 0; c < 6; ++c) HU[c] += node->H[i][j] * node->U[j][c];
-        for (int row = 0; row < 6; ++row)
-            for (int c = 0; c < 6; ++c) M[row][c] -= node->U[i][row] * HU[c];
+        six HU = six_zero();
+        for (int j = 0; j < node->free; ++j) HU = six_madd(HU, node->H[i][j], six_at(node->U[j]));
+        for (int k = 0; k < 6; ++k) M[k] = six_madd(M[k], -node->U[i][k < 3 ? k : k + 1], HU);
     }
-    add_shifted(M, node->offset, parent->A);
+    for (int k = 0; k < 6; ++k) M[k].angular += three_cross(r, M[k].linear); /* M X */
+    for (int k = 0; k < 3; ++k) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        M[3 + k] = six_madd(six_madd(M[3 + k], r[i], M[j]), -r[j], M[i]);
+    }
+    for (int k = 0; k < 6; ++k) six_put(six_add(six_at(parent->A[k]), M[k]), parent->A[k]);
 }
 
 static void factorize_node(const struct articulation_tree *tree, struct articulation_node *node,
                            const struct articulation_view *v)
 {
     double D[6][6];
-    find_roles(tree, node, v);
+    const int hard = find_roles(tree, node, v);
     for (int i = 0; i < node->free; ++i) {
-        for (int k = 0; k < 6; ++k) node->U[i][k] = six_product(node->A[k], node->S[i]);
-        for (int j = 0; j <= i; ++j) D[i][j] = six_product(node->S[j], node->U[i]);
+        six_put(six_add_product(six_zero(), 1, node->A, node->S[i]), node->U[i]);
+        for (int j = 0; j <= i; ++j) D[i][j] = six_dot(six_at(node->S[j]), six_at(node->U[i]));
     }
-    add_soft_rows(tree, node, v, D);
+    add_soft_rows(tree, node, D);
     invert(node->free, D, node->H);
-    hold_hard_rows(tree, node, v);
+    if (hard > 0) hold_hard_rows(tree, node);
     if (node->parent >= 0 && node->bound) hand_on_inertia(node, &tree->node[node->parent]);
 }
 
 static bool same_states(const struct articulation_tree *tree, const struct articulation_view *v)
 {
     int changed = 0;
-    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r)
-        changed |= (tree->factored[r] == ROW_INSIDE) ^ (v->state[r] == ROW_INSIDE);
+    for (int32_t at = 0; at < tree->rows; ++at)
+        changed |= (tree->row[at].factored == ROW_INSIDE) ^ (v->state[tree->row[at].r] == ROW_INSIDE);
     return !changed;
 }
 
-void sadmm_articulation_tree_factorize(struct articulation_tree *tree, const struct articulation_view *v)
+void SADMM_ARTICULATION_KERNEL(articulation_tree_factorize)(struct articulation_tree *tree,
+                                                            const struct articulation_view *v)
 {
     if (tree->known && same_states(tree, v)) return;
-    memcpy(tree->factored, v->state, (size_t)(SADMM_MAX_ROWS * v->s.columns));
     tree->known = true;
     for (int32_t n = 0; n < tree->nodes; ++n) {
         struct articulation_node *node = &tree->node[n];
         const double *A = v->factor + 36 * (size_t)node->body;
-        for (int i = 0; i < 6; ++i)
-            for (int j = 0; j <= i; ++j) node->A[i][j] = node->A[j][i] = A[6 * i + j];
+        for (int i = 0; i < 6; ++i) six_put(six_load(A + 6 * i), node->A[i]);
     }
     for (int32_t n = 0; n < tree->nodes; ++n) factorize_node(tree, &tree->node[n], v);
 }

@@ -2,64 +2,47 @@
 #include <math.h>
 #include <string.h>
 
-#include "articulation_tree_rows.h"
-#include "core/math/array3.h"
+#include "articulation_variants.h"
+#include "core/math/six.h"
 
 /* How far the axes of locks may be off being unit and perpendicular: their multipliers, by projection, are off by as
  * much, and refined. */
 static const double PERPENDICULAR = 1e-9;
 
-/* Where a lock's axis is in its row: 0: it locks a translation, 3: a rotation. */
-static int axis_at(const double *row) { return dot3(row, row) > 0.5 ? 0 : 3; }
-
-/* Is the axis of lock r unit, and perpendicular to those before it? */
-static bool add_lock(const struct articulation_tree *tree, struct articulation_node *node,
-                     const struct articulation_view *v, int32_t r)
+/* Is the axis of a lock unit, and perpendicular to those before it? */
+static bool add_lock(struct articulation_tree *tree, struct articulation_node *node, int32_t at)
 {
-    const double *row = tree_own_row(tree, v, r);
-    const int at = axis_at(row), kind = at / 3;
-    if (node->locks[kind] == 3 || !(fabs(dot3(row + at, row + at) - 1) < PERPENDICULAR) ||
-        (kind == 1 && dot3(row, row) != 0))
+    const six row = six_at(tree->row[at].own);
+    const double linear = three_dot(row.linear, row.linear);
+    const int kind = linear > 0.5 ? 0 : 1; /* of a translation, of a rotation */
+    const three axis = kind == 0 ? row.linear : row.angular;
+    if (node->locks[kind] == 3 || !(fabs(three_dot(axis, axis) - 1) < PERPENDICULAR) || (kind == 1 && linear != 0))
         return false;
-    for (int i = 0; i < node->locks[kind]; ++i)
-        if (!(fabs(dot3(row + at, tree_lock_row(tree, node, v, kind, i) + at)) < PERPENDICULAR)) return false;
-    node->lock[3 * kind + node->locks[kind]++] = r;
-    return true;
-}
-
-/* Rows that nothing gives way to. False: some are no locks of one joint. Those of two joints between the same bodies
- * say the same, and share their loads by the regularisation of the sparse factor. */
-static bool find_locks(const struct articulation_tree *tree, struct articulation_node *node,
-                       const struct articulation_view *v)
-{
-    node->locks[0] = node->locks[1] = 0;
-    EACH_TREE_ROW(tree, v, node, r) {
-        tree->role[r] = ARTICULATION_NONE;
-        if (!sadmm_law_is_coupled(v->rows[r].compliance, v->rows[r].lo, v->rows[r].hi)) continue;
-        if (!add_lock(tree, node, v, r)) return false;
-        tree->role[r] = ARTICULATION_LOCK;
+    for (int i = 0; i < node->locks[kind]; ++i) {
+        const three other = *(const three *)(tree->row[node->lock[3 * kind + i]].own + SIX_HALF * kind);
+        if (!(fabs(three_dot(axis, other)) < PERPENDICULAR)) return false;
     }
+    node->lock[3 * kind + node->locks[kind]++] = at;
+    tree->row[at].role = ARTICULATION_LOCK;
     return true;
 }
 
 /* Unit axes perpendicular to `count` given ones; how many. */
-static int complete(double axis[3][3], int count)
+static int complete(three axis[3], int count)
 {
     if (count == 0) {
-        memset(axis, 0, 9 * sizeof(double));
-        axis[0][0] = axis[1][1] = axis[2][2] = 1;
+        for (int k = 0; k < 3; ++k) axis[k] = (three){k == 0, k == 1, k == 2, 0};
         return 3;
     }
     if (count == 1) {
-        const vec3 n = v3_load(axis[0]);
         vec3 t, b;
-        v3_tangents(n, &t, &b);
-        v3_store(t, axis[0]);
-        v3_store(b, axis[1]);
+        v3_tangents(v3(axis[0][0], axis[0][1], axis[0][2]), &t, &b);
+        axis[0] = (three){t.x, t.y, t.z, 0};
+        axis[1] = (three){b.x, b.y, b.z, 0};
         return 2;
     }
     if (count == 2) {
-        v3_store(v3_cross(v3_load(axis[0]), v3_load(axis[1])), axis[0]);
+        axis[0] = three_cross(axis[0], axis[1]);
         return 1;
     }
     return 0;
@@ -67,63 +50,124 @@ static int complete(double axis[3][3], int count)
 
 /* Free directions: translations that no lock forbids; rotations likewise, about the point where the locked translations
  * are. */
-static void find_directions(const struct articulation_tree *tree, struct articulation_node *node,
-                            const struct articulation_view *v)
+static void find_directions(const struct articulation_tree *tree, struct articulation_node *node)
 {
-    double axis[3][3];
+    three axis[3];
     node->free = 0;
     for (int kind = 0; kind < 2; ++kind) {
         for (int i = 0; i < node->locks[kind]; ++i)
-            memcpy(axis[i], tree_lock_row(tree, node, v, kind, i) + 3 * kind, sizeof axis[i]);
+            axis[i] = *(const three *)(tree->row[node->lock[3 * kind + i]].own + SIX_HALF * kind);
         const int count = complete(axis, node->locks[kind]);
         for (int i = 0; i < count; ++i) {
-            double *S = node->S[node->free++];
-            memset(S, 0, 6 * sizeof *S);
-            memcpy(S + 3 * kind, axis[i], 3 * sizeof *S);
+            six S = six_zero();
+            if (kind == 0) S.linear = axis[i];
+            else S.angular = axis[i];
             for (int k = 0; kind == 1 && k < node->locks[0]; ++k) {
-                const double *row = tree_lock_row(tree, node, v, 0, k), way = dot3(row + 3, axis[i]);
-                for (int c = 0; c < 3; ++c) S[c] -= way * row[c];
+                const six row = six_at(tree->row[node->lock[k]].own);
+                S.linear -= three_fill(three_dot(row.angular, axis[i])) * row.linear;
             }
+            six_put(S, node->S[node->free++]);
         }
     }
 }
 
-/* S^T J^T of rows that are no locks. */
-static void find_row_directions(const struct articulation_tree *tree, const struct articulation_node *node,
-                                const struct articulation_view *v)
+static six start_past_parent(const struct articulation_tree *tree, const struct articulation_node *node,
+                             const struct articulation_view *v)
 {
-    EACH_TREE_ROW(tree, v, node, r) {
-        if (tree->role[r] == ARTICULATION_LOCK) continue;
-        for (int i = 0; i < node->free; ++i)
-            tree->direction[6 * r + i] = six_product(tree_own_row(tree, v, r), node->S[i]);
-    }
+    const six own = six_load(v->velocity + 6 * (size_t)node->body);
+    if (node->parent < 0) return own;
+    const six parent = six_load(v->velocity + 6 * (size_t)tree->node[node->parent].body);
+    return six_sub(own, six_carry(*(const three *)node->offset, parent));
 }
 
-/* Has it any rows, and where is it from its parent? False: they are no wrenches at points of space. */
-static bool find_offset(const struct articulation_tree *tree, struct articulation_node *node,
-                        const struct articulation_view *v, const struct sadmm_row_constraint *slots)
+/* Where it is from its parent, and its rows. False: they are no wrenches at points of space, or not locks of one joint:
+ * those of two joints between the same bodies say the same, and share their loads by the regularisation of the sparse
+ * factor. */
+static bool add_rows(struct articulation_tree *tree, struct articulation_node *node, const struct articulation_view *v,
+                     const struct sadmm_row_constraint *slots)
 {
     node->bound = false;
+    node->locks[0] = node->locks[1] = 0;
+    node->row = tree->rows;
+    six past = six_zero();
     for (int32_t j = node->first; j < node->first + node->count; ++j) {
-        const struct sadmm_row_constraint *slot = &slots[v->s.constraint[tree->joint[j] / 2]];
+        const int32_t column = tree->joint[j] / 2, side = tree->joint[j] % 2;
+        const struct sadmm_row_constraint *slot = &slots[v->s.constraint[column]];
         if (slot->count == 0) continue;
         if (!slot->rigid) return false;
+        if (!node->bound) {
+            for (int k = 0; k < 3; ++k) node->offset[k] = side ? slot->offset[k] : -slot->offset[k];
+            past = start_past_parent(tree, node, v);
+        }
         node->bound = true;
-        for (int k = 0; k < 3; ++k) node->offset[k] = tree->joint[j] % 2 ? slot->offset[k] : -slot->offset[k];
+        for (int32_t r = SADMM_MAX_ROWS * column; r < SADMM_MAX_ROWS * column + slot->count; ++r) {
+            const struct articulation_row *from = &v->rows[r];
+            const int32_t at = tree->rows++;
+            struct articulation_tree_row *row = &tree->row[at];
+            const six own = six_load(from->jacobian[side]);
+            six_put(own, row->own);
+            row->r = r;
+            row->role = ARTICULATION_NONE;
+            row->gain = from->gain, row->compliance = from->compliance;
+            row->start = from->gain * six_dot(own, past) + from->bias + from->compliance * from->lambda;
+            tree->row_of[r] = at;
+            if (sadmm_law_is_coupled(from->compliance, from->lo, from->hi) && !add_lock(tree, node, at)) return false;
+        }
     }
+    node->row_end = tree->rows;
     return true;
 }
 
-bool sadmm_articulation_tree_begin(struct articulation_tree *tree, const struct articulation_view *v,
-                                   const struct sadmm_row_constraint *slots)
+static void find_along(const struct articulation_tree *tree, const struct articulation_node *node)
+{
+    for (int32_t at = node->row; at < node->row_end; ++at) {
+        struct articulation_tree_row *row = &tree->row[at];
+        if (row->role == ARTICULATION_LOCK) continue;
+        for (int i = 0; i < node->free; ++i) row->along[i] = six_dot(six_at(row->own), six_at(node->S[i]));
+    }
+}
+
+/* J^T lambda of its rows, on its body and on its parent's. */
+static void add_row_loads(const struct articulation_tree *tree, struct articulation_node *node,
+                          const struct articulation_view *v)
+{
+    six load = six_zero();
+    if (!node->bound) return;
+    for (int32_t at = node->row; at < node->row_end; ++at)
+        load = six_madd(load, v->rows[tree->row[at].r].lambda, six_at(tree->row[at].own));
+    six_put(six_add(six_at(node->load), load), node->load);
+    if (node->parent < 0) return;
+    double *parent = tree->node[node->parent].load;
+    six_put(six_sub(six_at(parent), six_hand_on(*(const three *)node->offset, load)), parent);
+}
+
+static void add_loads(const struct articulation_node *node, const struct articulation_view *v, double *impulse,
+                      double *without)
+{
+    const size_t e = (size_t)node->body;
+    const double *A = v->factor + 36 * e, *velocity = v->velocity + 6 * e;
+    const six rows = six_at(node->load), contacts = six_load(impulse + 6 * e);
+    six residual = six_add(six_load(without + 6 * e), rows);
+    for (int k = 0; k < 6; ++k) residual = six_madd(residual, -velocity[k], six_load(A + 6 * k));
+    six_store(residual, without + 6 * e);
+    six_store(six_add(residual, contacts), v->residual + 6 * e);
+    six_store(six_add(contacts, rows), impulse + 6 * e);
+}
+
+bool SADMM_ARTICULATION_KERNEL(articulation_tree_load)(struct articulation_tree *tree, const struct articulation_view *v,
+                                                       const struct sadmm_row_constraint *slots, double *impulse,
+                                                       double *without)
 {
     tree->known = false;
+    tree->rows = 0;
     for (int32_t n = 0; n < tree->nodes; ++n) {
         struct articulation_node *node = &tree->node[n];
-        if (!find_offset(tree, node, v, slots) || !find_locks(tree, node, v)) return false;
-        find_directions(tree, node, v);
-        find_row_directions(tree, node, v);
+        if (!add_rows(tree, node, v, slots)) return false;
+        find_directions(tree, node);
+        find_along(tree, node);
+        six_put(six_zero(), node->load);
     }
+    for (int32_t n = 0; n < tree->nodes; ++n) add_row_loads(tree, &tree->node[n], v);
+    for (int32_t n = 0; n < tree->nodes; ++n) add_loads(&tree->node[n], v, impulse, without);
     return true;
 }
-

@@ -1,6 +1,4 @@
 /* Which body of a tree hangs on which (articulation_tree.h). */
-#include <string.h>
-
 #include "articulation_tree.h"
 
 static int32_t other_side(const struct articulation_structure *s, int32_t around) { return s->side[around ^ 1]; }
@@ -58,11 +56,11 @@ static void put_node(const struct articulation_structure *s, int32_t e, const in
     node->body = e;
     node->parent = parent[e] >= 0 ? tree->node_of[parent[e]] : -1;
     node->first = *joints;
+    node->offset[3] = 0;
     for (int32_t at = s->first_around[e]; at < s->first_around[e + 1]; ++at) {
         const int32_t other = other_side(s, s->around[at]);
         if (other >= 0 && other != parent[e]) continue;
         tree->joint[(*joints)++] = s->around[at];
-        memset(tree->own + SADMM_MAX_ROWS * (s->around[at] / 2), s->around[at] % 2, SADMM_MAX_ROWS);
     }
     node->count = *joints - node->first;
 }
@@ -78,11 +76,7 @@ void sadmm_articulation_tree_make(const struct articulation_structure *s, int32_
     if (root < 0 || !list_bodies(s, root, queue, parent)) return;
     tree->nodes = s->bodies;
     for (int32_t k = 0; k < s->bodies; ++k) tree->node_of[queue[k]] = s->bodies - 1 - k;
-    for (int32_t k = s->bodies; k-- > 0;) {
-        struct articulation_node *node = &tree->node[tree->node_of[queue[k]]];
-        put_node(s, queue[k], parent, tree, tree->node_of[queue[k]], &joints);
-        node->soft = SADMM_MAX_ROWS * node->first;
-    }
+    for (int32_t k = s->bodies; k-- > 0;) put_node(s, queue[k], parent, tree, tree->node_of[queue[k]], &joints);
     for (int32_t n = 0; n < tree->nodes; ++n) {
         int32_t depth = 1;
         for (int32_t up = tree->node[n].parent; up >= 0; up = tree->node[up].parent) ++depth;

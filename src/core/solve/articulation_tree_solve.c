@@ -1,44 +1,66 @@
-#include "articulation_tree.h"
-
 #include <math.h>
 #include <string.h>
 
-#include "articulation_tree_rows.h"
-#include "core/math/array3.h"
+#include "articulation_variants.h"
+#include "core/math/six.h"
 
-/* y += sign A x, A symmetric. */
-static void add_product(const double A[6][6], double sign, const double x[6], double y[6])
+static six parent_of(const struct articulation_node *node, const double velocity[SIX])
 {
-    for (int k = 0; k < 6; ++k)
-        for (int c = 0; c < 6; ++c) y[c] += sign * A[k][c] * x[k];
+    return six_carry(*(const three *)node->offset, six_at(velocity));
 }
 
-/* X v of a parent's velocity; p_parent += X^T p. */
-static void carry(const double r[3], const double v[6], double to[6])
+/* Loads on its body: v->residual; again: less what the velocity has taken so far. */
+static void begin_node(struct articulation_node *node, const struct articulation_view *v, bool again)
 {
-    memcpy(to, v, 6 * sizeof *to);
-    add_cross(v + 3, r, 1, to);
-}
-static void add_load(const double r[3], const double p[6], double to[6])
-{
-    for (int k = 0; k < 6; ++k) to[k] += p[k];
-    add_cross(r, p, 1, to + 3);
+    six load = six_load(v->residual + 6 * (size_t)node->body);
+    if (!again) {
+        six_put(six_zero(), node->total);
+    } else {
+        const double *A = v->factor + 36 * (size_t)node->body;
+        for (int k = 0; k < 6; ++k) load = six_madd(load, -node->total[k < 3 ? k : k + 1], six_load(A + 6 * k));
+    }
+    six_put(load, node->load);
 }
 
-/* s, which meets the locks: a target each is in v->right. */
-static void meet_locks(const struct articulation_tree *tree, struct articulation_node *node,
-                       const struct articulation_view *v)
+/* What rows inside their bounds ask for, and the loads of what rows have changed by. */
+static void begin_rows(const struct articulation_tree *tree, struct articulation_node *node,
+                       const struct articulation_view *v, bool again)
 {
-    double *s = node->met;
-    memset(s, 0, 6 * sizeof *s);
+    six load = six_zero();
+    bool any = false;
+    for (int32_t at = node->row; at < node->row_end; ++at) {
+        struct articulation_tree_row *row = &tree->row[at];
+        double *change = &v->change[row->r];
+        if (v->state[row->r] == ROW_INSIDE) {
+            row->found = 0;
+            row->right = -(again ? row->residual : row->start) / row->gain;
+            if (!again) *change = 0;
+        }
+        if (*change == 0) continue;
+        load = six_madd(load, *change, six_at(row->own));
+        any = true;
+    }
+    if (!any) return;
+    six_put(six_add(six_at(node->load), load), node->load);
+    if (node->parent < 0) return;
+    double *parent = tree->node[node->parent].load;
+    six_put(six_sub(six_at(parent), six_hand_on(*(const three *)node->offset, load)), parent);
+}
+
+/* s, which meets the locks. */
+static six meet_locks(const struct articulation_tree *tree, const struct articulation_node *node)
+{
+    six s = six_zero();
     for (int i = 0; i < node->locks[1]; ++i) {
-        const double *row = tree_lock_row(tree, node, v, 1, i), target = v->right[node->lock[3 + i]];
-        for (int k = 3; k < 6; ++k) s[k] += target * row[k];
+        const struct articulation_tree_row *row = &tree->row[node->lock[3 + i]];
+        s.angular += three_fill(row->right) * six_at(row->own).angular;
     }
     for (int i = 0; i < node->locks[0]; ++i) {
-        const double *row = tree_lock_row(tree, node, v, 0, i), target = v->right[node->lock[i]] - dot3(row + 3, s + 3);
-        for (int k = 0; k < 3; ++k) s[k] += target * row[k];
+        const struct articulation_tree_row *row = &tree->row[node->lock[i]];
+        const six own = six_at(row->own);
+        s.linear += three_fill(row->right - three_dot(own.angular, s.angular)) * own.linear;
     }
+    return s;
 }
 
 static double along(const struct articulation_node *node, const double *g, const double *q)
@@ -49,189 +71,131 @@ static double along(const struct articulation_node *node, const double *g, const
 }
 
 /* q = H t, and what hard rows ask for beside it. */
-static void find_free(const struct articulation_tree *tree, const struct articulation_node *node,
-                      const struct articulation_view *v, const double t[6], double q[6])
+static void find_free(const struct articulation_tree *tree, const struct articulation_node *node, six met,
+                      const double t[6], double q[6])
 {
     for (int i = 0; i < node->free; ++i) {
         q[i] = 0;
         for (int j = 0; j < node->free; ++j) q[i] += node->H[i][j] * t[j];
     }
+    if (node->hard_rows == 0) return;
     double held[6] = {0};
     for (int h = 0; h < node->hard_rows; ++h) {
         const struct articulation_hard_row *hard = &node->hard[h];
-        const int32_t r = hard->r;
-        const double *row = tree_own_row(tree, v, r);
+        const struct articulation_tree_row *row = &tree->row[hard->row];
         const double missing =
-            (v->right[r] - six_product(row, node->met) - along(node, tree->direction + 6 * r, held)) * hard->inverse;
+            (row->right - six_dot(six_at(row->own), met) - along(node, row->along, held)) * hard->inverse;
         for (int i = 0; i < node->free; ++i) held[i] += hard->response[i] * missing;
     }
-    for (int i = 0; i < node->free && node->hard_rows > 0; ++i) q[i] += held[i];
+    for (int i = 0; i < node->free; ++i) q[i] += held[i];
 }
 
-static double soft_change(const struct articulation_tree *tree, const struct articulation_node *node,
-                          const struct articulation_view *v, int32_t r, const double *q)
+static double soft_change(const struct articulation_tree_row *row, double rate)
 {
-    const double rate = six_product(tree_own_row(tree, v, r), node->met) +
-                        (q ? along(node, tree->direction + 6 * r, q) : 0);
-    return v->rows[r].gain / v->rows[r].compliance * (v->right[r] - rate);
+    return row->gain / row->compliance * (row->right - rate);
 }
 
 static void pass_down(const struct articulation_tree *tree, struct articulation_node *node,
-                      const struct articulation_view *v)
+                      const struct articulation_view *v, bool again)
 {
-    double p[6], t[6];
-    meet_locks(tree, node, v);
-    memcpy(p, node->load, sizeof p);
-    add_product(node->A, -1, node->met, p);
-    for (int i = 0; i < node->free; ++i) t[i] = six_product(node->S[i], p);
-    for (int32_t at = node->soft; at < node->soft_end; ++at) {
-        const int32_t r = tree->soft[at];
-        const double change = soft_change(tree, node, v, r, NULL);
-        for (int i = 0; i < node->free; ++i) t[i] += tree->direction[6 * r + i] * change;
+    double t[6];
+    begin_rows(tree, node, v, again);
+    const six met = meet_locks(tree, node);
+    six_put(met, node->met);
+    six p = six_at(node->load);
+    if (node->locks[0] + node->locks[1] > 0) p = six_add_product(p, -1, node->A, node->met);
+    for (int i = 0; i < node->free; ++i) t[i] = six_dot(six_at(node->S[i]), p);
+    for (int32_t at = node->row; at < node->row + node->soft; ++at) {
+        const struct articulation_tree_row *row = &tree->row[tree->soft[at]];
+        const double change = soft_change(row, six_dot(six_at(row->own), met));
+        for (int i = 0; i < node->free; ++i) t[i] += row->along[i] * change;
     }
-    find_free(tree, node, v, t, node->q);
+    find_free(tree, node, met, t, node->q);
     if (node->parent < 0 || !node->bound) return;
-    for (int i = 0; i < node->free; ++i)
-        for (int k = 0; k < 6; ++k) p[k] -= node->U[i][k] * node->q[i];
-    add_load(node->offset, p, tree->node[node->parent].load);
+    for (int i = 0; i < node->free; ++i) p = six_madd(p, -node->q[i], six_at(node->U[i]));
+    double *parent = tree->node[node->parent].load;
+    six_put(six_add(six_at(parent), six_hand_on(*(const three *)node->offset, p)), parent);
 }
 
 /* Multipliers of what holds it: F is what its joint does to it. */
-static void find_multipliers(const struct articulation_tree *tree, const struct articulation_node *node,
-                             const struct articulation_view *v, double F[6])
+static void find_multipliers(const struct articulation_tree *tree, const struct articulation_node *node, six F)
 {
-    for (int32_t at = node->soft; at < node->soft_end; ++at) {
-        const int32_t r = tree->soft[at];
-        const double *row = tree_own_row(tree, v, r), found = soft_change(tree, node, v, r, node->q);
-        v->found[r] = found;
-        for (int k = 0; k < 6; ++k) F[k] -= row[k] * found;
+    const six met = six_at(node->met);
+    for (int32_t at = node->row; at < node->row + node->soft; ++at) {
+        struct articulation_tree_row *row = &tree->row[tree->soft[at]];
+        const six own = six_at(row->own);
+        row->found = soft_change(row, six_dot(own, met) + along(node, row->along, node->q));
+        F = six_madd(F, -row->found, own);
     }
     for (int h = node->hard_rows; h-- > 0;) {
         const struct articulation_hard_row *hard = &node->hard[h];
-        const int32_t r = hard->r;
-        const double *row = tree_own_row(tree, v, r);
+        struct articulation_tree_row *row = &tree->row[hard->row];
         double sum = 0;
-        for (int i = 0; i < node->free; ++i) sum += hard->response[i] * six_product(node->S[i], F);
-        v->found[r] = sum * hard->inverse;
-        for (int k = 0; k < 6; ++k) F[k] -= row[k] * v->found[r];
+        for (int i = 0; i < node->free; ++i) sum += hard->response[i] * six_dot(six_at(node->S[i]), F);
+        row->found = sum * hard->inverse;
+        F = six_madd(F, -row->found, six_at(row->own));
     }
-    for (int kind = 0; kind < 2; ++kind)
-        for (int i = 0; i < node->locks[kind]; ++i) {
-            const double *row = tree_lock_row(tree, node, v, kind, i);
-            const double found = dot3(row + 3 * kind, F + 3 * kind);
-            v->found[node->lock[3 * kind + i]] = found;
-            for (int k = 3; k < 6; ++k) F[k] -= found * row[k];
-        }
+    for (int i = 0; i < node->locks[0]; ++i) {
+        struct articulation_tree_row *row = &tree->row[node->lock[i]];
+        const six own = six_at(row->own);
+        row->found = three_dot(own.linear, F.linear);
+        F.angular -= three_fill(row->found) * own.angular;
+    }
+    for (int i = 0; i < node->locks[1]; ++i) {
+        struct articulation_tree_row *row = &tree->row[node->lock[3 + i]];
+        row->found = three_dot(six_at(row->own).angular, F.angular);
+    }
 }
 
-static void pass_up(const struct articulation_tree *tree, struct articulation_node *node,
-                    const struct articulation_view *v)
+static void pass_up(const struct articulation_tree *tree, struct articulation_node *node)
 {
-    double *velocity = node->velocity, F[6], held[6] = {0}, pull[6];
     const bool carried = node->parent >= 0 && node->bound;
+    six velocity = six_at(node->met);
     if (carried) {
-        carry(node->offset, tree->node[node->parent].velocity, held);
-        for (int i = 0; i < node->free; ++i) pull[i] = six_product(node->U[i], held);
+        const six held = parent_of(node, tree->node[node->parent].velocity);
+        double pull[6];
+        for (int i = 0; i < node->free; ++i) pull[i] = six_dot(six_at(node->U[i]), held);
         for (int i = 0; i < node->free; ++i)
             for (int j = 0; j < node->free; ++j) node->q[i] -= node->H[i][j] * pull[j];
+        velocity = six_add(velocity, held);
     }
-    for (int k = 0; k < 6; ++k) velocity[k] = held[k] + node->met[k];
-    for (int i = 0; i < node->free; ++i)
-        for (int k = 0; k < 6; ++k) velocity[k] += node->S[i][k] * node->q[i];
+    for (int i = 0; i < node->free; ++i) velocity = six_madd(velocity, node->q[i], six_at(node->S[i]));
+    six_put(velocity, node->velocity);
+    six_put(six_add(six_at(node->total), velocity), node->total);
     if (!node->bound) return;
-    for (int k = 0; k < 6; ++k) F[k] = -node->load[k];
-    add_product(node->A, 1, velocity, F);
-    find_multipliers(tree, node, v, F);
+    find_multipliers(tree, node,
+                     six_add_product(six_sub(six_zero(), six_at(node->load)), 1, node->A, node->velocity));
 }
 
-/* articulation_row_residual with what the bodies' velocities are so far. */
-static double residual_of(const struct articulation_tree *tree, const struct articulation_view *v, int32_t r)
+/* What its rows have changed by, and are off by then. Returns the largest of those inside their bounds. */
+static double end_rows(const struct articulation_tree *tree, const struct articulation_node *node,
+                       const struct articulation_view *v, double most)
 {
-    const struct articulation_row *row = &v->rows[r];
-    const int32_t *side = v->s.side + 2 * (r / SADMM_MAX_ROWS);
-    double rate = 0;
-    for (int k = 0; k < 2; ++k)
-        if (side[k] >= 0) rate += six_product(row->jacobian[k], tree->total + 6 * side[k]);
-    return row->gain * rate + row->bias + row->compliance * (row->lambda + v->change[r]);
-}
-
-double sadmm_articulation_tree_residual(const struct articulation_tree *tree, const struct articulation_view *v)
-{
-    double most = 0;
-    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) {
-        if (v->state[r] != ROW_INSIDE) continue;
-        const double residual = fabs(residual_of(tree, v, r));
-        if (!(residual <= most)) most = residual;
+    six past = six_at(node->total);
+    if (node->parent >= 0) past = six_sub(past, parent_of(node, tree->node[node->parent].total));
+    for (int32_t at = node->row; at < node->row_end; ++at) {
+        struct articulation_tree_row *row = &tree->row[at];
+        const bool inside = v->state[row->r] == ROW_INSIDE;
+        double change = v->change[row->r];
+        if (inside) v->change[row->r] = change += row->found;
+        row->residual = row->start + row->gain * six_dot(six_at(row->own), past) + row->compliance * change;
+        const double size = inside ? fabs(row->residual) : 0;
+        if (!(size <= most)) most = size;
     }
     return most;
 }
 
-/* Loads of what rows have changed by so far. */
-static void add_changes(const struct articulation_tree *tree, const struct articulation_view *v)
+double SADMM_ARTICULATION_KERNEL(articulation_tree_solve)(const struct articulation_tree *tree,
+                                                          const struct articulation_view *v, bool again)
 {
-    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) {
-        const double change = v->change[r];
-        if (change == 0) continue;
-        const int32_t *side = v->s.side + 2 * (r / SADMM_MAX_ROWS);
-        for (int s = 0; s < 2; ++s)
-            for (int k = 0; side[s] >= 0 && k < 6; ++k)
-                tree->node[tree->node_of[side[s]]].load[k] += v->rows[r].jacobian[s][k] * change;
-    }
-}
-
-/* What acts on the bodies, and what rows inside their bounds ask for: of what is left again. */
-static void put_loads(const struct articulation_tree *tree, const struct articulation_view *v, bool again)
-{
-    const int32_t numbers = 6 * v->s.bodies;
-    for (int32_t k = 0; k < numbers; ++k) {
-        if (!again) v->dv[k] = 0;
-        tree->total[k] = v->velocity[k] + v->dv[k];
-    }
-    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r)
-        if (v->state[r] == ROW_INSIDE) {
-            if (!again) v->change[r] = 0;
-            v->found[r] = 0;
-            v->right[r] = -residual_of(tree, v, r) / v->rows[r].gain;
-        } else if (v->state[r] == ROW_ABSENT) v->change[r] = 0;
-    for (int32_t n = 0; n < tree->nodes; ++n) {
-        struct articulation_node *node = &tree->node[n];
-        const double *A = v->factor + 36 * (size_t)node->body, *dv = v->dv + 6 * (size_t)node->body;
-        memcpy(node->load, v->residual + 6 * (size_t)node->body, sizeof node->load);
-        for (int k = 0; again && k < 6; ++k)
-            for (int j = 0; j < 6; ++j) node->load[k] -= A[j <= k ? 6 * k + j : 6 * j + k] * dv[j];
-    }
-    add_changes(tree, v);
-}
-
-void sadmm_articulation_tree_solve(const struct articulation_tree *tree, const struct articulation_view *v, bool again)
-{
-    put_loads(tree, v, again);
-    for (int32_t n = 0; n < tree->nodes; ++n) pass_down(tree, &tree->node[n], v);
+    double most = 0;
+    for (int32_t n = 0; n < tree->nodes; ++n) begin_node(&tree->node[n], v, again);
+    for (int32_t n = 0; n < tree->nodes; ++n) pass_down(tree, &tree->node[n], v, again);
     for (int32_t n = tree->nodes; n-- > 0;) {
         struct articulation_node *node = &tree->node[n];
-        const size_t first = 6 * (size_t)node->body;
-        pass_up(tree, node, v);
-        for (size_t k = 0; k < 6; ++k) {
-            v->dv[first + k] += node->velocity[k];
-            tree->total[first + k] = v->velocity[first + k] + v->dv[first + k];
-        }
+        pass_up(tree, node);
+        most = end_rows(tree, node, v, most);
+        six_store(six_at(node->total), v->dv + 6 * (size_t)node->body);
     }
-    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r)
-        if (v->state[r] == ROW_INSIDE) v->change[r] += v->found[r];
-}
-
-void sadmm_articulation_tree_pass(const struct articulation_node *node, double load[6], const double *along_joint,
-                                  double z[6], double response[6])
-{
-    double up[6] = {0};
-    for (int i = 0; i < node->free; ++i) z[i] = six_product(node->S[i], load) + (along_joint ? along_joint[i] : 0);
-    for (int i = 0; i < node->free; ++i) {
-        response[i] = 0;
-        for (int j = 0; j < node->free; ++j) response[i] += node->H[i][j] * z[j];
-    }
-    if (node->parent < 0 || !node->bound) return;
-    for (int i = 0; i < node->free; ++i)
-        for (int k = 0; k < 6; ++k) load[k] -= node->U[i][k] * response[i];
-    add_load(node->offset, load, up);
-    memcpy(load, up, sizeof up);
+    return most;
 }
