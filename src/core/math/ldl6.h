@@ -77,4 +77,17 @@ SADMM_INLINE void ldl6_solve(const double L[36], const double b[6], double x[6])
     for (k = 0; k < 6; ++k) x[k] = y[k];
 }
 
+/* x^T A^-1 x */
+SADMM_INLINE double ldl6_inverse_product(const double L[36], const double x[6])
+{
+    double y[6], sum = 0;
+    int k;
+    SADMM_UNROLL
+    for (k = 0; k < 6; ++k) y[k] = x[k];
+    ldl6_forward(L, y);
+    SADMM_UNROLL
+    for (k = 0; k < 6; ++k) sum += y[k] * y[k] * L[7 * k];
+    return sum;
+}
+
 #endif

@@ -284,14 +284,20 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
     return SADMM_OK;
 }
 
-bool sadmm_articulations_has_loops(const struct sadmm_articulations *articulations) { return articulations->loops; }
+bool sadmm_articulations_has_loops(const struct sadmm_articulations *articulations)
+{
+    bool loops = false;
+    for (int32_t k = 0; articulations->loops && k < articulations->order.parts; ++k)
+        loops = loops || (articulations->parts[k].loop && !articulations->parts[k].by_tree);
+    return loops;
+}
 
 void sadmm_articulations_find_left(const struct sadmm_articulations *articulations,
                                    const struct sadmm_row_constraint *slots, double *left)
 {
     for (int32_t k = 0; k < articulations->order.parts; ++k) {
         const struct articulation_view *v = &articulations->parts[k].view;
-        if (articulations->parts[k].loop) EACH_ARTICULATION_ROW(slots, v, r, from) left[from] = articulation_left(v, r);
+        if (articulations->parts[k].loop && !articulations->parts[k].by_tree) EACH_ARTICULATION_ROW(slots, v, r, from) left[from] = articulation_left(v, r);
     }
 }
 

@@ -4,6 +4,7 @@
 #define SADMM_CORE_SOLVE_ARTICULATION_VARIANTS_H
 
 #include "articulation_tree.h"
+#include "ncp_newton.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -20,6 +21,7 @@ struct sadmm_articulation_kernels {
     sadmm_articulation_tree_factorize *factorize;
     sadmm_articulation_tree_solve *solve;
     sadmm_ncp_tree_responses *responses;
+    sadmm_ncp_search *newton, *interior; /* ncp_newton.h, ncp_interior.h */
 };
 
 #define SADMM_ARTICULATION_JOIN2(a, b) a##b
@@ -35,6 +37,8 @@ extern sadmm_articulation_tree_factorize sadmm_articulation_tree_factorize_basel
     sadmm_articulation_tree_factorize_avx2;
 extern sadmm_articulation_tree_solve sadmm_articulation_tree_solve_baseline, sadmm_articulation_tree_solve_avx2;
 extern sadmm_ncp_tree_responses sadmm_ncp_tree_responses_baseline, sadmm_ncp_tree_responses_avx2;
+extern sadmm_ncp_search sadmm_ncp_newton_baseline, sadmm_ncp_newton_avx2, sadmm_ncp_interior_baseline,
+    sadmm_ncp_interior_avx2;
 
 #ifdef __cplusplus
 }

@@ -7,9 +7,11 @@
 #ifndef SADMM_CORE_SOLVE_NCP_DENSE_H
 #define SADMM_CORE_SOLVE_NCP_DENSE_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -32,23 +34,122 @@ struct ncp_dense {
 };
 
 /* Doubles: a matrix, which both searches use, and vectors of each (ncp_newton.c, ncp_interior.c). */
-enum { NCP_NEWTON_VECTORS = 8, NCP_INTERIOR_VECTORS = 26 };
+enum { NCP_NEWTON_VECTORS = 20, NCP_INTERIOR_VECTORS = 26 };
 enum { NCP_VECTORS = NCP_NEWTON_VECTORS + NCP_INTERIOR_VECTORS };
 static inline size_t ncp_work_size(size_t size) { return size * (size + NCP_VECTORS); }
 
+/* ---- laws -------------------------------------------------------------------------------------------------------- */
+
 /* The projection Pi(y), and its derivative, row by row. */
-void ncp_project(const struct ncp_law *law, const double y[3], double to[3], double derivative[3][3]);
+static inline void ncp_project(const struct ncp_law *law, const double y[3], double to[3], double D[3][3])
+{
+    memset(D, 0, 9 * sizeof(double));
+    if (law->count == 1) {
+        to[0] = y[0] < law->lo ? law->lo : y[0] > law->hi ? law->hi : y[0];
+        D[0][0] = to[0] == y[0];
+        return;
+    }
+    to[0] = to[1] = to[2] = 0;
+    if (!(y[0] > 0)) return;
+    const double size = sqrt(y[1] * y[1] + y[2] * y[2]), limit = law->friction * y[0];
+    to[0] = y[0], D[0][0] = 1;
+    if (size <= limit) {
+        to[1] = y[1], to[2] = y[2];
+        D[1][1] = D[2][2] = 1;
+        return;
+    }
+    const double way[2] = {y[1] / size, y[2] / size}, left = limit / size;
+    for (int k = 0; k < 2; ++k) {
+        to[1 + k] = limit * way[k];
+        D[1 + k][0] = law->friction * way[k];
+        for (int q = 0; q < 2; ++q) D[1 + k][1 + q] = left * ((k == q) - way[k] * way[q]);
+    }
+}
+
 /* y = lambda - u/w of a law. */
-void ncp_arrive(const struct ncp_dense *d, const struct ncp_law *law, double y[3]);
+static inline void ncp_arrive(const struct ncp_dense *d, const struct ncp_law *law, double y[3])
+{
+    const double softness = 1 / law->response;
+    for (int32_t k = 0; k < law->count; ++k) y[k] = d->lambda[law->first + k] - d->u[law->first + k] * softness;
+}
+
+/* Of a law whose projection is `to`, m/s. */
+static inline double ncp_law_map(const struct ncp_dense *d, const struct ncp_law *law, const double to[3])
+{
+    double sum = 0;
+    for (int32_t k = 0; k < law->count; ++k) {
+        const double residual = d->lambda[law->first + k] - to[k];
+        sum += residual * residual;
+    }
+    return sqrt(sum) * law->response;
+}
+
 /* The largest natural map, m/s (rows: w times the residual of lambda). */
-double ncp_natural_map(const struct ncp_dense *d);
+static inline double ncp_natural_map(const struct ncp_dense *d)
+{
+    double most = 0;
+    for (int32_t i = 0; i < d->laws; ++i) {
+        double y[3], to[3], D[3][3];
+        ncp_arrive(d, &d->law[i], y);
+        ncp_project(&d->law[i], y, to, D);
+        const double map = ncp_law_map(d, &d->law[i], to);
+        if (!(map <= most)) most = map; /* what is not a number is the most */
+    }
+    return most;
+}
+
 /* u += G x, of one number x of lambda. */
-void ncp_respond(const struct ncp_dense *d, int32_t number, double x, double *u);
+static inline void ncp_respond(const struct ncp_dense *d, int32_t number, double x, double *u)
+{
+    for (int32_t r = 0; r < d->size; ++r) u[r] += d->G[(size_t)r * (size_t)d->size + (size_t)number] * x;
+}
+
+/* ---- linear equations -------------------------------------------------------------------------------------------- */
+
+static inline void ncp_exchange(double *a, double *b, size_t count)
+{
+    for (size_t c = 0; c < count; ++c) {
+        const double t = a[c];
+        a[c] = b[c], b[c] = t;
+    }
+}
 
 /* M = P L U in place, with the largest of each column as its pivot. False: singular. */
-bool ncp_factor(double *M, int32_t *pivot, int32_t count);
+static inline bool ncp_factor(double *M, int32_t *pivot, int32_t count)
+{
+    const size_t n = (size_t)count;
+    for (size_t k = 0; k < n; ++k) {
+        double *top = M + k * n;
+        size_t best = k;
+        for (size_t i = k + 1; i < n; ++i)
+            if (fabs(M[i * n + k]) > fabs(M[best * n + k])) best = i;
+        pivot[k] = (int32_t)best;
+        if (!(fabs(M[best * n + k]) > 0)) return false;
+        if (best != k) ncp_exchange(top, M + best * n, n);
+        const double inverse = 1 / top[k];
+        for (size_t i = k + 1; i < n; ++i) {
+            double *row = M + i * n;
+            const double share = row[k] *= inverse;
+            if (share == 0) continue;
+            for (size_t c = k + 1; c < n; ++c) row[c] -= share * top[c];
+        }
+    }
+    return true;
+}
+
 /* M x = right, in place. */
-void ncp_substitute(const double *M, const int32_t *pivot, int32_t count, double *right);
+static inline void ncp_substitute(const double *M, const int32_t *pivot, int32_t count, double *x)
+{
+    const size_t n = (size_t)count;
+    for (size_t k = 0; k < n; ++k) ncp_exchange(x + k, x + pivot[k], (size_t)pivot[k] != k);
+    for (size_t k = 1; k < n; ++k)
+        for (size_t c = 0; c < k; ++c) x[k] -= M[k * n + c] * x[c];
+    for (size_t k = n; k-- > 0;) {
+        for (size_t c = k + 1; c < n; ++c) x[k] -= M[k * n + c] * x[c];
+        x[k] /= M[k * n + k];
+    }
+}
+
 /* What both take together, in multiplications. */
 static inline double ncp_factor_work(double count) { return count * count * (count / 3 + 4); }
 

@@ -13,7 +13,7 @@ struct ncp_contact {
     int32_t pair, point;
     int32_t body[2];           /* of the island; -1: not one that is solved for */
     double e;
-    double row[2][3][6], response[2][3][6]; /* J, A^-1 J^T of either side: normal, tangents */
+    double row[2][3][6], response[2][3][6]; /* J of either side: normal, tangents; A^-1 J^T, for the sparse factor */
     double given[3];           /* velocity of what is not solved for */
 };
 
@@ -24,6 +24,7 @@ struct ncp_active {
 
 struct ncp_body {
     int32_t body;              /* of the system */
+    bool factored;             /* they are there (sadmm_ncp_factor): */
     double factor[36], b[6];
     double velocity[6], dv[6]; /* by the impulses so far; by one of them */
 };
@@ -67,6 +68,8 @@ struct island {
     double best, best_hard;              /* natural map, m/s, of what is solved; of contacts that do not give */
     bool gives;
     bool again;                          /* after the iterations */
+    bool fresh;                          /* all are parts, solved by their trees for the impulses that there are */
+    bool current;                        /* the best is what bodies and parts have: it is saved before that changes */
     double regularisation;               /* of contacts, a share of their response */
 };
 
@@ -85,6 +88,9 @@ struct ncp_passed {
     int32_t node, free;
     double along[6], response[6];
 };
+
+/* ncp_solve.c: A's factor and b of a body of the island. */
+const double *sadmm_ncp_factor(const struct island *s, int32_t number);
 
 /* ncp_response.c: numbers of nodes, once the island's bodies are there; G, with rows in the states that they have. */
 void sadmm_ncp_number_nodes(struct island *s);

@@ -1,9 +1,7 @@
-#include "ncp_newton.h"
-
 #include <math.h>
 #include <string.h>
 
-#include "ncp_interior.h"
+#include "articulation_variants.h"
 
 /* Steps from where the iterations are, which is what most problems need, and from an interior point. */
 enum { STEPS_FROM_START = 20, STEPS_FROM_INTERIOR = 200, STEPS_IN_TURN = 50 };
@@ -20,6 +18,11 @@ static const double NEARLY = 1e-11;
 
 /* ---- a step ------------------------------------------------------------------------------------------------------ */
 
+/* A law's projection, with its derivative. */
+struct piece {
+    double to[3], D[3][3];
+};
+
 struct newton {
     struct ncp_dense *d;
     double *M;              /* of the numbers that are solved for: count x count */
@@ -28,6 +31,7 @@ struct newton {
     double *start_lambda, *start_u, *best_lambda, *best_u;
     int32_t *number, count; /* those that are solved for */
     int32_t *pivot;
+    struct piece *piece;    /* (laws) where lambda and u are */
     double proximal;
 };
 
@@ -46,11 +50,27 @@ static struct newton newton_of(struct ncp_dense *d)
     s.best_u = s.best_lambda + n;
     s.number = (int32_t *)(s.best_u + n);
     s.pivot = s.number + n;
+    s.piece = (struct piece *)(s.best_u + 2 * n);
     return s;
 }
 
-/* Numbers that their law fixes go where it has them: an open contact's to 0. The others are listed, to be solved
- * for. */
+/* ncp_natural_map, with the pieces. */
+static double find_pieces(struct newton *s)
+{
+    const struct ncp_dense *d = s->d;
+    double most = 0;
+    for (int32_t i = 0; i < d->laws; ++i) {
+        struct piece *piece = &s->piece[i];
+        double y[3];
+        ncp_arrive(d, &d->law[i], y);
+        ncp_project(&d->law[i], y, piece->to, piece->D);
+        const double map = ncp_law_map(d, &d->law[i], piece->to);
+        if (!(map <= most)) most = map;
+    }
+    return most;
+}
+
+/* Numbers that their law fixes go where it has them: an open contact's to 0. The others are listed, to be solved for. */
 static void sort_numbers(struct newton *s)
 {
     const struct ncp_dense *d = s->d;
@@ -58,39 +78,35 @@ static void sort_numbers(struct newton *s)
     memset(s->moved, 0, (size_t)d->size * sizeof *s->moved);
     for (int32_t i = 0; i < d->laws; ++i) {
         const struct ncp_law *law = &d->law[i];
-        double y[3], to[3], D[3][3];
-        ncp_arrive(d, law, y);
-        ncp_project(law, y, to, D);
+        const struct piece *piece = &s->piece[i];
         for (int32_t k = 0; k < law->count; ++k) {
             const int32_t n = law->first + k;
-            s->step[n] = to[k] - d->lambda[n];
-            if (D[k][0] != 0 || D[k][1] != 0 || D[k][2] != 0) s->number[s->count++] = n;
+            const double *D = piece->D[k];
+            s->step[n] = piece->to[k] - d->lambda[n];
+            if (D[0] != 0 || D[1] != 0 || D[2] != 0) s->number[s->count++] = n;
             else if (s->step[n] != 0) ncp_respond(d, n, s->step[n], s->moved);
         }
     }
 }
 
 /* Rows of a law: (1 - D) step + D G step / w = Pi - lambda. `row`: the next one. */
-static void enter_law(struct newton *s, const struct ncp_law *law, int32_t *row)
+static void enter_law(struct newton *s, const struct ncp_law *law, const struct piece *piece, int32_t *row)
 {
     const struct ncp_dense *d = s->d;
-    double y[3], to[3], D[3][3];
-    ncp_arrive(d, law, y);
-    ncp_project(law, y, to, D);
     for (int32_t k = 0; k < law->count && *row < s->count; ++k) {
         if (s->number[*row] != law->first + k) continue;
         double *M = s->M + (size_t)*row * (size_t)s->count, *right = &s->right[*row];
         *right = s->step[law->first + k];
         memset(M, 0, (size_t)s->count * sizeof *M);
         for (int32_t h = 0; h < law->count; ++h) {
-            if (D[k][h] == 0) continue;
-            const double share = D[k][h] / law->response, *G = d->G + (size_t)(law->first + h) * (size_t)d->size;
+            if (piece->D[k][h] == 0) continue;
+            const double share = piece->D[k][h] / law->response, *G = d->G + (size_t)(law->first + h) * (size_t)d->size;
             *right -= share * s->moved[law->first + h];
             for (int32_t c = 0; c < s->count; ++c) M[c] += share * G[s->number[c]];
         }
         for (int32_t c = 0; c < s->count; ++c) {
             const int32_t h = s->number[c] - law->first;
-            if (h >= 0 && h < law->count) M[c] += (h == k) - D[k][h];
+            if (h >= 0 && h < law->count) M[c] += (h == k) - piece->D[k][h];
         }
         M[*row] += s->proximal;
         ++*row;
@@ -102,7 +118,7 @@ static bool make_step(struct newton *s)
     struct ncp_dense *d = s->d;
     int32_t row = 0;
     sort_numbers(s);
-    for (int32_t i = 0; i < d->laws; ++i) enter_law(s, &d->law[i], &row);
+    for (int32_t i = 0; i < d->laws; ++i) enter_law(s, &d->law[i], &s->piece[i], &row);
     const double solved_for = s->count, all = d->size;
     d->budget -= ncp_factor_work(solved_for) + 2 * all * all;
     if (!ncp_factor(s->M, s->pivot, s->count)) return false;
@@ -141,19 +157,19 @@ static double size_of(const struct ncp_dense *d)
 static double take_steps(struct newton *s, int steps, double size, double best, double enough)
 {
     struct ncp_dense *d = s->d;
-    double map = ncp_natural_map(d);
+    double map = find_pieces(s);
     for (int step = 0; step < steps && best > enough && map < HUGE_VAL && d->budget > 0; ++step) {
         const struct damping *by = &damping[step / STEPS_IN_TURN % DAMPINGS];
         s->proximal = fmin(by->most, fmax(by->least, by->share * map / size));
         if (!make_step(s)) return best;
-        map = ncp_natural_map(d);
+        map = find_pieces(s);
         if (map < best) keep_best(s);
-        best = fmin(best, map);
+        best = map < best ? map : best;
     }
     return best;
 }
 
-double ncp_newton(struct ncp_dense *d, double enough)
+double SADMM_ARTICULATION_KERNEL(ncp_newton)(struct ncp_dense *d, double enough)
 {
     struct newton s = newton_of(d);
     const double size = size_of(d);
@@ -164,7 +180,7 @@ double ncp_newton(struct ncp_dense *d, double enough)
     best = take_steps(&s, STEPS_FROM_START, size, best, enough);
     if (best > NEARLY) {
         copy(d, s.start_lambda, s.start_u, d->lambda, d->u);
-        const double map = ncp_interior(d, enough);
+        const double map = SADMM_ARTICULATION_KERNEL(ncp_interior)(d, enough);
         if (map < best) keep_best(&s);
         best = take_steps(&s, STEPS_FROM_INTERIOR, size, fmin(best, map), enough);
     }

@@ -116,6 +116,12 @@ static void make_sparse_responses(struct island *s, double *G)
         memset(v->dv, 0, 6 * (size_t)v->s.bodies * sizeof *v->dv);
     }
     for (int32_t i = 0; i < s->bodies; ++i) memset(s->d->bodies[i].dv, 0, sizeof s->d->bodies[i].dv);
+    for (int32_t i = 0; i < s->contacts; ++i) {
+        struct ncp_contact *contact = &s->d->contacts[i];
+        for (int side = 0; side < 2; ++side)
+            for (int k = 0; contact->body[side] >= 0 && k < 3; ++k)
+                ldl6_solve(sadmm_ncp_factor(s, contact->body[side]), contact->row[side][k], contact->response[side][k]);
+    }
     for (size_t c = 0; c < n; ++c) {
         struct impulse_side by[2], on[2];
         const int sides = sides_of(s, (int32_t)c, by);

@@ -47,16 +47,26 @@ void sadmm_ncp_destroy(struct sadmm_ncp *d)
 
 /* ---- an island's contacts and bodies ----------------------------------------------------------------------------- */
 
+const double *sadmm_ncp_factor(const struct island *s, int32_t number)
+{
+    struct ncp_body *body = &s->d->bodies[number];
+    if (body->factored) return body->factor;
+    double A[36];
+    sadmm_system_body(s->system, s->settings, body->body, A, body->b);
+    ldl6_factor(A, body->factor);
+    body->factored = true;
+    return body->factor;
+}
+
 static void add_body(struct island *s, int32_t i)
 {
     struct ncp_body *body = &s->d->bodies[s->bodies];
-    double A[36];
     body->body = i;
-    sadmm_system_body(s->system, s->settings, i, A, body->b);
-    ldl6_factor(A, body->factor);
+    body->factored = false;
     memcpy(body->velocity, s->system->velocity + 6 * (size_t)i, sizeof body->velocity);
     s->d->number[i] = s->bodies++;
     const int32_t part = s->articulations->part[i];
+    s->fresh = s->fresh && part >= 0 && s->articulations->parts[part].loaded;
     if (part < 0 || s->articulations->entry[i] != 0) return;
     s->d->parts[s->parts++] = part;
 }
@@ -85,8 +95,7 @@ static void add_contact(struct island *s, int32_t p, int32_t k)
         for (int side = 0; side < 2; ++side) {
             sadmm_contact_row(frame.r[i], side ? points[k].arm_b : points[k].arm_a, side ? 1 : -1, c->row[side][i]);
             if (c->body[side] < 0) continue;
-            ldl6_solve(s->d->bodies[c->body[side]].factor, c->row[side][i], c->response[side][i]);
-            response += six_product(c->row[side][i], c->response[side][i]);
+            response += ldl6_inverse_product(sadmm_ncp_factor(s, c->body[side]), c->row[side][i]);
         }
         if (i == 0 || pair->friction > 0) law->response = response > law->response ? response : law->response;
     }
@@ -134,11 +143,15 @@ static void add_contact_loads(struct island *s)
     }
 }
 
-/* The residual of the momentum, by velocities: m/s or rad/s. */
+/* The residual of the momentum, by velocities: m/s or rad/s. A tree leaves none. */
 static double momentum_residual(struct island *s)
 {
     double most = 0, owed[6];
-    for (int32_t n = 0; n < s->bodies; ++n) memcpy(s->d->bodies[n].dv, s->d->bodies[n].b, 6 * sizeof(double));
+    if (s->fresh) return 0;
+    for (int32_t n = 0; n < s->bodies; ++n) {
+        sadmm_ncp_factor(s, n);
+        memcpy(s->d->bodies[n].dv, s->d->bodies[n].b, 6 * sizeof(double));
+    }
     add_contact_loads(s);
     for (int32_t k = 0; k < s->parts; ++k) add_row_loads(s, &s->articulations->parts[s->d->parts[k]].view);
     for (int32_t n = 0; n < s->bodies; ++n) {
@@ -156,8 +169,10 @@ static void put_loads(struct island *s)
 {
     for (int32_t n = 0; n < s->bodies; ++n) {
         struct ncp_body *body = &s->d->bodies[n];
-        if (s->articulations->part[body->body] < 0) memcpy(body->dv, body->b, sizeof body->dv);
-        else memset(body->dv, 0, sizeof body->dv);
+        if (s->articulations->part[body->body] < 0) {
+            sadmm_ncp_factor(s, n);
+            memcpy(body->dv, body->b, sizeof body->dv);
+        } else memset(body->dv, 0, sizeof body->dv);
     }
     add_contact_loads(s);
     for (int32_t k = 0; k < s->parts; ++k) {
@@ -283,12 +298,25 @@ static void keep_best(struct island *s)
     s->best = map;
     s->best_hard = ncp_natural_map(&s->dense);
     memcpy(s->best_lambda, s->dense.lambda, 3 * (size_t)s->contacts * sizeof *s->best_lambda);
+    s->current = true;
+}
+
+/* Before bodies and parts change. */
+static void save_best(struct island *s)
+{
+    if (!s->current) return;
+    s->current = false;
     for (int32_t n = 0; n < s->bodies; ++n)
         memcpy(s->best_velocity + 6 * (size_t)n, s->d->bodies[n].velocity, 6 * sizeof(double));
     for (int32_t k = 0; k < s->parts; ++k) {
         const struct articulation_view *v = &part_of(s, k)->view;
         EACH_ARTICULATION_ROW(s->slots, v, r, from) s->d->rows[from] = articulation_bounded(v, r);
     }
+}
+
+static const double *best_velocity(const struct island *s, int32_t n)
+{
+    return s->current ? s->d->bodies[n].velocity : s->best_velocity + 6 * (size_t)n;
 }
 
 /* Velocities and inner rows for the impulses as they are, where rows that change their states become active, until none
@@ -298,9 +326,10 @@ static bool solve_inner_rows(struct island *s, uint8_t *states, uint8_t *next, s
     for (int pass = 0; pass < MOST_PASSES; ++pass) {
         bool active = false;
         memcpy(next, states, rows);
+        save_best(s);
         const bool solved = solve_for_impulses(s, next);
         if (solved) keep_best(s);
-        if (!activate(s, states, next, false, &active)) return false;
+        if (memcmp(states, next, rows) != 0 && !activate(s, states, next, false, &active)) return false;
         if (!active && !solved && !activate(s, states, next, true, &active)) return false;
         if (!active) return solved;
         memcpy(states, next, rows);
@@ -340,6 +369,7 @@ static void begin_giving(struct island *s, uint8_t *states, size_t rows)
     s->dense.laws = s->contacts;
     s->dense.size = 3 * s->contacts;
     s->gives = true;
+    s->current = false;
     s->regularisation = GIVES;
     s->best = HUGE_VAL;
 }
@@ -347,7 +377,8 @@ static void begin_giving(struct island *s, uint8_t *states, size_t rows)
 static void search(struct island *s, double *G, uint8_t *states, uint8_t *next, size_t rows)
 {
     bool changed = true;
-    if (!solve_inner_rows(s, states, next, rows, &changed)) return;
+    if (!s->fresh && !solve_inner_rows(s, states, next, rows, &changed)) return;
+    s->fresh = false;
     for (int round = 0, idle = 0;
          round < MOST_ROUNDS && idle < MOST_IDLE && s->best > AIM && s->dense.budget > 0; ++round) {
         const double last = s->best;
@@ -373,14 +404,11 @@ static void store_best(const struct island *s)
                  contacts->points[c->point].impulse);
     }
     for (int32_t n = 0; n < s->bodies; ++n)
-        memcpy(s->system->velocity + 6 * (size_t)s->d->bodies[n].body, s->best_velocity + 6 * (size_t)n,
-               6 * sizeof(double));
+        memcpy(s->system->velocity + 6 * (size_t)s->d->bodies[n].body, best_velocity(s, n), 6 * sizeof(double));
     for (int32_t k = 0; k < s->parts; ++k) {
         const struct articulation_view *v = &part_of(s, k)->view;
-        EACH_ARTICULATION_ROW(s->slots, v, r, from) {
-            s->system->rows->lambda[from] = s->d->rows[from];
-            (void)r;
-        }
+        EACH_ARTICULATION_ROW(s->slots, v, r, from)
+            s->system->rows->lambda[from] = s->current ? articulation_bounded(v, r) : s->d->rows[from];
     }
 }
 
@@ -403,14 +431,26 @@ static bool is_nearer(const struct island *s, double before, double size_before)
     return s->again && s->best < before && size_of(s, s->best_lambda) <= MOST_GROWTH * size_before;
 }
 
-/* Twice the kinetic energy of a body, J: v^T A v. */
-static double energy2(const struct ncp_body *body, const double v[6])
+/* A of a body that a tree has; NULL: of another one. */
+static const double *tree_inertia(const struct island *s, int32_t number)
 {
+    const int32_t i = s->d->bodies[number].body, part = s->articulations->part[i];
+    if (part < 0 || !s->articulations->parts[part].by_tree) return NULL;
+    return s->articulations->parts[part].view.factor + 36 * (size_t)s->articulations->entry[i];
+}
+
+/* Twice the kinetic energy of a body, J: v^T A v. */
+static double energy2(const struct island *s, int32_t number, const double v[6])
+{
+    const double *A = tree_inertia(s, number);
     double sum = 0;
+    for (int k = 0; A && k < 6; ++k) sum += v[k] * six_product(A + 6 * k, v);
+    if (A) return sum;
+    const double *factor = sadmm_ncp_factor(s, number);
     for (int k = 0; k < 6; ++k) {
         double along = v[k];
-        for (int i = k + 1; i < 6; ++i) along += body->factor[6 * i + k] * v[i];
-        sum += along * along / body->factor[7 * k];
+        for (int i = k + 1; i < 6; ++i) along += factor[6 * i + k] * v[i];
+        sum += along * along / factor[7 * k];
     }
     return sum;
 }
@@ -419,21 +459,36 @@ static double energy2(const struct ncp_body *body, const double v[6])
 static double best_energy2(const struct island *s)
 {
     double sum = 0;
-    for (int32_t n = 0; n < s->bodies; ++n) sum += energy2(&s->d->bodies[n], s->best_velocity + 6 * (size_t)n);
+    for (int32_t n = 0; n < s->bodies; ++n) sum += energy2(s, n, best_velocity(s, n));
     return sum;
 }
 
-/* That with nothing but forces, and of all at the speed of corrections. */
-static double expected_energy2(const struct island *s)
+/* That of all at the speed of corrections, and with nothing but forces. */
+static double correcting_energy2(const struct island *s)
 {
     const double speed = s->settings->correction_speed;
+    double mass = 0;
+    for (int32_t n = 0; n < s->bodies; ++n) {
+        const double *A = tree_inertia(s, n);
+        mass += A ? A[0] : 1 / sadmm_ncp_factor(s, n)[0];
+    }
+    return speed * speed * mass;
+}
+static double free_energy2(const struct island *s)
+{
     double sum = 0, v[6];
     for (int32_t n = 0; n < s->bodies; ++n) {
-        const struct ncp_body *body = &s->d->bodies[n];
-        ldl6_solve(body->factor, body->b, v);
-        sum += energy2(body, v) + speed * speed / body->factor[0];
+        ldl6_solve(sadmm_ncp_factor(s, n), s->d->bodies[n].b, v);
+        sum += energy2(s, n, v);
     }
     return sum;
+}
+
+/* Does a solution throw bodies about? */
+static bool is_violent(const struct island *s, double energy)
+{
+    const double correcting = correcting_energy2(s);
+    return energy > MOST_ENERGY * correcting && energy > MOST_ENERGY * (correcting + free_energy2(s));
 }
 
 /* The island's state is the best that was found. solved: no iteration can do better. */
@@ -451,6 +506,8 @@ static bool solve_island(struct island *s, int32_t label)
     const size_t size = 3 * (size_t)d->points[label] + MOST_ACTIVE;
     double *at = d->numbers, *G;
     s->bodies = s->contacts = s->parts = s->active = 0;
+    s->fresh = true;
+    s->current = false;
     s->dense.lambda = at, at += size;
     s->dense.u = at, at += size;
     s->best_lambda = at, at += size;
@@ -482,7 +539,7 @@ static bool solve_island(struct island *s, int32_t label)
     const bool solved = !(s->best > ENOUGH);
     const double energy = solved ? best_energy2(s) : HUGE_VAL;
     const bool taken = (solved || is_nearer(s, before, size_before)) && take(s, label, solved);
-    if (taken && !(solved && energy > MOST_ENERGY * expected_energy2(s))) return true;
+    if (taken && !(solved && is_violent(s, energy))) return true;
     s->dense.budget = BUDGET;
     begin_giving(s, d->states, rows);
     search(s, G, d->states, d->states + rows, rows);

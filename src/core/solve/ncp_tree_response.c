@@ -27,10 +27,10 @@ static void begin_way(const struct island *s, int32_t number, const double *row,
 
 static void pass_free(const struct island *s, struct way *way, struct ncp_passed *to)
 {
-    const struct ncp_body *body = &s->d->bodies[way->node - s->d->first_node[s->parts]];
+    const int32_t number = way->node - s->d->first_node[s->parts];
     to->node = way->node, to->free = 6;
     six_store(six_at(way->load), to->along);
-    ldl6_solve(body->factor, to->along, to->response);
+    ldl6_solve(sadmm_ncp_factor(s, number), to->along, to->response);
     way->node = -1;
 }
 
