@@ -266,6 +266,7 @@ static sadmm_status make_plan(struct host_step *step)
     sadmm_world *world = step->world;
     step->system = sadmm_world_system(world);
     step->system.first = step->system.first && step->stages.substep == 0;
+    if (world->spins_known) step->system.spins = world->spins;
     TRY(sadmm_world_enter_support_frame(world, &step->system));
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
@@ -299,7 +300,7 @@ static sadmm_status integrate(struct host_step *step)
     sadmm_world *world = step->world;
     sadmm_world_leave_support_frame(world, &step->system);
     if (step->stages.solved)
-        return sadmm_world_integrate(world, &step->system, &step->settings, sadmm_ncp_islands(world->ncp));
+        return sadmm_world_integrate(world, &step->system, &step->settings, world->ncp);
     return world->kernels->integrate(world->context, world->next, &world->error);
 }
 
@@ -308,6 +309,13 @@ static sadmm_status move_kinematic(struct host_step *step)
     TRY(sadmm_world_move_kinematic(step->world, &step->settings));
     sadmm_world_move_targets(step->world, step->settings.dt);
     return SADMM_OK;
+}
+
+static sadmm_status move_articulated(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    return sadmm_world_move_articulated(world, &step->settings,
+                                        step->stages.solved ? sadmm_ncp_islands(world->ncp) : NULL, &step->joint_drift);
 }
 
 static void move_pushed(struct host_step *step)
@@ -365,7 +373,7 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     case SADMM_STAGE_NCP_SOLVE_AGAIN: return solve_ncp(step, true);
     case SADMM_STAGE_REACTIONS: sadmm_world_keep_rows(world, settings); return SADMM_OK;
     case SADMM_STAGE_KINEMATIC: return move_kinematic(step);
-    case SADMM_STAGE_JOINT_MOTION: return sadmm_world_move_articulated(world, settings, &step->joint_drift);
+    case SADMM_STAGE_JOINT_MOTION: return move_articulated(step);
     case SADMM_STAGE_PUSH_MOTION: move_pushed(step); return SADMM_OK;
     case SADMM_STAGE_KEEP: return keep(step);
     case SADMM_STAGE_WRENCHES: return find_wrenches(step);

@@ -12,8 +12,24 @@ static bool is_sorted(const uint64_t *keys, size_t count)
     return true;
 }
 
+/* By insertion: counts of digits are not worth it. */
+enum { FEW_KEYS = 48 };
+static void sort_few(uint64_t *keys, size_t count)
+{
+    for (size_t i = 1; i < count; ++i) {
+        const uint64_t key = keys[i];
+        size_t at = i;
+        for (; at > 0 && keys[at - 1] > key; --at) keys[at] = keys[at - 1];
+        keys[at] = key;
+    }
+}
+
 void sadmm_radix_sort(uint64_t *keys, uint64_t *scratch, size_t count, int bits)
 {
+    if (count <= FEW_KEYS) {
+        sort_few(keys, count);
+        return;
+    }
     if (is_sorted(keys, count)) return;
     /* Digits as narrow as the number of passes allows: counts are cleared and added up in each. */
     const int passes = (bits + MOST_DIGIT_BITS - 1) / MOST_DIGIT_BITS, digit_bits = (bits + passes - 1) / passes;

@@ -42,6 +42,7 @@ struct sadmm_candidates {
     const struct sadmm_broad_phase_kind *kind;
     struct sadmm_broad_phase *broad_phase;
     bool broad_phase_valid; /* it holds every present entry */
+    bool few;               /* shapes: entries are held against each other, and the broad phase holds none */
     bool list_valid;
     double margin; /* of the last update */
     double gravity_fall; /* the list holds every pair with a plane up to this fall by gravity, m */

@@ -12,6 +12,8 @@
 
 /* Ask the broad phase for single shapes up to one in so many: a query costs as much as some ten of a sweep over all. */
 enum { ONE_BY_ONE = 8 };
+/* So many shapes are held against each other: all pairs take less than a broad phase does to update them. */
+enum { FEW_SHAPES = 32 };
 
 sadmm_status sadmm_candidates_init(struct sadmm_candidates *c, const struct sadmm_broad_phase_kind *kind,
                                    struct sadmm_error *error)
@@ -159,12 +161,36 @@ static bool merge_found(struct sadmm_candidates *c)
     return true;
 }
 
+/* What a broad phase reports (broad_phase.h). */
+static bool pairs_of_few(struct sadmm_candidates *c)
+{
+    uint32_t slots[FEW_SHAPES];
+    size_t count = 0;
+    for (size_t slot = 0; slot < c->slot_count; ++slot)
+        if (c->entries[slot].present) slots[count++] = (uint32_t)slot;
+    for (size_t i = 0; i < count; ++i) {
+        const struct sadmm_broad_entry *a = &c->entries[slots[i]];
+        for (size_t j = i + 1; j < count; ++j) {
+            const struct sadmm_broad_entry *b = &c->entries[slots[j]];
+            if (!boxes_overlap(&a->box, &b->box) || !(a->moves || b->moves)) continue;
+            if (a->group != b->group && a->group >= 0 && b->group >= 0) continue;
+            if (!sadmm_pair_list_add(&c->found, slots[i], slots[j])) return false;
+        }
+    }
+    return true;
+}
+
 static sadmm_status update_list(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool one_by_one,
                                 struct sadmm_error *error)
 {
     sadmm_status status;
     c->found.count = 0;
-    if (one_by_one) {
+    if (c->few) {
+        c->list.count = 0;
+        if (!pairs_of_few(c)) return sadmm_fail_memory(error, "candidate pairs");
+        if (c->plane_count > 0) list_movers(c);
+        status = SADMM_OK;
+    } else if (one_by_one) {
         status = c->kind->pairs_of(c->broad_phase, c->entries, c->slot_count, c->changed, c->changed_count, &c->found,
                                    error);
     } else {
@@ -185,7 +211,8 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     size_t slots = input->shape_count > c->slot_count ? input->shape_count : c->slot_count, present = 0;
     const double gravity_fall = fall_of(input->gravity, input->dt);
     /* Planes have no box that could leave a larger one: what they reach must not grow unnoticed. */
-    bool renew = !c->broad_phase_valid || !(c->margin == input->margin) || gravity_fall > c->gravity_fall;
+    const bool few = slots <= FEW_SHAPES;
+    bool renew = !c->broad_phase_valid || few != c->few || !(c->margin == input->margin) || gravity_fall > c->gravity_fall;
     bool one_by_one, plane_changed = false;
     sadmm_status status;
 
@@ -223,12 +250,12 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     if (c->changed_count == 0 && c->list_valid && !renew) return SADMM_OK;
 
     one_by_one =
-        c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * ONE_BY_ONE < present;
+        !few && c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * ONE_BY_ONE < present;
     c->broad_phase_valid = c->list_valid = false;
+    c->few = few;
     c->margin = input->margin;
     if (renew) c->gravity_fall = gravity_fall;
-    status = c->kind->update(c->broad_phase, c->entries, slots, c->changed, c->changed_count, error);
-    if (status != SADMM_OK) return status;
+    if (!few) TRY(c->kind->update(c->broad_phase, c->entries, slots, c->changed, c->changed_count, error));
     c->broad_phase_valid = true;
     status = update_list(c, input, one_by_one, error);
     c->list_valid = status == SADMM_OK;

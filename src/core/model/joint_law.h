@@ -127,7 +127,9 @@ struct acting_joint {
     quat frame;                          /* of a, in the middle */
 };
 
-SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struct sadmm_settings *settings)
+/* by: spin_of_system of a body that is solved for, NULL: not known. */
+SADMM_INLINE struct joint_side joint_side_by(struct joint_body body, const struct spin_system *by,
+                                             const struct sadmm_settings *settings)
 {
     struct joint_side side;
     struct rigid_spin spin;
@@ -143,11 +145,21 @@ SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struc
     if (body.prescribed)
         side.turned = rigid_turn(q_load(body.rigid->orientation), v3_load(side.velocity + 3), settings->dt / 2);
     if (body.system_body < 0) return side;
-    spin = spin_halfway(body.rigid, settings->dt);
+    if (by && !rolling_turns_on(body.rigid) && !rigid_is_isotropic(v3_load(body.rigid->inertia))) {
+        spin.orientation = by->orientation;
+        spin.angular = by->angular;
+    } else {
+        spin = spin_halfway(body.rigid, settings->dt);
+    }
     side.turned = spin.orientation;
     v3_store(spin.angular, side.middle + 3);
     forces_free(side.rigid, side.middle, settings->gravity, settings->dt, side.free);
     return side;
+}
+
+SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struct sadmm_settings *settings)
+{
+    return joint_side_by(body, NULL, settings);
 }
 
 /* Its frame after half a step. */

@@ -52,17 +52,16 @@ SADMM_INLINE double joint_free_energy(double mass, sym3 inertia, const double b[
     return dot3(b, b) / mass + v3_dot(angular, m3_solve(rows, angular));
 }
 
-/* A body that the step moves to this pose and velocity. turned: its orientation halfway (spin.h). */
-SADMM_INLINE void joint_add_momentum(struct joint_momentum *to, const struct sadmm_rigid *from,
-                                     const double turned[4], const double position[3],
-                                     const double orientation[4], const double velocity[6], const double origin[3],
-                                     const struct sadmm_settings *settings)
+/* A body that the step moves to this pose and velocity. spin: halfway. */
+SADMM_INLINE void joint_add_momentum_by(struct joint_momentum *to, const struct sadmm_rigid *from,
+                                        const struct spin_system *spin, const double position[3],
+                                        const double orientation[4], const double velocity[6], const double origin[3],
+                                        const struct sadmm_settings *settings)
 {
     const double none[6] = {0, 0, 0, 0, 0, 0};
     double mass, b[6], halfway[3], end[3], A[PACKED6];
-    const struct spin_system spin = spin_system_at(from, turned, settings->dt);
     /* stiffness of joints moves no momentum to anything */
-    sym3 inertia = sadmm_rigid_body_by(from, &spin, rolling_is_stiff(from), settings, &mass, b);
+    sym3 inertia = sadmm_rigid_body_by(from, spin, rolling_is_stiff(from), settings, &mass, b);
     int k;
     to->free_energy += joint_free_energy(mass, inertia, b);
     joint_halfway(from, origin, settings->dt, halfway);
@@ -80,6 +79,16 @@ SADMM_INLINE void joint_add_momentum(struct joint_momentum *to, const struct sad
     for (k = 0; k < 6; ++k) to->sums.free[k] += b[k];
     for (k = 0; k < 3; ++k) to->halfway[k] += mass * halfway[k];
     add_cross(halfway, b, 1, to->sums.free + 3);
+}
+
+/* turned: its orientation halfway (spin.h). */
+SADMM_INLINE void joint_add_momentum(struct joint_momentum *to, const struct sadmm_rigid *from,
+                                     const double turned[4], const double position[3],
+                                     const double orientation[4], const double velocity[6], const double origin[3],
+                                     const struct sadmm_settings *settings)
+{
+    const struct spin_system spin = spin_system_at(from, turned, settings->dt);
+    joint_add_momentum_by(to, from, &spin, position, orientation, velocity, origin, settings);
 }
 
 /* The points of a static contact pair of its body; */

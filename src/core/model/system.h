@@ -53,11 +53,13 @@ struct sadmm_extrapolation {
 };
 
 struct sadmm_team;
+struct spin_system; /* spin.h */
 
 struct sadmm_system {
     struct sadmm_team *team;         /* whose threads work on it (parallel.h); NULL: OpenMP's */
     int32_t body_count;
     const struct sadmm_rigid *rigid; /* (body_count) or NULL */
+    const struct spin_system *spins; /* (body_count) spin_of_system of `rigid`, or NULL: not known yet */
     const double *A;                 /* (body_count x 36), when rigid is NULL */
     const double *b;                 /* (body_count x 6), when rigid is NULL */
     double *velocity;                /* (body_count x 6) start in, solution out */

@@ -91,6 +91,10 @@ SADMM_INLINE void sadmm_system_rigid(const struct sadmm_system *system, const st
 SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const struct sadmm_settings *settings, int32_t i,
                                      double A[36], double b[6])
 {
+    if (system->spins) {
+        sadmm_system_rigid(system, settings, &system->rigid[i], &system->spins[i], i, A, b);
+        return;
+    }
     if (system->rigid) {
         const struct spin_system spin = spin_of_system(&system->rigid[i], settings->dt);
         sadmm_system_rigid(system, settings, &system->rigid[i], &spin, i, A, b);

@@ -69,16 +69,21 @@ void sadmm_find_trapezoids(size_t count, const struct sadmm_rigid *bodies, const
     }
 }
 
+void sadmm_advance_later(const struct sadmm_rigid *body, struct sadmm_rigid *next)
+{
+    *next = *body;
+    rolling_forget(next);
+    next->was_hit = 0;
+}
+
 static void advance(const struct sadmm_rigid *body, const double velocity[6], const struct sadmm_trapezoid *trapezoid,
                     double dt, struct sadmm_rigid *next)
 {
     double mean[6];
     for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - trapezoid->correction[k];
-    *next = *body;
+    sadmm_advance_later(body, next);
     spin_move_from(body, trapezoid->halfway, velocity, mean, trapezoid->kind != TRAPEZOID_OWN, dt, next->position,
                    next->orientation, next->velocity);
-    rolling_forget(next);
-    next->was_hit = 0;
     next->mean = trapezoid->kind == TRAPEZOID_OWN;
 }
 

@@ -37,4 +37,7 @@ void sadmm_find_trapezoids(size_t count, const struct sadmm_rigid *bodies, const
 void sadmm_advance(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
                    const struct sadmm_trapezoid *trapezoids, double dt, struct sadmm_rigid *next);
 
+/* Of a body whose pose and velocity are found later (joint_trapezoid.h): the rest. */
+void sadmm_advance_later(const struct sadmm_rigid *body, struct sadmm_rigid *next);
+
 #endif

@@ -50,6 +50,9 @@ sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input
 /* The islands of that call, by their first body (core/model/islands.h); (body_count). */
 const int32_t *sadmm_ncp_islands(const struct sadmm_ncp *ncp);
 
+/* Has the island of a body rows? */
+bool sadmm_ncp_has_rows(const struct sadmm_ncp *ncp, int32_t body);
+
 /* After them: islands that were solved before are as they were then, others are solved from where they are. */
 sadmm_status sadmm_ncp_solve_again(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, int32_t *solved,
                                    struct sadmm_error *error);

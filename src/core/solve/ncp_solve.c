@@ -594,3 +594,8 @@ sadmm_status sadmm_ncp_solve_again(struct sadmm_ncp *ncp, const struct sadmm_ncp
 void sadmm_ncp_begin(struct sadmm_ncp *ncp) { ncp->known = false; }
 
 const int32_t *sadmm_ncp_islands(const struct sadmm_ncp *ncp) { return ncp->label; }
+
+bool sadmm_ncp_has_rows(const struct sadmm_ncp *ncp, int32_t body)
+{
+    return ncp->kind[ncp->label[body]] & ISLAND_ARTICULATED;
+}

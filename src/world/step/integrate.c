@@ -9,17 +9,22 @@
 #include "core/model/pair_touch.h"
 #include "core/model/spin.h"
 
+/* Bodies of islands with joints are moved later, together. */
+static bool moves_alone(const struct sadmm_ncp *ncp, int32_t body) { return !sadmm_ncp_has_rows(ncp, body); }
+
 /* Of bodies by themselves; the last is what does not move. */
-static void find_trapezoids(const sadmm_world *world, const sadmm_settings *settings,
-                            struct sadmm_trapezoid *trapezoids)
+static void find_trapezoids(const sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings,
+                            const struct sadmm_ncp *ncp, struct sadmm_trapezoid *trapezoids)
 {
     const size_t n = (size_t)world->dynamic_count;
     for (size_t i = 0; i < n; ++i) {
-        const struct spin_system spin = spin_of_system(&world->start.rigid[i], settings->dt);
+        if (!moves_alone(ncp, (int32_t)i)) continue;
+        const struct spin_system spin = system->spins ? system->spins[i]
+                                                      : spin_of_system(&world->start.rigid[i], settings->dt);
         q_store(spin.orientation, trapezoids[i].halfway);
         v3_store(spin.angular, trapezoids[i].spin);
+        sadmm_find_trapezoids(1, &world->start.rigid[i], world->velocity + 6 * i, settings, &trapezoids[i]);
     }
-    sadmm_find_trapezoids(n, world->start.rigid, world->velocity, settings, trapezoids);
     memset(&trapezoids[n], 0, sizeof trapezoids[n]);
 }
 
@@ -37,19 +42,31 @@ static void touch_pair(const struct sadmm_system *system, const sadmm_settings *
     if (b >= 0) touch[b] |= found.body[1];
 }
 
-sadmm_status sadmm_world_integrate(sadmm_world *world, const struct sadmm_system *system,
-                                   const sadmm_settings *settings, const int32_t *label)
+sadmm_status sadmm_world_integrate(sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings,
+                                   const struct sadmm_ncp *ncp)
 {
     const size_t n = (size_t)world->dynamic_count;
-    if (!SADMM_GROW(world->trapezoids, 0, n + 1) || !SADMM_GROW(world->touch, 0, n))
+    const int32_t *label = sadmm_ncp_islands(ncp);
+    const struct sadmm_contact_set *contacts = system->contacts;
+    if (!sadmm_grow_empty(&world->trapezoids, &world->trapezoid_capacity, n + 1, sizeof *world->trapezoids) ||
+        !sadmm_grow_empty(&world->touch, &world->touch_capacity, n, sizeof *world->touch))
         return sadmm_fail_memory(&world->error, "the motion of bodies");
-    find_trapezoids(world, settings, world->trapezoids);
+    find_trapezoids(world, system, settings, ncp, world->trapezoids);
     memset(world->touch, 0, n * sizeof *world->touch);
-    for (size_t p = 0; p < system->contacts->pair_count; ++p)
-        touch_pair(system, settings, label, &system->contacts->pairs[p], world->trapezoids, world->touch);
-    for (size_t i = 0; i < n && system->contacts->pair_count > 0; ++i)
-        sadmm_choose_trapezoid(&world->start.rigid[i], settings, world->touch[label[i]], world->touch[i],
-                               &world->trapezoids[i]);
-    sadmm_advance(n, world->start.rigid, world->velocity, world->trapezoids, settings->dt, world->next);
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        if (moves_alone(ncp, pair->body_a >= 0 ? pair->body_a : pair->body_b))
+            touch_pair(system, settings, label, pair, world->trapezoids, world->touch);
+    }
+    for (size_t i = 0; i < n; ++i) {
+        const struct sadmm_rigid *start = &world->start.rigid[i];
+        if (!moves_alone(ncp, (int32_t)i)) {
+            sadmm_advance_later(start, &world->next[i]);
+            continue;
+        }
+        if (contacts->pair_count > 0)
+            sadmm_choose_trapezoid(start, settings, world->touch[label[i]], world->touch[i], &world->trapezoids[i]);
+        sadmm_advance(1, start, world->velocity + 6 * i, &world->trapezoids[i], settings->dt, &world->next[i]);
+    }
     return SADMM_OK;
 }

@@ -244,6 +244,7 @@ static sadmm_status turn_speeds(sadmm_world *world, const struct sadmm_system *s
 sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *settings, double *off)
 {
     struct sadmm_system system = sadmm_world_system(world);
+    if (world->spins_known) system.spins = world->spins;
     const size_t n = (size_t)world->dynamic_count;
     if (!SADMM_GROW(world->opened, 0, n) || !SADMM_GROW(world->closing_costs, 0, n))
         return sadmm_fail_memory(&world->error, "joints that close");

@@ -53,11 +53,17 @@ static void add_rows(const sadmm_world *world, const struct sadmm_row_constraint
 static void add_body(const sadmm_world *world, int32_t i, const sadmm_settings *settings)
 {
     const struct sadmm_rigid *next = &world->next[i];
+    const struct sadmm_rigid *start = &world->start.rigid[i];
     double halfway[4];
     if (!is_floating(world, i)) return;
-    q_store(spin_turned_halfway(&world->start.rigid[i], settings->dt), halfway);
-    joint_add_momentum(sums_of(world, i), &world->start.rigid[i], halfway, next->position, next->orientation,
-                       next->velocity, origin_of(world, i), settings);
+    if (world->spins_known && !rolling_is_stiff(start)) {
+        joint_add_momentum_by(sums_of(world, i), start, &world->spins[i], next->position, next->orientation,
+                              next->velocity, origin_of(world, i), settings);
+        return;
+    }
+    q_store(spin_turned_halfway(start, settings->dt), halfway);
+    joint_add_momentum(sums_of(world, i), start, halfway, next->position, next->orientation, next->velocity,
+                       origin_of(world, i), settings);
 }
 
 /* To its island's first body, which names it. */

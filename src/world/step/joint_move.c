@@ -11,10 +11,14 @@
 #include "joint_momentum.h"
 #include "joint_move.h"
 
-static struct joint_trapezoid trapezoid_of(const sadmm_world *world, int32_t body, double dt)
+static const struct joint_trapezoid *trapezoid_of(const sadmm_world *world, int32_t body, double dt)
 {
-    return body >= 0 ? joint_trapezoid_of(&world->start.rigid[body], world->velocity + 6 * (size_t)body, dt)
-                     : joint_trapezoid_of(NULL, NULL, dt);
+    static const struct joint_trapezoid unmoved = {0};
+    if (body < 0) return &unmoved;
+    struct joint_trapezoid *kept = &world->joint_trapezoids[body];
+    if (!kept->rigid)
+        *kept = joint_trapezoid_of(&world->start.rigid[body], world->velocity + 6 * (size_t)body, dt);
+    return kept;
 }
 
 static uint16_t *island_of(const sadmm_world *world, int32_t a, int32_t b)
@@ -26,8 +30,8 @@ static void add_constraint(const sadmm_world *world, const struct sadmm_row_cons
                            const sadmm_settings *settings)
 {
     const struct sadmm_rows *rows = &world->start.rows;
-    const struct joint_trapezoid bodies[2] = {trapezoid_of(world, constraint->body_a, settings->dt),
-                                              trapezoid_of(world, constraint->body_b, settings->dt)};
+    const struct joint_trapezoid bodies[2] = {*trapezoid_of(world, constraint->body_a, settings->dt),
+                                              *trapezoid_of(world, constraint->body_b, settings->dt)};
     uint16_t *island = island_of(world, constraint->body_a, constraint->body_b);
     int moorings = 0;
     *island |= ISLAND_ARTICULATED;
@@ -54,6 +58,7 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
 {
     const struct sadmm_contact_set *contacts = system->contacts;
     sadmm_islands(system, world->joint_labels);
+    for (int32_t i = 0; i < system->body_count; ++i) world->joint_trapezoids[i].rigid = NULL;
     memset(world->joint_touch, 0, (size_t)system->body_count * sizeof *world->joint_touch);
     for (size_t k = 0; k < system->rows->constraint_count; ++k)
         add_constraint(world, &system->rows->constraints[k], settings);
@@ -63,8 +68,8 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
         if (!(*island & ISLAND_ARTICULATED)) continue;
         *island |= ISLAND_TOUCHED | (anchors(contacts, pair) ? ISLAND_ANCHORED : 0);
         if (*island & ISLAND_TRAPEZOID_OFF) continue;
-        const struct joint_trapezoid bodies[2] = {trapezoid_of(world, pair->body_a, settings->dt),
-                                                  trapezoid_of(world, pair->body_b, settings->dt)};
+        const struct joint_trapezoid bodies[2] = {*trapezoid_of(world, pair->body_a, settings->dt),
+                                                  *trapezoid_of(world, pair->body_b, settings->dt)};
         struct trapezoid_touch touch = {0, {0, 0}};
         for (int32_t p = pair->first; p < pair->first + pair->count; ++p)
             joint_contact_touches(pair->normal, &contacts->points[p],
@@ -75,11 +80,16 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
     }
 }
 
-sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settings *settings, double *off)
+sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settings *settings, const int32_t *islands,
+                                          double *off)
 {
-    const struct sadmm_system system = sadmm_world_system(world);
+    struct sadmm_system system = sadmm_world_system(world);
+    system.islands = islands;
     const size_t n = (size_t)system.body_count;
-    if (!SADMM_GROW(world->joint_labels, 0, n) || !SADMM_GROW(world->joint_touch, 0, n))
+    if (!sadmm_grow_empty(&world->joint_labels, &world->joint_label_capacity, n, sizeof *world->joint_labels) ||
+        !sadmm_grow_empty(&world->joint_trapezoids, &world->joint_trapezoid_capacity, n,
+                          sizeof *world->joint_trapezoids) ||
+        !sadmm_grow_empty(&world->joint_touch, &world->joint_touch_capacity, n, sizeof *world->joint_touch))
         return sadmm_fail_memory(&world->error, "islands of joints");
     find_islands(world, &system, settings);
     for (size_t i = 0; i < n; ++i) {
@@ -90,7 +100,9 @@ sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settin
         if (!(island & ISLAND_ARTICULATED)) continue;
         next->mean = !(island & ISLAND_TRAPEZOID_OFF);
         double halfway[4];
-        q_store(spin_turned_halfway(&world->start.rigid[i], settings->dt), halfway);
+        q_store(world->spins_known ? world->spins[i].orientation
+                                   : spin_turned_halfway(&world->start.rigid[i], settings->dt),
+                halfway);
         joint_move(&world->start.rigid[i], halfway, world->velocity + 6 * i, island & ISLAND_TRAPEZOID_OFF,
                    settings->dt, next->position, next->orientation, next->velocity);
     }

@@ -5,7 +5,9 @@
 #include "world/state/world_state.h"
 
 /* Bodies of islands with joints as they are after the step, in the place of what the backend made of them, once the
- * others have moved. off: the largest error of a locked translation that is left, m. */
-sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settings *settings, double *off);
+ * others have moved. islands: of bodies, NULL: not known. off: the largest error of a locked translation that is
+ * left, m. */
+sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settings *settings, const int32_t *islands,
+                                          double *off);
 
 #endif

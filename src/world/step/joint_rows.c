@@ -102,7 +102,8 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
     sadmm_rows_clear(&world->start.rows);
     world->joints_acting = world->couplings_acting = 0;
     world->joint_constraint_count = 0;
-    if (world->joint_count > 0 && !sadmm_world_begin_acting(world))
+    world->spins_known = false;
+    if (world->joint_count > 0 && !sadmm_world_begin_acting(world, settings))
         return sadmm_fail_memory(&world->error, "the joints' rows");
     for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
         struct sadmm_world_joint *joint = &world->joints[slot];

@@ -27,7 +27,7 @@ static void each_force(sadmm_world *world, double dt, on_force *f)
         const struct sadmm_world_joint *joint = &world->joints[source->joint];
         for (end = r + 1; end < world->joint_rows && world->joint_sources[end].joint == source->joint;) ++end;
         for (int s = 0; s < 2; ++s) {
-            const int32_t body = sadmm_world_joint_body(world, joint->body[s]).system_body;
+            const int32_t body = world->acting_joints[source->joint].side[s].system_body;
             if (body < 0 || (s == 0 && joint->coupling)) continue;
             f(world, body, joint->frame[s].position,
               force_of((s ? rows->jacobian_b : rows->jacobian_a) + 6 * r, rows->lambda + r, source, end - r, dt));
