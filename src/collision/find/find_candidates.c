@@ -212,7 +212,8 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     const double gravity_fall = fall_of(input->gravity, input->dt);
     /* Planes have no box that could leave a larger one: what they reach must not grow unnoticed. */
     const bool few = slots <= FEW_SHAPES;
-    bool renew = !c->broad_phase_valid || few != c->few || !(c->margin == input->margin) || gravity_fall > c->gravity_fall;
+    bool renew = !c->broad_phase_valid || few != c->few || !(c->margin == input->margin) ||
+                 gravity_fall > c->gravity_fall;
     bool one_by_one, plane_changed = false;
     sadmm_status status;
 
@@ -250,7 +251,8 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     if (c->changed_count == 0 && c->list_valid && !renew) return SADMM_OK;
 
     one_by_one =
-        !few && c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * ONE_BY_ONE < present;
+        !few && c->list_valid && !renew && !plane_changed && c->kind->pairs_of &&
+        c->changed_count * ONE_BY_ONE < present;
     c->broad_phase_valid = c->list_valid = false;
     c->few = few;
     c->margin = input->margin;

@@ -301,9 +301,9 @@ SADMM_INLINE double articulation_regularisation(const struct articulation_view *
     return ARTICULATION_REGULARISATION * articulation_scale(v, r);
 }
 
-/* Where a row that is there is before the first pass, its change to its bounds made. earlier: where a solve of this step
- * has left it, which is mostly where it is still: iterations leave multipliers near bounds on either side. ROW_ABSENT:
- * there was none. residual: of the row, read where its multiplier is at a bound. */
+/* Where a row that is there is before the first pass, its change to its bounds made. earlier: where a solve of this
+ * step has left it, which is mostly where it is still: iterations leave multipliers near bounds on either side.
+ * ROW_ABSENT: there was none. residual: of the row, read where its multiplier is at a bound. */
 SADMM_INLINE void articulation_place_row(const struct articulation_view *v, int32_t r, uint8_t earlier, double residual)
 {
     const struct articulation_row *row = &v->rows[r];

@@ -352,46 +352,88 @@ SADMM_INLINE bool joint_turns(const struct acting_joint *acting, int k, bool rad
            JOINT_MOST_TURN * JOINT_MOST_TURN * (around + past);
 }
 
+/* What joint_turns asks of most rows, which is the same for all of a joint that are not radial: of rotations, their
+ * most turning; of translations, squares of how fast bodies turn and of the speeds around them. */
+struct joint_turn_bounds {
+    double rotation, turn2, around2;
+};
+SADMM_INLINE struct joint_turn_bounds joint_turn_bounds_of(const struct acting_joint *acting)
+{
+    const struct joint_geometry *g = &acting->start;
+    const vec3 turn_a = v3_load(acting->side[0].velocity + 3), turn_b = v3_load(acting->side[1].velocity + 3);
+    struct joint_turn_bounds out;
+    out.rotation = JOINT_MOST_TURN * v3_norm(v3_sub(turn_b, turn_a)) +
+                   JOINT_NO_TURN * (v3_norm(turn_a) + v3_norm(turn_b));
+    out.turn2 = max_of(v3_norm2(turn_a), v3_norm2(turn_b));
+    out.around2 = v3_norm2(v3_cross(turn_a, g->arm_a)) + v3_norm2(v3_cross(turn_b, g->arm_b));
+    return out;
+}
+SADMM_INLINE bool joint_turns_within(const struct joint_turn_bounds *bounds, int k, double turning, double dt)
+{
+    const double half = dt / 2 * turning, most = JOINT_MOST_TURN * JOINT_MOST_TURN;
+    return k >= 3 ? !(fabs(turning) > bounds->rotation) : half * half * bounds->turn2 <= most * most * bounds->around2;
+}
+
+/* Rates of a coordinate: at the start; of the step's row, by velocities at the start, halfway, and free, of sides that
+ * move by forces; of those that move as prescribed; the row's response. free, response: not where it is locked, whose
+ * law does not ask how it would move. */
+struct joint_coordinate_rates {
+    double before, start, middle, free, prescribed, response;
+};
+
+/* turns: joint_turns. */
+SADMM_INLINE struct joint_moving joint_moving_by(const sadmm_joint_def *def, const struct sadmm_joint_memory *memory,
+                                                 const struct acting_joint *acting, int k,
+                                                 const struct joint_coordinate_rates *rates, bool turns,
+                                                 const struct sadmm_settings *settings)
+{
+    const double middle = rates->middle + rates->prescribed, free = rates->free + rates->prescribed;
+    struct joint_moving m;
+    m.memory = memory;
+    m.dt = settings->dt;
+    m.most = settings->correction_speed;
+    m.response = rates->response;
+    m.value = acting->start.value[k];
+    if (joint_winds(def->locks, k)) m.value = joint_unwind(m.value, memory->angle[k]);
+    if (k == 0 && def->locks & 1 && joint_is_radial(def->kind)) m.value -= def->length;
+    m.before = rates->before;
+    m.prescribed = rates->prescribed;
+    m.turning = middle - m.before;
+    m.turns = turns;
+    m.free = free - m.turning;
+    m.late = memory->trapezoid_off || m.turns;
+    m.turned = (m.late ? 0 : m.turning) + m.prescribed; /* the solve's rates are of its bodies alone */
+    m.reach = 2 * m.dt * max_of(fabs(m.before), fabs(free));
+    return m;
+}
+
 SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, const struct sadmm_joint_memory *memory,
                                                  const struct acting_joint *acting, int k,
                                                  const struct sadmm_settings *settings)
 {
     const struct joint_side *a = &acting->side[0], *b = &acting->side[1];
-    struct joint_moving m;
-    const bool locked = def->locks >> k & 1; /* its law does not ask how it would move */
-    double middle = 0, free = 0, prescribed = 0, start = 0; /* start: of velocities at the start */
+    const bool locked = def->locks >> k & 1;
+    struct joint_coordinate_rates r = {0, 0, 0, 0, 0, 0};
     int s;
-    m.memory = memory;
-    m.dt = settings->dt;
-    m.most = settings->correction_speed;
-    m.response = 0;
-    m.value = acting->start.value[k];
-    if (joint_winds(def->locks, k)) m.value = joint_unwind(m.value, memory->angle[k]);
-    if (k == 0 && def->locks & 1 && joint_is_radial(def->kind)) m.value -= def->length;
-    m.before = joint_rate(&acting->start, k, a->velocity, b->velocity);
+    r.before = joint_rate(&acting->start, k, a->velocity, b->velocity);
     for (s = 0; s < 2; ++s) {
         double row[6];
         if (acting->side[s].system_body < 0 && !acting->side[s].prescribed) continue;
         joint_step_row(acting, s, k, row);
         if (acting->side[s].prescribed) {
-            prescribed += joint_row_product(row, acting->side[s].velocity);
+            r.prescribed += joint_row_product(row, acting->side[s].velocity);
             continue;
         }
-        start += joint_row_product(row, acting->side[s].velocity);
-        middle += joint_row_product(row, acting->side[s].middle);
+        r.start += joint_row_product(row, acting->side[s].velocity);
+        r.middle += joint_row_product(row, acting->side[s].middle);
         if (locked) continue;
-        free += joint_row_product(row, acting->side[s].free);
-        m.response += joint_response(&acting->side[s], row);
+        r.free += joint_row_product(row, acting->side[s].free);
+        r.response += joint_response(&acting->side[s], row);
     }
-    start += prescribed, middle += prescribed, free += prescribed;
-    m.prescribed = prescribed;
-    m.turning = middle - m.before;
-    m.turns = joint_turns(acting, k, joint_is_radial(def->kind), start - m.before, m.dt);
-    m.free = free - m.turning;
-    m.late = memory->trapezoid_off || m.turns;
-    m.turned = (m.late ? 0 : m.turning) + prescribed; /* the solve's rates are of its bodies alone */
-    m.reach = 2 * m.dt * max_of(fabs(m.before), fabs(free));
-    return m;
+    return joint_moving_by(def, memory, acting, k, &r,
+                           joint_turns(acting, k, joint_is_radial(def->kind), r.start + r.prescribed - r.before,
+                                       settings->dt),
+                           settings);
 }
 
 SADMM_INLINE void joint_add_limits(struct joint_laws *laws, const struct joint_moving *m, int k,

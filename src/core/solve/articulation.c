@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "articulation_part.h"
+#include "articulation_variants.h"
 #include "core/base/memory.h"
 #include "core/model/joint_close.h"
 #include "core/model/system_math.h"
@@ -84,7 +85,8 @@ static bool make_parts(struct sadmm_articulations *j, size_t bodies)
         return false;
     for (size_t i = 0; i < bodies; ++i) j->part[i] = -1;
     const size_t all = members, all_columns = columns;
-    int32_t *const queue = j->tree_numbers + all + (1 + 2 * SADMM_MAX_ROWS) * all_columns; /* and parents: members each */
+    /* and parents: members each */
+    int32_t *const queue = j->tree_numbers + all + (1 + 2 * SADMM_MAX_ROWS) * all_columns;
     work = members = columns = 0;
     j->loops = false;
     for (int32_t k = 0; k < j->order.parts; ++k) {
@@ -271,13 +273,14 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
             take_kept(&s, part);
             continue;
         }
-        if (part->touched && settings->method == SADMM_METHOD_PAPER) leave_to_contacts(&part->view);
+        const bool leaves = part->touched && settings->method == SADMM_METHOD_PAPER;
+        if (leaves) leave_to_contacts(&part->view);
         const bool solved = sadmm_articulation_part_solve(part, part->kept ? part->kept_state : NULL,
                                                           settings->ncp_points > 0);
         /* Rows that are not solved are left as they are: velocities that go with multipliers beyond their bounds have
          * energy from nowhere. */
         if (solved) sadmm_articulation_part_store(&part->view, system, slots);
-        part->loaded = solved && part->for_ncp;
+        part->loaded = solved && part->for_ncp && !leaves;
         if (!after) keep_part(&s, part, solved);
     }
     articulations->kept = !after;
@@ -297,7 +300,8 @@ void sadmm_articulations_find_left(const struct sadmm_articulations *articulatio
 {
     for (int32_t k = 0; k < articulations->order.parts; ++k) {
         const struct articulation_view *v = &articulations->parts[k].view;
-        if (articulations->parts[k].loop && !articulations->parts[k].by_tree) EACH_ARTICULATION_ROW(slots, v, r, from) left[from] = articulation_left(v, r);
+        if (!articulations->parts[k].loop || articulations->parts[k].by_tree) continue;
+        EACH_ARTICULATION_ROW(slots, v, r, from) left[from] = articulation_left(v, r);
     }
 }
 

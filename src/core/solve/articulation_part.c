@@ -270,11 +270,13 @@ static void begin_tree_rows(const struct articulation_part *part, const uint8_t 
         const struct articulation_row *from = &v->rows[row->r];
         const double change = articulation_clamp(from->lambda, from->lo, from->hi) - from->lambda;
         v->change[row->r] = change;
-        articulation_place_row(v, row->r, earlier ? earlier[row->r] : ROW_ABSENT, row->start + row->compliance * change);
+        articulation_place_row(v, row->r, earlier ? earlier[row->r] : ROW_ABSENT,
+                               row->start + row->compliance * change);
     }
 }
 
-/* change_rows. one: the first of them alone, which comes to an end where all at once go round in circles (Murty, 1974). */
+/* change_rows. one: the first of them alone, which comes to an end where all at once go round in circles (Murty,
+ * 1974). */
 static bool change_tree_rows(const struct articulation_part *part, bool one)
 {
     bool changed = false;
@@ -314,7 +316,7 @@ static bool solve_tree(struct articulation_part *part, const uint8_t *earlier)
             last = residual;
             residual = by->solve(&part->tree, v, true);
         }
-        if (last == HUGE_VAL || !change_tree_rows(part, false)) return isfinite(residual);
+        if (last == HUGE_VAL || !change_tree_rows(part, false)) return is_finite(v);
         last = HUGE_VAL;
     }
     return false;

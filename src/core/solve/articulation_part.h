@@ -5,7 +5,7 @@
 #define SADMM_CORE_SOLVE_ARTICULATION_PART_H
 
 #include "articulation_order.h"
-#include "articulation_variants.h"
+#include "articulation_kernels.h"
 #include "core/model/articulation.h"
 #include "core/model/system.h"
 
@@ -71,8 +71,8 @@ void sadmm_articulation_part_load_at(struct articulation_part *part, const struc
 /* The speed that its impulses change it by, once it is loaded. */
 void sadmm_articulation_part_find_speed(struct articulation_part *part);
 
-/* For G (ncp.h): the sparse factor with rows in their states; multipliers of rows inside their bounds, for what the others
- * are. again: from what they are. */
+/* For G (ncp.h): the sparse factor with rows in their states; multipliers of rows inside their bounds, for what the
+ * others are. again: from what they are. */
 void sadmm_articulation_part_factorize(struct articulation_part *part);
 void sadmm_articulation_part_solve_rows(const struct articulation_part *part, bool again);
 

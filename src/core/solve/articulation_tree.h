@@ -10,9 +10,9 @@
  *                                                                        what hard rows hold left out
  *     A_parent += X^T (A - U H U^T) X,   p_parent += X^T (p - A s - U q)        U = A S
  *
- * from the leaves to the root with the inertias A and loads p, then back with the velocities. A row acts on the parent as on
- * a point of its node's body: it needs its Jacobian on that body alone. In double; kernels are compiled once per instruction
- * set (articulation_variants.h). */
+ * from the leaves to the root with the inertias A and loads p, then back with the velocities. A row acts on the parent
+ * as on a point of its node's body: it needs its Jacobian on that body alone. In double; kernels are compiled once per
+ * instruction set (articulation_kernels.h). */
 #ifndef SADMM_CORE_SOLVE_ARTICULATION_TREE_H
 #define SADMM_CORE_SOLVE_ARTICULATION_TREE_H
 
@@ -23,12 +23,14 @@ extern "C" {
 #endif
 
 /* What a row is to its node. */
-enum articulation_role { ARTICULATION_NONE, ARTICULATION_LOCK, ARTICULATION_SOFT, ARTICULATION_HARD, ARTICULATION_LEFT };
+enum articulation_role {
+    ARTICULATION_NONE, ARTICULATION_LOCK, ARTICULATION_SOFT, ARTICULATION_HARD, ARTICULATION_LEFT
+};
 
 /* Six numbers of a body take eight (core/math/six.h). */
 struct articulation_tree_row {
     double own[8];           /* on its node's body */
-    double along[6];         /* S^T own^T of rows that are no locks */
+    double along[6];         /* S^T own^T; of locks 0 */
     double gain, compliance; /* its law */
     double start, residual;  /* of it, m/s or rad/s: before anything changes; by the changes so far */
     double right, found;     /* the rate past the parent that is asked for; the multiplier's change by this solve */
@@ -78,18 +80,18 @@ void sadmm_articulation_tree_make(const struct articulation_structure *s, int32_
                                   struct articulation_tree *tree);
 
 /* This call's rows and loads: v->residual = b - A v + J^T lambda + impulse. slots: as of sadmm_articulations_solve.
- * impulse (bodies x 6): of contacts, then J^T lambda besides. without (bodies x 6): b, then the residual without contacts.
- * False, and both are what they were: the tree cannot solve them. Rows are no wrenches at points of space (gears), or locks
- * are not those of one joint. */
+ * impulse (bodies x 6): of contacts, then J^T lambda besides. without (bodies x 6): b, then the residual without
+ * contacts. False, and both are what they were: the tree cannot solve them. Rows are no wrenches at points of space
+ * (gears), or locks are not those of one joint. */
 typedef bool sadmm_articulation_tree_load(struct articulation_tree *tree, const struct articulation_view *v,
                                           const struct sadmm_row_constraint *slots, double *impulse, double *without);
 
 /* With rows in their states, inertias in v->factor; nothing where it is known for these. */
 typedef void sadmm_articulation_tree_factorize(struct articulation_tree *tree, const struct articulation_view *v);
 
-/* Changes of the velocities, and of the multipliers of rows inside their bounds, for loads v->residual and what the other
- * rows are. again: from what they are, by what is left (iterative refinement). Returns the largest residual of a row inside
- * its bounds, m/s or rad/s. */
+/* Changes of the velocities, and of the multipliers of rows inside their bounds, for loads v->residual and what the
+ * other rows are. again: from what they are, by what is left (iterative refinement). Returns the largest residual of a
+ * row inside its bounds, m/s or rad/s. */
 typedef double sadmm_articulation_tree_solve(const struct articulation_tree *tree, const struct articulation_view *v,
                                              bool again);
 

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "articulation_variants.h"
+#include "articulation_kernels.h"
 #include "core/math/six.h"
 
 /* Of a hard row's response without others, the share under which it says what they say: far above rounding, far below
@@ -157,8 +157,8 @@ static bool same_states(const struct articulation_tree *tree, const struct artic
     return !changed;
 }
 
-void SADMM_ARTICULATION_KERNEL(articulation_tree_factorize)(struct articulation_tree *tree,
-                                                            const struct articulation_view *v)
+void SADMM_KERNEL(articulation_tree_factorize)(struct articulation_tree *tree,
+                                               const struct articulation_view *v)
 {
     if (tree->known && same_states(tree, v)) return;
     tree->known = true;

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "articulation_variants.h"
+#include "articulation_kernels.h"
 #include "core/math/six.h"
 
 /* How far the axes of locks may be off being unit and perpendicular: their multipliers, by projection, are off by as
@@ -108,6 +108,7 @@ static bool add_rows(struct articulation_tree *tree, struct articulation_node *n
             six_put(own, row->own);
             row->r = r;
             row->role = ARTICULATION_NONE;
+            row->right = row->found = 0;
             row->gain = from->gain, row->compliance = from->compliance;
             row->start = from->gain * six_dot(own, past) + from->bias + from->compliance * from->lambda;
             tree->row_of[r] = at;
@@ -122,8 +123,9 @@ static void find_along(const struct articulation_tree *tree, const struct articu
 {
     for (int32_t at = node->row; at < node->row_end; ++at) {
         struct articulation_tree_row *row = &tree->row[at];
-        if (row->role == ARTICULATION_LOCK) continue;
-        for (int i = 0; i < node->free; ++i) row->along[i] = six_dot(six_at(row->own), six_at(node->S[i]));
+        const bool locks = row->role == ARTICULATION_LOCK;
+        for (int i = 0; i < node->free; ++i)
+            row->along[i] = locks ? 0 : six_dot(six_at(row->own), six_at(node->S[i]));
     }
 }
 
@@ -154,9 +156,10 @@ static void add_loads(const struct articulation_node *node, const struct articul
     six_store(six_add(contacts, rows), impulse + 6 * e);
 }
 
-bool SADMM_ARTICULATION_KERNEL(articulation_tree_load)(struct articulation_tree *tree, const struct articulation_view *v,
-                                                       const struct sadmm_row_constraint *slots, double *impulse,
-                                                       double *without)
+bool SADMM_KERNEL(articulation_tree_load)(struct articulation_tree *tree,
+                                          const struct articulation_view *v,
+                                          const struct sadmm_row_constraint *slots, double *impulse,
+                                          double *without)
 {
     tree->known = false;
     tree->rows = 0;

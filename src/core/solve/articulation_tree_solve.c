@@ -1,7 +1,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "articulation_variants.h"
+#include "articulation_kernels.h"
 #include "core/math/six.h"
 
 static six parent_of(const struct articulation_node *node, const double velocity[SIX])
@@ -185,8 +185,8 @@ static double end_rows(const struct articulation_tree *tree, const struct articu
     return most;
 }
 
-double SADMM_ARTICULATION_KERNEL(articulation_tree_solve)(const struct articulation_tree *tree,
-                                                          const struct articulation_view *v, bool again)
+double SADMM_KERNEL(articulation_tree_solve)(const struct articulation_tree *tree,
+                                             const struct articulation_view *v, bool again)
 {
     double most = 0;
     for (int32_t n = 0; n < tree->nodes; ++n) begin_node(&tree->node[n], v, again);

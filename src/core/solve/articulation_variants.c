@@ -1,26 +1,17 @@
 #include "articulation_variants.h"
 
 #include "config.h"
-#include "ncp_interior.h"
 
 const struct sadmm_articulation_kernels *sadmm_articulation_kernels_best(void)
 {
-    static const struct sadmm_articulation_kernels baseline = {
-        "baseline", sadmm_articulation_tree_load_baseline, sadmm_articulation_tree_factorize_baseline,
-        sadmm_articulation_tree_solve_baseline, sadmm_ncp_tree_responses_baseline,
-        sadmm_ncp_newton_baseline, sadmm_ncp_interior_baseline};
+    static const struct sadmm_articulation_kernels baseline = {sadmm_articulation_tree_load_baseline,
+                                                               sadmm_articulation_tree_factorize_baseline,
+                                                               sadmm_articulation_tree_solve_baseline};
 #ifdef SADMM_HAVE_ISA_AVX2
-    static const struct sadmm_articulation_kernels avx2 = {
-        "avx2", sadmm_articulation_tree_load_avx2, sadmm_articulation_tree_factorize_avx2,
-        sadmm_articulation_tree_solve_avx2, sadmm_ncp_tree_responses_avx2,
-        sadmm_ncp_newton_avx2, sadmm_ncp_interior_avx2};
+    static const struct sadmm_articulation_kernels avx2 = {sadmm_articulation_tree_load_avx2,
+                                                           sadmm_articulation_tree_factorize_avx2,
+                                                           sadmm_articulation_tree_solve_avx2};
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return &avx2;
 #endif
     return &baseline;
-}
-
-double ncp_newton(struct ncp_dense *d, double enough) { return sadmm_articulation_kernels_best()->newton(d, enough); }
-double ncp_interior(struct ncp_dense *d, double enough)
-{
-    return sadmm_articulation_kernels_best()->interior(d, enough);
 }

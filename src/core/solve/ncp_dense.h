@@ -70,6 +70,7 @@ static inline void ncp_project(const struct ncp_law *law, const double y[3], dou
 static inline void ncp_arrive(const struct ncp_dense *d, const struct ncp_law *law, double y[3])
 {
     const double softness = 1 / law->response;
+    y[0] = y[1] = y[2] = 0;
     for (int32_t k = 0; k < law->count; ++k) y[k] = d->lambda[law->first + k] - d->u[law->first + k] * softness;
 }
 

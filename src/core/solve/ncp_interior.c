@@ -1,7 +1,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "articulation_variants.h"
+#include "ncp_kernels.h"
 
 enum { MOST_STEPS = 40, MOST_SHORT = 4 };
 /* How much of the way to the boundary is gone. Steps shorter than SHORT turn to the middle of the cones instead. */
@@ -314,7 +314,7 @@ static double make_step(struct interior *s)
     return way;
 }
 
-double SADMM_ARTICULATION_KERNEL(ncp_interior)(struct ncp_dense *d, double enough)
+double SADMM_KERNEL(ncp_interior)(struct ncp_dense *d, double enough)
 {
     struct interior s = {.d = d};
     double size = 0, map;

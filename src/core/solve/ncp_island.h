@@ -89,14 +89,13 @@ struct ncp_passed {
     double along[6], response[6];
 };
 
-/* ncp_solve.c: A's factor and b of a body of the island. */
-const double *sadmm_ncp_factor(const struct island *s, int32_t number);
-
 /* ncp_response.c: numbers of nodes, once the island's bodies are there; G, with rows in the states that they have. */
 void sadmm_ncp_number_nodes(struct island *s);
 void sadmm_ncp_find_responses(struct island *s, double *G);
 
-/* ncp_lists.c: the islands of a (sub-)step. False: no memory. */
+/* ncp_lists.c: A's factor and b of a body of the island. */
+const double *sadmm_ncp_factor(const struct island *s, int32_t number);
+/* The islands of a (sub-)step. False: no memory. */
 bool sadmm_ncp_make_lists(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, const struct sadmm_system *system);
 /* Is it one that the dense contact solve takes, and not solved yet? */
 bool sadmm_ncp_takes(const struct sadmm_ncp *d, int32_t label, const struct sadmm_settings *settings);

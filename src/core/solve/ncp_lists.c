@@ -177,3 +177,14 @@ void sadmm_ncp_take_kept(const struct sadmm_ncp *d, const struct sadmm_system *s
                    3 * sizeof *d->kept);
     }
 }
+
+const double *sadmm_ncp_factor(const struct island *s, int32_t number)
+{
+    struct ncp_body *body = &s->d->bodies[number];
+    if (body->factored) return body->factor;
+    double A[36];
+    sadmm_system_body(s->system, s->settings, body->body, A, body->b);
+    ldl6_factor(A, body->factor);
+    body->factored = true;
+    return body->factor;
+}

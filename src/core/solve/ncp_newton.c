@@ -1,7 +1,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "articulation_variants.h"
+#include "ncp_kernels.h"
 
 /* Steps from where the iterations are, which is what most problems need, and from an interior point. */
 enum { STEPS_FROM_START = 20, STEPS_FROM_INTERIOR = 200, STEPS_IN_TURN = 50 };
@@ -70,7 +70,8 @@ static double find_pieces(struct newton *s)
     return most;
 }
 
-/* Numbers that their law fixes go where it has them: an open contact's to 0. The others are listed, to be solved for. */
+/* Numbers that their law fixes go where it has them: an open contact's to 0. The others are listed, to be solved
+ * for. */
 static void sort_numbers(struct newton *s)
 {
     const struct ncp_dense *d = s->d;
@@ -169,7 +170,7 @@ static double take_steps(struct newton *s, int steps, double size, double best, 
     return best;
 }
 
-double SADMM_ARTICULATION_KERNEL(ncp_newton)(struct ncp_dense *d, double enough)
+double SADMM_KERNEL(ncp_newton)(struct ncp_dense *d, double enough)
 {
     struct newton s = newton_of(d);
     const double size = size_of(d);
@@ -180,7 +181,7 @@ double SADMM_ARTICULATION_KERNEL(ncp_newton)(struct ncp_dense *d, double enough)
     best = take_steps(&s, STEPS_FROM_START, size, best, enough);
     if (best > NEARLY) {
         copy(d, s.start_lambda, s.start_u, d->lambda, d->u);
-        const double map = SADMM_ARTICULATION_KERNEL(ncp_interior)(d, enough);
+        const double map = SADMM_KERNEL(ncp_interior)(d, enough);
         if (map < best) keep_best(&s);
         best = take_steps(&s, STEPS_FROM_INTERIOR, size, fmin(best, map), enough);
     }

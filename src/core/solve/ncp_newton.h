@@ -13,7 +13,6 @@ extern "C" {
 
 /* Goes on until the natural map is at most `enough`, nothing else is left to try or the budget is spent. Returns it. */
 double ncp_newton(struct ncp_dense *d, double enough);
-typedef double sadmm_ncp_search(struct ncp_dense *d, double enough); /* an instruction set's */
 
 #ifdef __cplusplus
 }

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ncp_island.h"
+#include "ncp_variants.h"
 
 void sadmm_ncp_number_nodes(struct island *s)
 {
@@ -14,7 +15,8 @@ void sadmm_ncp_number_nodes(struct island *s)
     s->d->first_node[s->parts] = first;
 }
 
-/* ---- by the sparse factor ------------------------------------------------------------------------------------------ */
+/* ---- by the sparse factor
+ * ------------------------------------------------------------------------------------------ */
 
 /* Rows of a part respond to impulses alone, from rest, in their present states. */
 static void make_linear(const struct articulation_view *v)
@@ -160,7 +162,7 @@ static void finish_rows(const struct island *s, double *G)
 
 void sadmm_ncp_find_responses(struct island *s, double *G)
 {
-    if (are_trees(s)) sadmm_articulation_kernels_best()->responses(s, G);
+    if (are_trees(s)) sadmm_ncp_kernels_best()->responses(s, G);
     else make_sparse_responses(s, G);
     finish_rows(s, G);
 }

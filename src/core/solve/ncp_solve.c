@@ -18,7 +18,7 @@ static const double REGULARISATION = 3e-12;
 /* Multiplications for a search, so that one that does not come to an end takes some 10 ms. */
 static const double BUDGET = 4e7;
 /* Contacts that cannot be met give by this share of their response: a body's own weight by 0.5 mm/s in a step of 5 ms.
- * Of 600 mechanisms that begin in overlap (python/tests/test_mechanisms.py 600) 15 end above 20 m/s, with 1e-3 29, with
+ * Of 600 mechanisms that begin in overlap (python/tests/test_mechanisms.py 600) 16 end above 20 m/s, with 1e-3 29, with
  * 1e-4 82. */
 static const double GIVES = 1e-2;
 /* A solution of so many times the energy that is expected is held against that of contacts that give: where bodies are
@@ -46,17 +46,6 @@ void sadmm_ncp_destroy(struct sadmm_ncp *d)
 }
 
 /* ---- an island's contacts and bodies ----------------------------------------------------------------------------- */
-
-const double *sadmm_ncp_factor(const struct island *s, int32_t number)
-{
-    struct ncp_body *body = &s->d->bodies[number];
-    if (body->factored) return body->factor;
-    double A[36];
-    sadmm_system_body(s->system, s->settings, body->body, A, body->b);
-    ldl6_factor(A, body->factor);
-    body->factored = true;
-    return body->factor;
-}
 
 static void add_body(struct island *s, int32_t i)
 {

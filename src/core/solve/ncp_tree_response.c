@@ -3,6 +3,7 @@
 
 #include "core/math/six.h"
 #include "ncp_island.h"
+#include "ncp_kernels.h"
 
 static int32_t node_of(const struct island *s, int32_t number, int32_t *part)
 {
@@ -30,12 +31,12 @@ static void pass_free(const struct island *s, struct way *way, struct ncp_passed
     const int32_t number = way->node - s->d->first_node[s->parts];
     to->node = way->node, to->free = 6;
     six_store(six_at(way->load), to->along);
-    ldl6_solve(sadmm_ncp_factor(s, number), to->along, to->response);
+    ldl6_solve(s->d->bodies[number].factor, to->along, to->response); /* there: a contact is on it */
     way->node = -1;
 }
 
-/* A load on its way to the root: on the node's body, with what its child has handed on; then what it hands on to its parent.
- * along: what acts along S besides, NULL: nothing does. z, response: S^T p, and H S^T p. */
+/* A load on its way to the root: on the node's body, with what its child has handed on; then what it hands on to its
+ * parent. along: what acts along S besides, NULL: nothing does. z, response: S^T p, and H S^T p. */
 static void pass_tree_node(const struct articulation_node *node, double load[SIX], const double *along, double z[6],
                            double response[6])
 {
@@ -105,7 +106,7 @@ static int32_t longest_way(const struct island *s)
     return 2 * most;
 }
 
-void SADMM_ARTICULATION_KERNEL(ncp_tree_responses)(struct island *s, double *G)
+void SADMM_KERNEL(ncp_tree_responses)(struct island *s, double *G)
 {
     const int32_t n = s->dense.size, room = longest_way(s), nodes = s->d->first_node[s->parts] + s->bodies;
     const struct ncp_passed **at = s->d->passed_at;

@@ -42,8 +42,8 @@ static void touch_pair(const struct sadmm_system *system, const sadmm_settings *
     if (b >= 0) touch[b] |= found.body[1];
 }
 
-sadmm_status sadmm_world_integrate(sadmm_world *world, const struct sadmm_system *system, const sadmm_settings *settings,
-                                   const struct sadmm_ncp *ncp)
+sadmm_status sadmm_world_integrate(sadmm_world *world, const struct sadmm_system *system,
+                                   const sadmm_settings *settings, const struct sadmm_ncp *ncp)
 {
     const size_t n = (size_t)world->dynamic_count;
     const int32_t *label = sadmm_ncp_islands(ncp);

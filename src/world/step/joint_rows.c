@@ -2,9 +2,11 @@
  * step's rows, multipliers from the forces of the last step, and the solution's back into what joints keep. */
 #include <string.h>
 
+#include "config.h"
 #include "core/base/memory.h"
 #include "gear_rows.h"
 #include "joint_act.h"
+#include "joint_rates.h"
 #include "joint_rows.h"
 #include "joint_stiffen.h"
 
@@ -14,16 +16,36 @@ struct all_laws {
     int count;
 };
 
+/* joint_moving_of. */
+static struct joint_moving moving_of(const struct sadmm_world_joint *joint, const struct acting_joint *acting,
+                                     const struct joint_rates *rates, const struct joint_turn_bounds *bounds, int k,
+                                     const sadmm_settings *settings)
+{
+    const bool radial = joint_is_radial(joint->def.kind);
+    struct joint_coordinate_rates r = {.before = rates->before[k], .start = rates->start[k],
+                                       .middle = rates->middle[k], .prescribed = rates->prescribed[k]};
+    const double turning = r.start + r.prescribed - r.before;
+    const bool turns = !((k > 0 || !radial) && joint_turns_within(bounds, k, turning, settings->dt)) &&
+                       joint_turns(acting, k, radial, turning, settings->dt);
+    for (int s = 0; !(joint->def.locks >> k & 1) && s < 2; ++s) {
+        if (acting->side[s].system_body < 0) continue;
+        r.free += joint_row_product(rates->row[s][k], acting->side[s].free);
+        r.response += joint_response(&acting->side[s], rates->row[s][k]);
+    }
+    return joint_moving_by(&joint->def, &joint->next, acting, k, &r, turns, settings);
+}
+
 /* Locked coordinates first: they are held together. */
 static void find_laws(struct sadmm_world_joint *joint, const struct acting_joint *acting,
-                      const sadmm_settings *settings, struct all_laws *all)
+                      const struct joint_rates *rates, const sadmm_settings *settings, struct all_laws *all)
 {
+    const struct joint_turn_bounds bounds = joint_turn_bounds_of(acting);
     all->count = 0;
     for (int locked = 1; locked >= 0; --locked)
         for (int k = 0; k < JOINT_COORDINATES; ++k) {
             struct joint_laws laws;
             if ((int)(joint->def.locks >> k & 1) != locked || !joint_has_coordinate(&joint->def, k)) continue;
-            const struct joint_moving m = joint_moving_of(&joint->def, &joint->next, acting, k, settings);
+            const struct joint_moving m = moving_of(joint, acting, rates, &bounds, k, settings);
             if (joint_winds(joint->def.locks, k)) joint->next.angle[k] = m.value;
             const struct joint_table table = {joint->table[k],
                                               joint->table[k] ? joint->table[k] + joint->table_count[k] : NULL,
@@ -33,10 +55,18 @@ static void find_laws(struct sadmm_world_joint *joint, const struct acting_joint
         }
 }
 
+static sadmm_joint_rates *best_rates(void)
+{
+#ifdef SADMM_HAVE_ISA_AVX2
+    if (__builtin_cpu_supports("avx2")) return sadmm_joint_rates_avx2;
+#endif
+    return sadmm_joint_rates_baseline;
+}
+
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 
 static bool add_constraints(sadmm_world *world, int32_t slot, const struct acting_joint *acting,
-                            const struct all_laws *laws, double dt)
+                            const struct joint_rates *rates, const struct all_laws *laws, double dt)
 {
     struct sadmm_rows *rows = &world->start.rows;
     const struct sadmm_world_joint *joint = &world->joints[slot];
@@ -58,8 +88,7 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
         for (int s = 0; s < 2; ++s) {
             double *row = (s ? rows->jacobian_b : rows->jacobian_a) + 6 * r;
             if (acting->side[s].system_body < 0) continue;
-            joint_step_row(acting, s, law->coordinate, row);
-            for (int j = 0; j < 6; ++j) row[j] *= law->sign;
+            for (int j = 0; j < 6; ++j) row[j] = rates->row[s][law->coordinate][j] * law->sign;
         }
         sadmm_row_set(rows, (int32_t)r, law->gain, law->bias, law->compliance, law->lo, law->hi);
         rows->lambda[r] = world->start.multiplier[r] =
@@ -99,6 +128,7 @@ static bool add_slots(sadmm_world *world, const struct sadmm_world_joint *joint,
 
 sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings)
 {
+    sadmm_joint_rates *const find_rates = best_rates();
     sadmm_rows_clear(&world->start.rows);
     world->joints_acting = world->couplings_acting = 0;
     world->joint_constraint_count = 0;
@@ -108,6 +138,7 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
     for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
         struct sadmm_world_joint *joint = &world->joints[slot];
         struct all_laws laws;
+        struct joint_rates rates;
         if (!joint->alive) continue;
         const size_t before = world->start.rows.constraint_count;
         if (!joint->def.enabled) {
@@ -115,9 +146,11 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
             continue;
         }
         const struct acting_joint *acting = sadmm_world_act_joint(world, (int32_t)slot, settings);
-        find_laws(joint, acting, settings, &laws);
+        find_rates(acting, &rates);
+        find_laws(joint, acting, &rates, settings, &laws);
         if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
-        if (!add_constraints(world, (int32_t)slot, acting, &laws, settings->dt) || !add_slots(world, joint, before))
+        if (!add_constraints(world, (int32_t)slot, acting, &rates, &laws, settings->dt) ||
+            !add_slots(world, joint, before))
             return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution says */
     }
