@@ -49,10 +49,8 @@ static bool same_graph(const struct solving *s)
 static bool make_tree_room(struct sadmm_articulations *j, size_t members, size_t columns)
 {
     const size_t rows = SADMM_MAX_ROWS * columns;
-    return sadmm_grow_empty(&j->nodes, &j->nodes_capacity, members, sizeof *j->nodes) &&
-           sadmm_grow_empty(&j->tree_numbers, &j->tree_number_capacity, 3 * members + columns + 2 * rows,
-                            sizeof *j->tree_numbers) &&
-           sadmm_grow_empty(&j->tree_rows, &j->tree_row_capacity, rows, sizeof *j->tree_rows);
+    return SADMM_GROW(j->nodes, 0, members) && SADMM_GROW(j->tree_rows, 0, rows) &&
+           SADMM_GROW(j->tree_numbers, 0, 3 * members + columns + 2 * rows);
 }
 
 /* Where the tree's arrays are of a part that comes after so many bodies and columns of all. */

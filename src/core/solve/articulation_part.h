@@ -48,9 +48,6 @@ struct sadmm_articulations {
     bool kept;              /* velocities and multipliers from before the iterations are in: */
     double *kept_velocity, *kept_lambda; /* bodies of parts x 6; rows */
     uint8_t *kept_states;                /* columns x SADMM_MAX_ROWS of all parts */
-    size_t bodies_capacity, part_capacity, entry_capacity, parts_capacity, work_capacity, impulse_capacity,
-        kept_velocity_capacity, kept_lambda_capacity, kept_states_capacity, nodes_capacity, tree_number_capacity,
-        tree_row_capacity;
 };
 
 /* Goes through the rows of a part: r, which is row `from` of the system; slots as of sadmm_articulations_solve. */

@@ -89,7 +89,6 @@ struct sadmm_world {
     struct spin_system *spins;                /* dynamic bodies: spin_of_system, in a (sub-)step where spins_known */
     bool spins_known;
     struct joint_trapezoid *joint_trapezoids; /* dynamic bodies, as the step ends; rigid NULL: not found yet */
-    size_t acting_joint_capacity, joint_side_capacity, spin_capacity, joint_trapezoid_capacity;
     struct sadmm_trapezoid *trapezoids;       /* dynamic bodies, in steps without a solve, and one more; */
     int32_t *touch;                           /* what their contacts say of them */
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */

@@ -48,8 +48,7 @@ sadmm_status sadmm_world_integrate(sadmm_world *world, const struct sadmm_system
     const size_t n = (size_t)world->dynamic_count;
     const int32_t *label = sadmm_ncp_islands(ncp);
     const struct sadmm_contact_set *contacts = system->contacts;
-    if (!sadmm_grow_empty(&world->trapezoids, &world->trapezoid_capacity, n + 1, sizeof *world->trapezoids) ||
-        !sadmm_grow_empty(&world->touch, &world->touch_capacity, n, sizeof *world->touch))
+    if (!SADMM_GROW(world->trapezoids, 0, n + 1) || !SADMM_GROW(world->touch, 0, n))
         return sadmm_fail_memory(&world->error, "the motion of bodies");
     find_trapezoids(world, system, settings, ncp, world->trapezoids);
     memset(world->touch, 0, n * sizeof *world->touch);

@@ -36,14 +36,12 @@ static struct joint_side side_of(sadmm_world *world, struct joint_body body, con
 
 bool sadmm_world_begin_acting(sadmm_world *world, const sadmm_settings *settings)
 {
-    const size_t n = has_room(world) ? (size_t)world->dynamic_count : 0, before = world->joint_side_capacity;
-    if (!sadmm_grow_empty(&world->acting_joints, &world->acting_joint_capacity, world->joint_slots,
-                          sizeof *world->acting_joints) ||
-        !sadmm_grow_empty(&world->spins, &world->spin_capacity, n, sizeof *world->spins) ||
-        !sadmm_grow_empty(&world->joint_sides, &world->joint_side_capacity, n, sizeof *world->joint_sides))
+    const size_t n = has_room(world) ? (size_t)world->dynamic_count : 0, before = SADMM_ROOM(world->joint_sides);
+    if (!SADMM_GROW(world->acting_joints, 0, world->joint_slots) || !SADMM_GROW(world->joint_sides, 0, n) ||
+        !SADMM_GROW(world->spins, 0, n))
         return false;
-    if (world->joint_side_capacity != before)
-        memset(world->joint_sides, 0, world->joint_side_capacity * sizeof *world->joint_sides);
+    if (SADMM_ROOM(world->joint_sides) != before)
+        memset(world->joint_sides, 0, SADMM_ROOM(world->joint_sides) * sizeof *world->joint_sides);
     ++world->joint_sides_made;
     for (size_t i = 0; i < n; ++i) world->spins[i] = spin_of_system(&world->start.rigid[i], settings->dt);
     world->spins_known = n > 0;

@@ -86,10 +86,8 @@ sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settin
     struct sadmm_system system = sadmm_world_system(world);
     system.islands = islands;
     const size_t n = (size_t)system.body_count;
-    if (!sadmm_grow_empty(&world->joint_labels, &world->joint_label_capacity, n, sizeof *world->joint_labels) ||
-        !sadmm_grow_empty(&world->joint_trapezoids, &world->joint_trapezoid_capacity, n,
-                          sizeof *world->joint_trapezoids) ||
-        !sadmm_grow_empty(&world->joint_touch, &world->joint_touch_capacity, n, sizeof *world->joint_touch))
+    if (!SADMM_GROW(world->joint_labels, 0, n) || !SADMM_GROW(world->joint_touch, 0, n) ||
+        !SADMM_GROW(world->joint_trapezoids, 0, n))
         return sadmm_fail_memory(&world->error, "islands of joints");
     find_islands(world, &system, settings);
     for (size_t i = 0; i < n; ++i) {
