@@ -7,9 +7,9 @@
 #include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "core/solve/registry.h"
-#include "world/objects/body.h"
+#include "world/objects/body_check.h"
 #include "world/objects/events.h"
-#include "world/objects/joint.h"
+#include "world/objects/joint_slots.h"
 #include "world/resident/resident.h"
 #include "world/step/hits.h"
 

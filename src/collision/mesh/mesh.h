@@ -1,6 +1,8 @@
 /* A mesh (subadmm/mesh.h) from the inside. Of C alone: its uses are counted by an atomic number.
  *
- *   mesh.c         what callers see: checks, queries; the block put together
+ *   mesh.c         what callers see of a mesh, its uses
+ *   mesh_make.c    from a definition to the block; mesh_heights.c: of a heightfield
+ *   mesh_marks.c   which edges and corners are flat
  *   mesh_edges.c   which triangles are beside each other, which vertices
  *   mesh_tree.c    the tree of boxes, and with it the order of the triangles
  *   mesh_archive.c a mesh as bytes and back

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "body.h"
+#include "body_check.h"
 #include "core/base/check.h"
 #include "core/base/definition_fields.h"
 #include "core/solve/resident.h"

@@ -12,6 +12,7 @@
 #include "core/math/rigid.h"
 #include "coupling.h"
 #include "joint.h"
+#include "joint_slots.h"
 #include "subadmm/arrays.h"
 #include "world/resident/resident.h"
 #include "world/state/ids.h"

@@ -9,7 +9,7 @@
 #include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "gear.h"
-#include "joint.h"
+#include "joint_slots.h"
 #include "world/resident/resident.h"
 #include "world/resident/resident_joints.h"
 #include "world/state/ids.h"

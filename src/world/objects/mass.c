@@ -165,3 +165,31 @@ sadmm_status sadmm_mass_pose_of_body(const sadmm_mass *mass, double position[3],
     q_store(q_normalize(q_mul(frame, axes)), orientation);
     return SADMM_OK;
 }
+
+/* ---- inertia of solids ------------------------------------------------------------------------------------------- */
+
+void sadmm_box_inertia(double mass, const double h[3], double inertia[3])
+{
+    if (!h || !inertia) return;
+    inertia[0] = mass / 3 * (h[1] * h[1] + h[2] * h[2]);
+    inertia[1] = mass / 3 * (h[0] * h[0] + h[2] * h[2]);
+    inertia[2] = mass / 3 * (h[0] * h[0] + h[1] * h[1]);
+}
+
+void sadmm_sphere_inertia(double mass, double radius, double inertia[3])
+{
+    if (!inertia) return;
+    inertia[0] = inertia[1] = inertia[2] = 0.4 * mass * radius * radius;
+}
+
+/* A cylinder of length 2 h and two half balls, by their shares of the volume. */
+void sadmm_capsule_inertia(double mass, double r, double h, double inertia[3])
+{
+    if (!inertia) return;
+    double cylinder = 2 * h, balls = 4.0 / 3.0 * r;
+    double mc = mass * cylinder / (cylinder + balls), mb = mass - mc;
+    double ball_axis = 0.4 * mb * r * r;
+    double ball_side = ball_axis + mb * (h * h + 0.75 * h * r);
+    inertia[2] = 0.5 * mc * r * r + ball_axis;
+    inertia[0] = inertia[1] = mc * (3 * r * r + cylinder * cylinder) / 12 + ball_side;
+}

@@ -1,0 +1,56 @@
+#include "save_parts.h"
+
+static void archive_field(struct sadmm_archive *archive, const struct sadmm_field *field, void *at)
+{
+    switch (field->kind) {
+    case SADMM_FIELD_REALS:
+    case SADMM_FIELD_TURN:
+    case SADMM_FIELD_BOUND:
+    case SADMM_FIELD_MEASURED: sadmm_archive_bytes(archive, at, (size_t)field->count * sizeof(double)); break;
+    case SADMM_FIELD_WHOLE: sadmm_archive_bytes(archive, at, sizeof(int)); break;
+    case SADMM_FIELD_BITS: sadmm_archive_bytes(archive, at, sizeof(uint32_t)); break;
+    case SADMM_FIELD_NAMED: sadmm_archive_bytes(archive, at, sizeof(sadmm_method)); break; /* as all enumerations */
+    case SADMM_FIELD_ID: sadmm_archive_bytes(archive, at, sizeof(sadmm_body_id)); break;   /* as all ids */
+    case SADMM_FIELD_FLAG: sadmm_archive_flag(archive, (bool *)at); break;
+    case SADMM_FIELD_OTHER: break; /* the caller's */
+    }
+}
+
+void sadmm_archive_fields(struct sadmm_archive *archive, const struct sadmm_field *fields, size_t count, void *object)
+{
+    for (size_t k = 0; k < count; ++k) archive_field(archive, &fields[k], (char *)object + fields[k].offset);
+}
+
+void sadmm_archive_fail_memory(struct sadmm_archive *archive)
+{
+    if (archive->status == SADMM_OK) archive->status = sadmm_fail_memory(archive->error, "the state of a world");
+}
+
+static bool pairs_fit(const struct sadmm_pair_table *table, size_t count, size_t slots)
+{
+    for (size_t k = 0; k < count; ++k) {
+        const uint64_t low = table->keys[k] >> 32, high = table->keys[k] & UINT32_MAX;
+        if (high >= slots || low >= high || (k > 0 && table->keys[k - 1] >= table->keys[k]) ||
+            !(table->values[k] >= 0 && table->values[k] <= 1e9))
+            return false;
+    }
+    return true;
+}
+
+void sadmm_archive_pairs(struct sadmm_archive *archive, struct sadmm_pair_table *table, size_t slots)
+{
+    size_t count = sadmm_pair_table_count(table), values;
+    if (!archive->reading && sadmm_pair_table_list(table, archive->error) != SADMM_OK) {
+        archive->status = SADMM_ERROR_OUT_OF_MEMORY;
+        return;
+    }
+    values = count;
+    sadmm_archive_array(archive, &table->keys, &count, sizeof *table->keys, SIZE_MAX);
+    sadmm_archive_array(archive, &table->values, &values, sizeof *table->values, SIZE_MAX);
+    if (!archive->reading ||
+        !sadmm_archive_expect(archive, values == count && pairs_fit(table, count, slots), "pairs of bodies or shapes"))
+        return;
+    for (size_t k = 0; k < count && archive->status == SADMM_OK; ++k)
+        if (sadmm_pair_table_set(table, table->keys[k], table->values[k], archive->error) != SADMM_OK)
+            sadmm_archive_fail_memory(archive);
+}
