@@ -93,8 +93,9 @@ START_TEST(couplings_come_and_go)
     const sadmm_coupling_id second = add_coupling(world, &def);
     MUST(world, sadmm_world_add_joint(world, &joint, &joints[1]));
 
-    /* counts, indices and ids of joints do not have them */
+    /* they have ids of their own, and joints know nothing of them */
     ck_assert(sadmm_world_coupling_count(world) == 2 && sadmm_world_joint_count(world) == 2);
+    ck_assert(first.slot == 1 && second.slot == 2 && joints[0].slot == 1 && joints[1].slot == 2);
     for (int k = 0; k < 2; ++k) {
         MUST(world, sadmm_world_joint_at(world, k, &found));
         ck_assert(found.slot == joints[k].slot && found.generation == joints[k].generation);

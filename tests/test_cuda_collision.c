@@ -92,11 +92,11 @@ static struct sadmm_collision_input world_input(const sadmm_world *world, struct
 {
     struct sadmm_collision_input input = {
         .shapes = world->shapes,
-        .shape_count = world->shape_slots,
+        .shape_count = world->shape_ids.slots,
         .geometries = world->geometries,
-        .geometry_count = world->shape_slots,
+        .geometry_count = world->shape_ids.slots,
         .bodies = bodies,
-        .body_count = world->body_slots,
+        .body_count = world->body_ids.slots,
         .dt = world->def.settings.dt,
         .margin = world->def.contact_margin,
         .threads = 1,
@@ -107,14 +107,15 @@ static struct sadmm_collision_input world_input(const sadmm_world *world, struct
         .friction_pair_count = sadmm_pair_table_count(&world->friction_pairs),
     };
     int32_t dynamic = 0;
-    for (size_t slot = 0; slot < world->body_slots; ++slot) {
+    for (size_t slot = 0; slot < world->body_ids.slots; ++slot) {
         const struct sadmm_world_body *body = &world->bodies[slot];
         memcpy(bodies[slot].position, body->rigid.position, sizeof bodies[slot].position);
         memcpy(bodies[slot].orientation, body->rigid.orientation, sizeof bodies[slot].orientation);
         memcpy(bodies[slot].velocity, body->rigid.velocity, sizeof bodies[slot].velocity);
         bodies[slot].inertia = body->rigid.inertia[0];
         bodies[slot].environment = body->environment;
-        bodies[slot].system_body = body->alive && body->type == SADMM_BODY_DYNAMIC ? dynamic++ : -1;
+        const bool moves = sadmm_ids_has(&world->body_ids, slot) && body->type == SADMM_BODY_DYNAMIC;
+        bodies[slot].system_body = moves ? dynamic++ : -1;
     }
     return input;
 }
@@ -136,7 +137,7 @@ START_TEST(scenes_equal_host)
     struct sadmm_scene scene = open_scene(scenes[_i / 2].spec);
     scene.def.backend = SADMM_BACKEND_CPU;
     sadmm_world *world = build_scene(&scene);
-    struct sadmm_collision_body *bodies = calloc(world->body_slots, sizeof *bodies);
+    struct sadmm_collision_body *bodies = calloc(world->body_ids.slots, sizeof *bodies);
     struct both b = both_new(tree ? 1 : 1000000);
     size_t points = 0, pushing = 0;
     for (int step = 0; step < scenes[_i / 2].steps; ++step) {

@@ -74,7 +74,7 @@ static void check_shape_data(sadmm_world *world)
         used += entry->of.doubles;
         uses += entry->uses;
     }
-    for (size_t slot = 0; slot < world->shape_slots; ++slot) {
+    for (size_t slot = 0; slot < world->shape_ids.slots; ++slot) {
         const struct sadmm_geometry *geometry = &world->geometries[slot];
         if (!world->shapes[slot].alive || geometry->type != SADMM_SHAPE_HULL) continue;
         const sadmm_hull *hull = world->block_shapes[slot].hull;

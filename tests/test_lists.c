@@ -1,4 +1,4 @@
-/* Growable arrays; and lists that stay quick wherever things come and go: key trees, sets of slots, tables of pairs,
+/* Growable arrays; and lists that stay quick wherever things come and go: key trees, pools of ids, tables of pairs,
  * against plain arrays. */
 #include <check.h>
 #include <stdint.h>
@@ -8,8 +8,8 @@
 #include "core/base/key_tree.h"
 #include "core/base/memory.h"
 #include "run_suite.h"
+#include "world/state/id_pool.h"
 #include "world/state/pair_table.h"
-#include "world/state/slots.h"
 
 enum { KEYS = 300, SLOTS = 700, BODIES = 14, CALLS = 20000 };
 
@@ -113,47 +113,137 @@ START_TEST(key_trees)
 }
 END_TEST
 
-static void compare_slots(const struct sadmm_slot_set *set, const bool taken[SLOTS], int room)
+/* What a pool of ids has to be, in plain arrays: by slot whether there is an object, and its generation, or the next
+ * one's. */
+struct plain_pool {
+    bool taken[SLOTS];
+    uint32_t generation[SLOTS];
+    int slots, count;
+};
+
+static int next_slot(const struct plain_pool *plain)
 {
-    int32_t count = 0;
-    int lowest = 0;
-    while (lowest < room && taken[lowest]) ++lowest;
-    const size_t free = sadmm_slots_free(set);
-    ck_assert(lowest < room ? free == (size_t)lowest : free >= (size_t)room);
-    for (int slot = 0; slot < room; ++slot) {
-        ck_assert_int_eq(sadmm_slots_index(set, (size_t)slot), count);
-        if (!taken[slot]) continue;
-        ck_assert_uint_eq(sadmm_slots_at(set, count), (size_t)slot);
-        ++count;
-    }
+    int slot = 0;
+    while (slot < plain->slots && plain->taken[slot]) ++slot;
+    return slot;
 }
 
-/* In room that grows slot by slot, as slots of worlds do. */
-START_TEST(slots)
+static void compare_pool(const struct sadmm_id_pool *pool, const struct plain_pool *plain)
 {
-    struct sadmm_slot_set set = {0};
-    bool taken[SLOTS] = {false};
-    int room = 0;
+    int32_t count = 0;
+    size_t from = 0;
+    ck_assert_uint_eq(pool->slots, (size_t)plain->slots);
+    ck_assert_int_eq(pool->count, plain->count);
+    for (int slot = 0; slot < plain->slots; ++slot) {
+        ck_assert_int_eq(sadmm_ids_index(pool, (size_t)slot), count);
+        ck_assert_uint_eq(pool->generations[slot], plain->generation[slot]);
+        ck_assert(sadmm_ids_has(pool, (size_t)slot) == plain->taken[slot]);
+        if (!plain->taken[slot]) continue;
+        ck_assert_uint_eq(sadmm_ids_at(pool, count), (size_t)slot);
+        ck_assert_uint_eq(sadmm_ids_from(pool, from), (size_t)slot);
+        from = (size_t)slot + 1;
+        ++count;
+    }
+    ck_assert(!sadmm_ids_has(pool, pool->slots) && sadmm_ids_from(pool, from) == pool->slots);
+    for (SADMM_OBJECTS(slot, pool)) {
+        ck_assert(plain->taken[slot]);
+        --count;
+    }
+    ck_assert_int_eq(count, 0);
+}
+
+static size_t take_next(struct sadmm_id_pool *pool)
+{
+    size_t slot;
+    ck_assert_int_eq(sadmm_ids_next(pool, &slot, NULL), SADMM_OK);
+    sadmm_ids_take(pool, slot);
+    return slot;
+}
+
+static struct sadmm_id_pool empty_pool(void)
+{
+    return (struct sadmm_id_pool){.object = "thing", .objects = "things", .most = 10};
+}
+
+/* Objects come and go in random order, few and many in turn; the next one gets the lowest free slot. */
+START_TEST(pools)
+{
+    struct sadmm_id_pool pool = empty_pool();
+    struct plain_pool plain = {.slots = 0};
     state = 9;
-    ck_assert_uint_eq(sadmm_slots_free(&set), 0);
+    compare_pool(&pool, &plain);
     for (int call = 0; call < CALLS; ++call) {
-        if (room < SLOTS && (room == 0 || call % 16 == 0)) {
-            ck_assert(sadmm_slots_reserve(&set, (size_t)++room));
-            taken[room - 1] = call % 1024 != 0;
-            if (taken[room - 1]) sadmm_slots_take(&set, (size_t)room - 1);
+        if (plain.count < SLOTS && below(CALLS) < (call / 2500 % 2 ? 8000 : 14000)) {
+            const int slot = next_slot(&plain);
+            ck_assert_uint_eq(take_next(&pool), (size_t)slot);
+            if (slot == plain.slots) plain.generation[plain.slots++] = 1;
+            plain.taken[slot] = true;
+            ++plain.count;
+        } else if (plain.count > 0) {
+            const int slot = (int)sadmm_ids_at(&pool, below(plain.count));
+            sadmm_ids_release(&pool, (size_t)slot);
+            plain.taken[slot] = false;
+            ++plain.generation[slot];
+            --plain.count;
         }
-        const int slot = below(room);
-        if (taken[slot] && below(4) > 0) continue;
-        (taken[slot] ? sadmm_slots_release : sadmm_slots_take)(&set, (size_t)slot);
-        taken[slot] = !taken[slot];
-        if (call % 50 < 2) compare_slots(&set, taken, room);
+        if (call % 200 < 2) compare_pool(&pool, &plain);
     }
-    while (sadmm_slots_free(&set) < (size_t)room) { /* until none is free */
-        taken[sadmm_slots_free(&set)] = true;
-        sadmm_slots_take(&set, sadmm_slots_free(&set));
+    ck_assert_int_gt(plain.slots, 300); /* several words, and many slots used again */
+    ck_assert_int_gt(plain.slots, plain.count);
+    sadmm_ids_free(&pool);
+    compare_pool(&pool, &(struct plain_pool){.slots = 0});
+}
+END_TEST
+
+/* Ids of what is gone, of what is not there yet, and of nothing. */
+START_TEST(stale_ids)
+{
+    struct sadmm_id_pool pool = empty_pool();
+    struct sadmm_error error = {.status = SADMM_OK};
+    ck_assert_int_eq(sadmm_ids_check(&pool, 1, 1, "id", NULL), SADMM_ERROR_STALE_ID);
+    for (size_t slot = 0; slot < 3; ++slot) ck_assert_uint_eq(take_next(&pool), slot);
+    sadmm_ids_release(&pool, 1);
+    static const uint32_t refused[][2] = {{0, 0}, {0, 1}, {1, 0}, {1, 2}, {2, 1}, {2, 2}, {4, 1}, {UINT32_MAX, 1}};
+    for (size_t k = 0; k < sizeof refused / sizeof *refused; ++k)
+        ck_assert_int_eq(sadmm_ids_check(&pool, refused[k][0], refused[k][1], "id", NULL), SADMM_ERROR_STALE_ID);
+    ck_assert_int_eq(sadmm_ids_check(&pool, 3, 1, "id", NULL), SADMM_OK);
+    ck_assert_uint_eq(take_next(&pool), 1);
+    ck_assert_int_eq(sadmm_ids_check(&pool, 2, 2, "id", NULL), SADMM_OK);
+    ck_assert_int_eq(sadmm_ids_check(&pool, 2, 1, "def->thing", &error), SADMM_ERROR_STALE_ID);
+    ck_assert_str_eq(error.message, "def->thing = (slot 2, generation 1): no such thing (any more)");
+
+    pool.generations[1] = UINT32_MAX; /* as after so many objects in the slot */
+    sadmm_ids_release(&pool, 1);
+    ck_assert_uint_eq(take_next(&pool), 1);
+    ck_assert_int_eq(sadmm_ids_check(&pool, 2, UINT32_MAX, "id", NULL), SADMM_ERROR_STALE_ID);
+    ck_assert_int_eq(sadmm_ids_check(&pool, 2, 0, "id", NULL), SADMM_ERROR_STALE_ID);
+    ck_assert_int_eq(sadmm_ids_check(&pool, 2, 1, "id", NULL), SADMM_OK);
+    sadmm_ids_free(&pool);
+}
+END_TEST
+
+START_TEST(full_pools)
+{
+    struct sadmm_id_pool pool = empty_pool();
+    struct sadmm_error error = {.status = SADMM_OK};
+    size_t slot;
+    for (long left = 0;; ++left) { /* of three arrays */
+        sadmm_test_fail_allocations_after(left);
+        const sadmm_status status = sadmm_ids_next(&pool, &slot, &error);
+        sadmm_test_fail_allocations_after(-1);
+        if (status == SADMM_OK) break;
+        ck_assert(status == SADMM_ERROR_OUT_OF_MEMORY && pool.slots == 0 && pool.count == 0 && left < 3);
+        ck_assert_str_eq(error.message, "out of memory for a thing");
     }
-    compare_slots(&set, taken, room);
-    sadmm_slots_destroy(&set);
+    for (size_t k = 0; k < 1024; ++k) ck_assert_uint_eq(take_next(&pool), k);
+    ck_assert_int_eq(sadmm_ids_next(&pool, &slot, &error), SADMM_ERROR_LIMIT);
+    ck_assert_str_eq(error.message, "1024 things: a world holds at most 2^10");
+    sadmm_ids_release(&pool, 700);
+    sadmm_ids_release(&pool, 77);
+    ck_assert_uint_eq(take_next(&pool), 77);
+    ck_assert_uint_eq(take_next(&pool), 700);
+    ck_assert_int_eq(sadmm_ids_next(&pool, &slot, NULL), SADMM_ERROR_LIMIT);
+    sadmm_ids_free(&pool);
 }
 END_TEST
 
@@ -208,7 +298,9 @@ int main(void)
     TCase *cases = tcase_create("lists");
     tcase_add_test(cases, arrays);
     tcase_add_test(cases, key_trees);
-    tcase_add_test(cases, slots);
+    tcase_add_test(cases, pools);
+    tcase_add_test(cases, stale_ids);
+    tcase_add_test(cases, full_pools);
     tcase_add_test(cases, pairs);
     suite_add_tcase(suite, cases);
     return run_suite(suite);

@@ -78,7 +78,7 @@ static int32_t brute_force(sadmm_world *world, const struct sadmm_placed *shape,
                            uint32_t *slots)
 {
     int32_t count = 0;
-    for (uint32_t slot = 0; slot < world->shape_slots; ++slot) {
+    for (uint32_t slot = 0; slot < world->shape_ids.slots; ++slot) {
         struct sadmm_placed other;
         struct sadmm_separation separation;
         struct sadmm_box3 own;
@@ -104,7 +104,7 @@ static void expect_slots(const sadmm_world *world, const sadmm_shape_id *got, in
     ck_assert_int_eq(count, wanted);
     for (int32_t i = 0; i < count; ++i) {
         ck_assert_uint_eq(got[i].slot, slots[i] + 1);
-        ck_assert_uint_eq(got[i].generation, world->shape_generations[slots[i]]);
+        ck_assert_uint_eq(got[i].generation, world->shape_ids.generations[slots[i]]);
     }
 }
 

@@ -55,7 +55,7 @@ static inline sadmm_coupling_def sadmm_coupling_def_default(void)
 }
 
 /* *id: the new coupling, until it or its body is removed. Errors: STALE_ID, INVALID_ARGUMENT (range; the body is
- * static; nothing changes), LIMIT (2^24 joints and couplings), OUT_OF_MEMORY, DEVICE. */
+ * static; nothing changes), LIMIT (2^24 couplings), OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_def *def,
                                                 sadmm_coupling_id *id /* may be NULL */);
 /* Errors: STALE_ID, DEVICE. */

@@ -1,5 +1,5 @@
-/* Ids of a world's objects: small values with a generation. The id of a destroyed object gives SADMM_ERROR_STALE_ID,
- * and never names another object.
+/* Ids of a world's objects: small values with a generation. The id of a destroyed object gives SADMM_ERROR_STALE_ID: it
+ * names another object only after 2^32 - 1 more of them in its slot.
  */
 #ifndef SUBADMM_ID_H
 #define SUBADMM_ID_H

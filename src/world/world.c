@@ -59,6 +59,11 @@ sadmm_status sadmm_world_create(const sadmm_world_def *given, sadmm_world **out)
     world->def = def;
     world->team = team;
     world->certified_step = -1;
+    world->body_ids = (struct sadmm_id_pool){.object = "body", .objects = "bodies", .most = 27};
+    world->shape_ids = (struct sadmm_id_pool){.object = "shape", .objects = "shapes", .most = 28};
+    world->joint_ids = (struct sadmm_id_pool){.object = "joint", .objects = "joints", .most = 24};
+    world->gear_ids = (struct sadmm_id_pool){.object = "gear", .objects = "gears", .most = 24};
+    world->coupling_ids = (struct sadmm_id_pool){.object = "coupling", .objects = "couplings", .most = 24};
     const sadmm_status status = sadmm_collision_create(&world->collision, NULL);
     if (status != SADMM_OK) {
         sadmm_free(world);
@@ -81,18 +86,18 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_rows_free(&world->start.rows);
     sadmm_rows_free(&world->last_start.rows);
     sadmm_rows_free(&world->closing);
-    for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
+    for (SADMM_OBJECTS(slot, &world->body_ids)) sadmm_free(world->bodies[slot].name);
     sadmm_world_free_tables(world);
     sadmm_shape_data_free(&world->shape_data);
     sadmm_query_tree_free(&world->query.tree);
     sadmm_world_free_events(world);
-    struct sadmm_slot_set *const taken[] = {&world->bodies_taken, &world->shapes_taken, &world->joints_taken,
-                                            &world->own_joints, &world->gears_taken, &world->couplings_taken};
+    struct sadmm_id_pool *const ids[] = {&world->body_ids, &world->shape_ids, &world->joint_ids, &world->gear_ids,
+                                         &world->coupling_ids};
     struct sadmm_pair_table *const pairs[] = {&world->disabled_pairs, &world->jointed_pairs, &world->friction_pairs};
-    for (size_t i = 0; i < sizeof taken / sizeof *taken; ++i) sadmm_slots_destroy(taken[i]);
+    for (size_t i = 0; i < sizeof ids / sizeof *ids; ++i) sadmm_ids_free(ids[i]);
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; ++i) sadmm_pair_table_free(pairs[i]);
     sadmm_world_free_hits(world);
-    void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->block_shapes,
+    void *blocks[] = {world->bodies, world->shapes, world->geometries, world->block_shapes,
                       world->shape_links, world->filtered_pairs, world->joints, world->couplings, world->gears,
                       world->joint_sources, world->joint_load, world->stiffening, world->stiffened,
                       world->opened, world->folding, world->row_left, world->closing_costs, world->closing_slots,
@@ -109,7 +114,7 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->slot_of, world->resident.extrapolation, world->resident.kinematic,
                       world->resident.kinematic_wrench, world->resident.gears, world->resident.gear_force,
                       world->resident.tables, world->resident.dirty, world->resident.updates, world->resident.held,
-                      world->resident.joints, world->resident.memory, world->resident.joint_slots,
+                      world->resident.joints, world->resident.memory, world->step_joints,
                       world->resident.solution, world->resident.dirty_joints,
                       world->resident.coupling_memory, world->query.prelude, world->query.hits,
                       world->query.slots, world->query.spare};

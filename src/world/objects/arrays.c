@@ -11,6 +11,7 @@
 #include "coupling.h"
 #include "joint.h"
 #include "world/resident/resident.h"
+#include "world/state/ids.h"
 
 enum owner { OF_BODY, OF_JOINT, OF_COUPLING };
 enum { MOST_COLUMNS = 13 };
@@ -25,11 +26,6 @@ struct array_kind {
 };
 
 /* ---- bodies ------------------------------------------------------------------------------------------------------ */
-
-static sadmm_body_id body_id(const sadmm_world *world, size_t slot)
-{
-    return (sadmm_body_id){(uint32_t)slot + 1, world->bodies[slot].generation};
-}
 
 static bool dynamic(const sadmm_world *world, size_t slot) { return world->bodies[slot].type == SADMM_BODY_DYNAMIC; }
 
@@ -71,7 +67,7 @@ static sadmm_status set_state(sadmm_world *world, size_t slot, const double *row
     store_motion(&body->rigid, now);
     /* Such a body is part of what a backend was given once. */
     if (body->type == SADMM_BODY_STATIC && memcmp(now, row, sizeof now) == 0) return SADMM_OK;
-    return sadmm_world_set_body_state(world, body_id(world, slot), &state);
+    return sadmm_world_set_body_state(world, sadmm_world_body_id(world, slot), &state);
 }
 
 static sadmm_status get_wrench(sadmm_world *world, size_t slot, double *row)
@@ -99,7 +95,8 @@ static sadmm_status check_wrench(const sadmm_world *world, size_t slot, const do
 
 static sadmm_status set_wrench(sadmm_world *world, size_t slot, const double *row)
 {
-    return dynamic(world, slot) ? sadmm_world_set_body_wrench(world, body_id(world, slot), row, row + 3) : SADMM_OK;
+    return dynamic(world, slot) ? sadmm_world_set_body_wrench(world, sadmm_world_body_id(world, slot), row, row + 3)
+                                : SADMM_OK;
 }
 
 static sadmm_status get_contact_wrench(sadmm_world *world, size_t slot, double *row)
@@ -128,65 +125,56 @@ static sadmm_status check_inertia(const sadmm_world *world, size_t slot, const d
 
 static sadmm_status set_inertia(sadmm_world *world, size_t slot, const double *row)
 {
-    return dynamic(world, slot) ? sadmm_world_set_body_mass(world, body_id(world, slot), row[0], row + 1) : SADMM_OK;
+    return dynamic(world, slot) ? sadmm_world_set_body_mass(world, sadmm_world_body_id(world, slot), row[0], row + 1)
+                                : SADMM_OK;
 }
 
 /* ---- joints ------------------------------------------------------------------------------------------------------ */
 
-static sadmm_joint_id joint_id(const sadmm_world *world, size_t slot)
-{
-    return (sadmm_joint_id){(uint32_t)slot + 1, world->joints[slot].generation};
-}
-
-#define GET_OF_JOINT(name, member)                                                     \
-    static sadmm_status name(sadmm_world *world, size_t slot, double *row)             \
-    {                                                                                  \
-        sadmm_joint_state state;                                                       \
-        TRY(sadmm_world_joint_state(world, joint_id(world, slot), &state));            \
-        memcpy(row, state.member, sizeof state.member);                                \
-        return SADMM_OK;                                                               \
+#define GET_OF_JOINT(name, member)                                                      \
+    static sadmm_status name(sadmm_world *world, size_t slot, double *row)              \
+    {                                                                                   \
+        sadmm_joint_state state;                                                        \
+        TRY(sadmm_world_joint_state(world, sadmm_world_joint_id(world, slot), &state)); \
+        memcpy(row, state.member, sizeof state.member);                                 \
+        return SADMM_OK;                                                                \
     }
 GET_OF_JOINT(get_joint_position, position)
 GET_OF_JOINT(get_joint_speed, speed)
 GET_OF_JOINT(get_drive_force, drive_force)
 GET_OF_JOINT(get_joint_wrench, wrench_b)
 
-#define TARGET_OF_JOINT(part, member)                                                                               \
-    static sadmm_status get_##part(sadmm_world *world, size_t slot, double *row)                                    \
-    {                                                                                                               \
-        for (int k = 0; k < JOINT_COORDINATES; ++k) row[k] = world->joints[slot].def.coordinates[k].member;         \
-        return SADMM_OK;                                                                                            \
-    }                                                                                                               \
-    static sadmm_status check_##part(const sadmm_world *world, size_t slot, const double *row,                      \
-                                     struct sadmm_error *error)                                                     \
-    {                                                                                                               \
-        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                           \
-            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                             \
-            coordinate.member = row[k];                                                                             \
-            if (row[k] == world->joints[slot].def.coordinates[k].member) continue;                                  \
-            TRY(sadmm_world_check_coordinate(&world->joints[slot], k, &coordinate, error));                         \
-        }                                                                                                           \
-        return SADMM_OK;                                                                                            \
-    }                                                                                                               \
-    static sadmm_status set_##part(sadmm_world *world, size_t slot, const double *row)                              \
-    {                                                                                                               \
-        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                           \
-            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                             \
-            if (row[k] == coordinate.member) continue;                                                              \
-            coordinate.member = row[k];                                                                             \
-            TRY(sadmm_world_set_joint_coordinate(world, joint_id(world, slot), k, &coordinate));                    \
-        }                                                                                                           \
-        return SADMM_OK;                                                                                            \
+#define TARGET_OF_JOINT(part, member)                                                                        \
+    static sadmm_status get_##part(sadmm_world *world, size_t slot, double *row)                             \
+    {                                                                                                        \
+        for (int k = 0; k < JOINT_COORDINATES; ++k) row[k] = world->joints[slot].def.coordinates[k].member;  \
+        return SADMM_OK;                                                                                     \
+    }                                                                                                        \
+    static sadmm_status check_##part(const sadmm_world *world, size_t slot, const double *row,               \
+                                     struct sadmm_error *error)                                              \
+    {                                                                                                        \
+        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                    \
+            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                      \
+            coordinate.member = row[k];                                                                      \
+            if (row[k] == world->joints[slot].def.coordinates[k].member) continue;                           \
+            TRY(sadmm_world_check_coordinate(&world->joints[slot], k, &coordinate, error));                  \
+        }                                                                                                    \
+        return SADMM_OK;                                                                                     \
+    }                                                                                                        \
+    static sadmm_status set_##part(sadmm_world *world, size_t slot, const double *row)                       \
+    {                                                                                                        \
+        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                    \
+            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                      \
+            if (row[k] == coordinate.member) continue;                                                       \
+            coordinate.member = row[k];                                                                      \
+            TRY(sadmm_world_set_joint_coordinate(world, sadmm_world_joint_id(world, slot), k, &coordinate)); \
+        }                                                                                                    \
+        return SADMM_OK;                                                                                     \
     }
 TARGET_OF_JOINT(target_position, target_position)
 TARGET_OF_JOINT(target_speed, target_speed)
 
 /* ---- couplings --------------------------------------------------------------------------------------------------- */
-
-static sadmm_coupling_id coupling_id(const sadmm_world *world, size_t slot)
-{
-    return (sadmm_coupling_id){(uint32_t)slot + 1, world->couplings[slot].generation};
-}
 
 static sadmm_status get_target(sadmm_world *world, size_t slot, double *row)
 {
@@ -204,7 +192,7 @@ static sadmm_status check_target(const sadmm_world *world, size_t slot, const do
 
 static sadmm_status set_target(sadmm_world *world, size_t slot, const double *row)
 {
-    return sadmm_world_set_coupling_target(world, coupling_id(world, slot), row, row + 3, row + 7);
+    return sadmm_world_set_coupling_target(world, sadmm_world_coupling_id(world, slot), row, row + 3, row + 7);
 }
 
 static sadmm_status get_reaction(sadmm_world *world, size_t slot, double *row)
@@ -239,32 +227,17 @@ static const struct array_kind *kind_of(sadmm_array array)
 int32_t sadmm_array_columns(sadmm_array array) { return kind_of(array) ? kind_of(array)->columns : 0; }
 bool sadmm_array_is_settable(sadmm_array array) { return kind_of(array) && kind_of(array)->set; }
 
+static const struct sadmm_id_pool *ids_of(const sadmm_world *world, const struct array_kind *kind)
+{
+    return kind->owner == OF_BODY    ? &world->body_ids
+           : kind->owner == OF_JOINT ? &world->joint_ids
+                                     : &world->coupling_ids;
+}
+
 int32_t sadmm_world_array_rows(const sadmm_world *world, sadmm_array array)
 {
     const struct array_kind *kind = kind_of(array);
-    if (!kind) return 0;
-    return kind->owner == OF_BODY ? sadmm_world_body_count(world)
-         : kind->owner == OF_JOINT ? sadmm_world_joint_count(world) : sadmm_world_coupling_count(world);
-}
-
-static bool alive(const sadmm_world *world, enum owner owner, size_t slot)
-{
-    return owner == OF_BODY    ? world->bodies[slot].alive
-           : owner == OF_JOINT ? world->joints[slot].alive && !world->joints[slot].coupling
-                               : world->couplings[slot].alive;
-}
-
-/* Slot of the first row. */
-static sadmm_status first_slot(sadmm_world *world, enum owner owner, int32_t row, size_t *slot)
-{
-    sadmm_body_id body = {1, 0};
-    sadmm_joint_id joint = {1, 0};
-    sadmm_coupling_id coupling = {1, 0};
-    if (owner == OF_BODY) TRY(sadmm_world_body_at(world, row, &body));
-    if (owner == OF_JOINT) TRY(sadmm_world_joint_at(world, row, &joint));
-    if (owner == OF_COUPLING) TRY(sadmm_world_coupling_at(world, row, &coupling));
-    *slot = (owner == OF_BODY ? body.slot : owner == OF_JOINT ? joint.slot : coupling.slot) - 1;
-    return SADMM_OK;
+    return kind && world ? ids_of(world, kind)->count : 0;
 }
 
 /* The array, its range and its numbers, and all that is needed from a device. */
@@ -288,13 +261,10 @@ sadmm_status sadmm_world_get_array(sadmm_world *world, sadmm_array array, int32_
     TRY(sadmm_check_given(world, "world", NULL));
     TRY(begin(world, array, first, count, values));
     const struct array_kind *kind = &kinds[array];
-    size_t slot = 0;
-    if (count > 0) TRY(first_slot(world, kind->owner, first, &slot));
-    for (int32_t row = 0; row < count; ++slot) {
-        if (!alive(world, kind->owner, slot)) continue;
+    const struct sadmm_id_pool *ids = ids_of(world, kind);
+    size_t slot = count > 0 ? sadmm_ids_at(ids, first) : 0;
+    for (int32_t row = 0; row < count; ++row, slot = sadmm_ids_from(ids, slot + 1))
         TRY(kind->get(world, slot, values + (size_t)row * (size_t)kind->columns));
-        ++row;
-    }
     return SADMM_OK;
 }
 
@@ -311,20 +281,17 @@ sadmm_status sadmm_world_set_array(sadmm_world *world, sadmm_array array, int32_
     TRY(sadmm_check_given(world, "world", NULL));
     TRY(begin(world, array, first, count, values));
     const struct array_kind *kind = &kinds[array];
-    size_t begin_slot = 0;
+    const struct sadmm_id_pool *ids = ids_of(world, kind);
     if (!kind->set)
         return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "array = %d: must be one that can be set",
                           (int)array);
-    if (count > 0) TRY(first_slot(world, kind->owner, first, &begin_slot));
     for (int setting = 0; setting < 2; ++setting) {
-        size_t slot = begin_slot;
-        for (int32_t row = 0; row < count; ++slot) {
-            if (!alive(world, kind->owner, slot)) continue;
+        size_t slot = count > 0 ? sadmm_ids_at(ids, first) : 0;
+        for (int32_t row = 0; row < count; ++row, slot = sadmm_ids_from(ids, slot + 1)) {
             const double *given = values + (size_t)row * (size_t)kind->columns;
             const sadmm_status status =
                 setting ? kind->set(world, slot, given) : kind->check(world, slot, given, &world->error);
             if (status != SADMM_OK) return fail_row(world, row, status);
-            ++row;
         }
     }
     return SADMM_OK;
@@ -379,8 +346,7 @@ sadmm_status sadmm_world_dynamic_bodies(sadmm_world *world, int32_t *indices, in
                           "capacity = %d: must be at least %d, the number of dynamic bodies", capacity,
                           world->dynamic_count);
     int32_t index = 0;
-    for (size_t slot = 0; slot < world->body_slots; ++slot) {
-        if (!world->bodies[slot].alive) continue;
+    for (SADMM_OBJECTS(slot, &world->body_ids)) {
         if (dynamic(world, slot)) *indices++ = index;
         ++index;
     }

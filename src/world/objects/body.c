@@ -7,9 +7,9 @@
 #include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "core/base/utf8.h"
+#include "coupling.h"
 #include "joint_slots.h"
 #include "shape.h"
-#include "subadmm/arrays.h"
 #include "world/resident/resident.h"
 #include "world/state/ids.h"
 #include "world/step/kinematic.h"
@@ -42,22 +42,17 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *give
     const sadmm_body_def *const def = &taken;
     double orientation[4];
     char *name;
+    size_t slot;
     TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
     TRY(sadmm_check_given(id, "id", error));
     TRY(sadmm_world_check_body_def(def, world->def.precision, orientation, error));
     TRY(sadmm_world_detach(world));
-    const size_t slot = sadmm_slots_free(&world->bodies_taken);
-    if (slot >= (size_t)1 << 27)
-        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: a world holds at most 2^27", world->body_count);
-    if (!SADMM_GROW(world->bodies, world->body_slots, slot + 1) || !sadmm_slots_reserve(&world->bodies_taken, slot + 1))
-        return sadmm_fail_memory(error, "a body");
+    TRY(sadmm_ids_next(&world->body_ids, &slot, error));
+    if (!SADMM_GROW(world->bodies, world->body_ids.slots, slot + 1)) return sadmm_fail_memory(error, "a body");
     TRY(copy_name(def->name, &name, error));
 
     struct sadmm_world_body *body = &world->bodies[slot];
-    uint32_t generation = slot < world->body_slots ? body->generation : 1;
     memset(body, 0, sizeof *body);
-    body->alive = true;
-    body->generation = generation;
     body->type = def->type;
     body->environment = def->environment;
     body->system_body = -1;
@@ -75,12 +70,9 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *give
     memcpy(rigid->velocity, def->linear_velocity, sizeof def->linear_velocity);
     memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
     body->name = name;
-    if (slot == world->body_slots) ++world->body_slots;
-    sadmm_slots_take(&world->bodies_taken, slot);
-    ++world->body_count;
+    sadmm_ids_take(&world->body_ids, slot);
     if (def->type == SADMM_BODY_KINEMATIC) sadmm_world_count_kinematic(world, 1);
-    id->slot = (uint32_t)slot + 1;
-    id->generation = generation;
+    *id = sadmm_world_body_id(world, slot);
     return SADMM_OK;
 }
 
@@ -92,39 +84,14 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     TRY(sadmm_world_detach(world));
     while (body->first_shape) sadmm_world_kill_shape(world, body->first_shape - 1);
     sadmm_world_kill_joints_of(world, (int32_t)id.slot - 1);
+    sadmm_world_kill_couplings_of(world, (int32_t)id.slot - 1);
     sadmm_pair_table_forget(&world->disabled_pairs, id.slot - 1);
     sadmm_free(body->name);
     body->name = NULL;
-    body->alive = false;
-    ++body->generation;
-    --world->body_count;
-    sadmm_slots_release(&world->bodies_taken, id.slot - 1);
+    sadmm_ids_release(&world->body_ids, id.slot - 1);
     if (body->type == SADMM_BODY_DYNAMIC) --world->dynamic_count;
     if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_count_kinematic(world, -1);
     world->contacts_readable = false;
-    return SADMM_OK;
-}
-
-int32_t sadmm_world_body_count(const sadmm_world *world)
-{
-    return world ? world->body_count : 0;
-}
-
-sadmm_status sadmm_world_body_at(sadmm_world *world, int32_t index, sadmm_body_id *id)
-{
-    size_t slot;
-    TRY(sadmm_check_given(world, "world", NULL));
-    TRY(sadmm_world_slot_at(&world->bodies_taken, world->body_count, index, id, &slot, &world->error));
-    *id = sadmm_world_body_id(world, (int32_t)slot);
-    return SADMM_OK;
-}
-
-sadmm_status sadmm_world_body_index(sadmm_world *world, sadmm_body_id id, int32_t *index)
-{
-    TRY(sadmm_check_given(world, "world", NULL));
-    if (!sadmm_world_find_body(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(index, "index", &world->error));
-    *index = sadmm_slots_index(&world->bodies_taken, id.slot - 1);
     return SADMM_OK;
 }
 
@@ -165,40 +132,4 @@ void *sadmm_world_body_user_data(const sadmm_world *world, sadmm_body_id id)
     struct sadmm_error ignored;
     const struct sadmm_world_body *body = world ? sadmm_world_find_body(world, id, "id", &ignored) : NULL;
     return body ? body->user_data : NULL;
-}
-
-sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id a, sadmm_body_id b, bool enabled)
-{
-    TRY(sadmm_check_given(world, "world", NULL));
-    struct sadmm_error *error = &world->error;
-    if (!sadmm_world_find_body(world, a, "a", error) || !sadmm_world_find_body(world, b, "b", error))
-        return SADMM_ERROR_STALE_ID;
-    if (a.slot == b.slot) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "a and b are the same body");
-    TRY(sadmm_world_detach(world));
-    uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
-    if (!enabled) return sadmm_pair_table_set(&world->disabled_pairs, key, 0, error);
-    sadmm_pair_table_remove(&world->disabled_pairs, key);
-    return SADMM_OK;
-}
-
-int32_t sadmm_world_body_pair_off_count(const sadmm_world *world)
-{
-    return world ? (int32_t)sadmm_pair_table_count(&world->disabled_pairs) : 0;
-}
-
-sadmm_status sadmm_world_body_pair_off_at(sadmm_world *world, int32_t index, sadmm_body_id *a, sadmm_body_id *b)
-{
-    TRY(sadmm_check_given(world, "world", NULL));
-    struct sadmm_error *error = &world->error;
-    TRY(sadmm_check_given(a, "a", error));
-    TRY(sadmm_check_given(b, "b", error));
-    const size_t count = sadmm_pair_table_count(&world->disabled_pairs);
-    double ignored;
-    if (index < 0 || (size_t)index >= count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %zu)", index, count);
-    const uint64_t key = sadmm_pair_table_at(&world->disabled_pairs, (size_t)index, &ignored);
-    const uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
-    *a = (sadmm_body_id){low + 1, world->bodies[low].generation};
-    *b = (sadmm_body_id){high + 1, world->bodies[high].generation};
-    return SADMM_OK;
 }

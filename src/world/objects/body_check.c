@@ -30,11 +30,12 @@ static sadmm_status check_inertia_ratio(const char *name, const double inertia[3
 
 sadmm_status sadmm_world_check_inertias(sadmm_world *world, sadmm_precision precision)
 {
-    for (size_t slot = 0; slot < world->body_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->body_ids)) {
         const struct sadmm_world_body *body = &world->bodies[slot];
         char name[96];
-        if (!body->alive || body->type != SADMM_BODY_DYNAMIC) continue;
-        snprintf(name, sizeof name, "inertia of body (slot %zu, generation %u)", slot + 1, body->generation);
+        if (body->type != SADMM_BODY_DYNAMIC) continue;
+        snprintf(name, sizeof name, "inertia of body (slot %zu, generation %u)", slot + 1,
+                 world->body_ids.generations[slot]);
         TRY(check_inertia_ratio(name, body->rigid.inertia, precision, &world->error));
     }
     return SADMM_OK;

@@ -67,10 +67,10 @@ double sadmm_world_contact_speed(const sadmm_world *world, const struct sadmm_co
 static void read_common(const sadmm_world *world, int32_t shape_a, int32_t shape_b, const double normal[3],
                         const double impulse[3], double dt, sadmm_contact *out)
 {
-    out->shape_a = sadmm_world_shape_id(world, shape_a);
-    out->shape_b = sadmm_world_shape_id(world, shape_b);
-    out->body_a = sadmm_world_body_id(world, world->shapes[shape_a].body);
-    out->body_b = sadmm_world_body_id(world, world->shapes[shape_b].body);
+    out->shape_a = sadmm_world_shape_id(world, (size_t)shape_a);
+    out->shape_b = sadmm_world_shape_id(world, (size_t)shape_b);
+    out->body_a = sadmm_world_body_of(world, shape_a);
+    out->body_b = sadmm_world_body_of(world, shape_b);
     for (int k = 0; k < 3; ++k) {
         out->normal[k] = normal[k];
         out->impulse[k] = impulse[k];

@@ -1,5 +1,5 @@
-/* Couplings of a world: what callers see of them, and change. Each has a joint slot that callers do not see, from its
- * target to the frame on the body, whose six coordinates have position drives: its gains and limits. */
+/* Couplings of a world: what callers see of them, and change. In a step a coupling acts as a joint from its target to
+ * the frame on the body would whose six coordinates have position drives: its gains and limits. */
 #include "subadmm/coupling.h"
 
 #include <math.h>
@@ -12,8 +12,6 @@
 #include "core/math/rigid.h"
 #include "coupling.h"
 #include "joint.h"
-#include "joint_slots.h"
-#include "subadmm/arrays.h"
 #include "world/resident/resident.h"
 #include "world/state/ids.h"
 
@@ -23,11 +21,6 @@ static const struct sadmm_growing growing = SADMM_GROWING(sadmm_coupling_def, &d
 void sadmm_coupling_def_init(sadmm_coupling_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
 
 /* ---- checks ------------------------------------------------------------------------------------------------------ */
-
-sadmm_status sadmm_world_check_coupling(const sadmm_coupling_def *def, struct sadmm_error *error)
-{
-    return sadmm_fields_check(sadmm_coupling_table, SADMM_COUPLING_FIELDS_COUNT, def, "def->", error);
-}
 
 /* Gains and limits, under their own names. */
 static sadmm_status check_numbers(const sadmm_coupling_def *def, struct sadmm_error *error)
@@ -48,21 +41,15 @@ sadmm_status sadmm_world_check_target(const double position[3], const double ori
     return SADMM_OK;
 }
 
-static sadmm_status check_def(const sadmm_world *world, const sadmm_coupling_def *def, struct joint_frame *frame,
-                              struct sadmm_rigid *target, struct sadmm_error *error)
+static sadmm_status check_def(const sadmm_world *world, const sadmm_coupling_def *def, struct sadmm_error *error)
 {
     const struct sadmm_world_body *body = sadmm_world_find_body(world, def->body, "def->body", error);
-    double unit[4];
     if (!body) return SADMM_ERROR_STALE_ID;
     if (body->type != SADMM_BODY_DYNAMIC)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "def->body = (slot %u, generation %u): must be dynamic, it is %s", def->body.slot,
                           def->body.generation, sadmm_body_type_names[body->type]);
-    TRY(sadmm_world_check_coupling(def, error));
-    TRY(sadmm_check_orientation("def->orientation", def->orientation, unit, error));
-    frame->position = v3_load(def->position);
-    frame->orientation = q_load(unit);
-    return sadmm_world_check_target(def->target_position, def->target_orientation, def->target_velocity, target, error);
+    return sadmm_fields_check(sadmm_coupling_table, SADMM_COUPLING_FIELDS_COUNT, def, "def->", error);
 }
 
 /* ---- life -------------------------------------------------------------------------------------------------------- */
@@ -80,75 +67,83 @@ static void set_drives(sadmm_joint_def *joint, const sadmm_coupling_def *def)
     }
 }
 
-static struct sadmm_world_joint joint_of(const sadmm_coupling_def *def, struct joint_frame frame, size_t coupling)
+static void set_joint(struct sadmm_world_coupling *coupling)
 {
-    struct sadmm_world_joint joint = {.alive = true,
-                                      .coupling = (int32_t)coupling + 1,
-                                      .def = sadmm_joint_def_default(),
-                                      .body = {-1, (int32_t)def->body.slot - 1},
-                                      .frame = {{.orientation = {1, 0, 0, 0}}, frame}};
-    joint.def.kind = SADMM_JOINT_CUSTOM;
-    joint.def.body_b = def->body;
-    set_drives(&joint.def, def);
-    return joint;
+    const sadmm_coupling_def *def = &coupling->def;
+    struct sadmm_world_joint *joint = &coupling->joint;
+    joint->def = sadmm_joint_def_default();
+    joint->def.kind = SADMM_JOINT_CUSTOM;
+    joint->def.body_b = def->body;
+    joint->body[0] = -1;
+    joint->body[1] = (int32_t)def->body.slot - 1;
+    joint->frame[0] = (struct joint_frame){.orientation = {1, 0, 0, 0}};
+    joint->frame[1] = (struct joint_frame){v3_load(def->position), q_load(def->orientation)};
+    set_drives(&joint->def, def);
+}
+
+sadmm_status sadmm_world_read_coupling(const sadmm_world *world, struct sadmm_world_coupling *coupling,
+                                       struct sadmm_error *error)
+{
+    TRY(check_def(world, &coupling->def, error));
+    set_joint(coupling);
+    return SADMM_OK;
+}
+
+static struct sadmm_link *link_at(sadmm_world *world, uint32_t name)
+{
+    return &world->couplings[name - 1].joint.on_body[1];
+}
+
+void sadmm_world_link_coupling(sadmm_world *world, size_t slot)
+{
+    struct sadmm_world_joint *joint = &world->couplings[slot].joint;
+    joint->coupling = (int32_t)slot + 1;
+    sadmm_link_add(world, link_at, &world->bodies[joint->body[1]].first_coupling, (uint32_t)slot + 1);
+}
+
+static void kill(sadmm_world *world, size_t slot)
+{
+    const int32_t body = world->couplings[slot].joint.body[1];
+    sadmm_link_remove(world, link_at, &world->bodies[body].first_coupling, (uint32_t)slot + 1);
+    sadmm_ids_release(&world->coupling_ids, slot);
+}
+
+void sadmm_world_kill_couplings_of(sadmm_world *world, int32_t body)
+{
+    const uint32_t *first = &world->bodies[body].first_coupling;
+    while (*first) kill(world, *first - 1);
 }
 
 sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_def *given, sadmm_coupling_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
-    struct sadmm_world_coupling made = {.alive = true, .generation = 1};
-    struct joint_frame frame = {.orientation = {1, 0, 0, 0}};
-    sadmm_coupling_def taken;
-    const sadmm_coupling_def *const def = &taken;
-    TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
-    TRY(check_def(world, def, &frame, &made.last.target, error));
+    struct sadmm_world_coupling made = {.joint = {.coupling = 0}};
+    sadmm_coupling_def *const def = &made.def;
+    size_t slot;
+    TRY(sadmm_growing_take(&growing, def, given, "def", error));
+    TRY(check_def(world, def, error));
+    TRY(sadmm_check_orientation("def->orientation", def->orientation, def->orientation, error));
+    TRY(sadmm_world_check_target(def->target_position, def->target_orientation, def->target_velocity, &made.last.target,
+                                 error));
+    set_joint(&made);
     TRY(sadmm_world_detach(world));
-    made.def = *def;
-    q_store(frame.orientation, made.def.orientation);
-    const size_t slot = sadmm_slots_free(&world->couplings_taken);
-    if (!SADMM_GROW(world->couplings, world->coupling_slots, slot + 1) ||
-        !sadmm_slots_reserve(&world->couplings_taken, slot + 1))
+    TRY(sadmm_ids_next(&world->coupling_ids, &slot, error));
+    if (!SADMM_GROW(world->couplings, world->coupling_ids.slots, slot + 1))
         return sadmm_fail_memory(error, "a coupling");
-    const struct sadmm_world_joint joint = joint_of(&made.def, frame, slot);
-    TRY(sadmm_world_insert_joint(world, &joint, &made.joint));
-
-    if (slot < world->coupling_slots) made.generation = world->couplings[slot].generation;
-    else ++world->coupling_slots;
+    sadmm_ids_take(&world->coupling_ids, slot);
     world->couplings[slot] = made;
-    sadmm_slots_take(&world->couplings_taken, slot);
-    ++world->coupling_count;
-    if (id) *id = (sadmm_coupling_id){(uint32_t)slot + 1, made.generation};
+    sadmm_world_link_coupling(world, slot);
+    if (id) *id = sadmm_world_coupling_id(world, slot);
     return SADMM_OK;
 }
 
 sadmm_status sadmm_world_remove_coupling(sadmm_world *world, sadmm_coupling_id id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
-    const struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
-    if (!coupling) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_world_detach(world));
-    sadmm_world_kill_joint(world, coupling->joint);
-    return SADMM_OK;
-}
-
-int32_t sadmm_world_coupling_count(const sadmm_world *world) { return world ? world->coupling_count : 0; }
-
-sadmm_status sadmm_world_coupling_at(sadmm_world *world, int32_t index, sadmm_coupling_id *id)
-{
-    size_t slot;
-    TRY(sadmm_check_given(world, "world", NULL));
-    TRY(sadmm_world_slot_at(&world->couplings_taken, world->coupling_count, index, id, &slot, &world->error));
-    *id = (sadmm_coupling_id){(uint32_t)slot + 1, world->couplings[slot].generation};
-    return SADMM_OK;
-}
-
-sadmm_status sadmm_world_coupling_index(sadmm_world *world, sadmm_coupling_id id, int32_t *index)
-{
-    TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_coupling(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(index, "index", &world->error));
-    *index = sadmm_slots_index(&world->couplings_taken, id.slot - 1);
+    TRY(sadmm_world_detach(world));
+    kill(world, id.slot - 1);
     return SADMM_OK;
 }
 
@@ -182,7 +177,7 @@ sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_
     TRY(sadmm_check_given(orientation, "orientation", error));
     TRY(sadmm_world_check_target(position, orientation, velocity, &target, error));
     coupling->last.target = target;
-    return sadmm_world_take_update(world, &world->joints[coupling->joint], SADMM_JOINT_TARGET);
+    return sadmm_world_take_update(world, &coupling->joint, SADMM_JOINT_TARGET);
 }
 
 /* Gains, limits and whether it acts: those of `def` from here on. */
@@ -190,10 +185,9 @@ static sadmm_status change(sadmm_world *world, struct sadmm_world_coupling *coup
 {
     TRY(check_numbers(def, &world->error));
     coupling->def = *def;
-    struct sadmm_world_joint *joint = &world->joints[coupling->joint];
-    set_drives(&joint->def, def);
+    set_drives(&coupling->joint.def, def);
     for (int k = 0; k <= SADMM_JOINT_ENABLED; ++k)
-        TRY(sadmm_world_take_update(world, joint, (enum sadmm_joint_update)k));
+        TRY(sadmm_world_take_update(world, &coupling->joint, (enum sadmm_joint_update)k));
     return SADMM_OK;
 }
 
@@ -244,7 +238,7 @@ sadmm_status sadmm_world_coupling_state(sadmm_world *world, sadmm_coupling_id id
     TRY(sadmm_world_download_bodies(world));
     TRY(sadmm_world_download_joints(world));
     const struct sadmm_coupling_memory *last = &coupling->last;
-    const struct sadmm_world_joint *joint = &world->joints[coupling->joint];
+    const struct sadmm_world_joint *joint = &coupling->joint;
     const struct joint_end end = joint_end_on(&joint->frame[1], &world->bodies[joint->body[1]].rigid);
     memcpy(state->reaction_force, last->reaction, sizeof state->reaction_force);
     memcpy(state->reaction_torque, last->reaction + 3, sizeof state->reaction_torque);

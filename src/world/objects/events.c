@@ -93,9 +93,9 @@ static sadmm_event *push(sadmm_world *world, sadmm_event_type type, const struct
 static bool add(sadmm_world *world, struct sadmm_touches *touches, int32_t a, int32_t b, size_t pair)
 {
     if (!SADMM_GROW(touches->list, touches->count, touches->count + 1)) return false;
-    touches->list[touches->count++] = (struct sadmm_touch){
-        sadmm_world_shape_id(world, a), sadmm_world_shape_id(world, b),
-        sadmm_world_body_id(world, world->shapes[a].body), sadmm_world_body_id(world, world->shapes[b].body), pair};
+    touches->list[touches->count++] =
+        (struct sadmm_touch){sadmm_world_shape_id(world, (size_t)a), sadmm_world_shape_id(world, (size_t)b),
+                             sadmm_world_body_of(world, a), sadmm_world_body_of(world, b), pair};
     return true;
 }
 
@@ -159,9 +159,9 @@ static sadmm_status list_inside(sadmm_world *world)
 {
     world->events.inside_now.count = 0;
     if (world->sensor_count == 0) return SADMM_OK;
-    for (size_t slot = 0; slot < world->shape_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->shape_ids)) {
         size_t seen;
-        if (!world->shapes[slot].alive || !world->shapes[slot].sensor) continue;
+        if (!world->shapes[slot].sensor) continue;
         TRY(sadmm_world_list_seen(world, slot, &seen));
         for (size_t k = 0; k < seen; ++k)
             if (!add(world, &world->events.inside_now, (int32_t)slot, (int32_t)world->query.slots[k], 0))

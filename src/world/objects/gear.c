@@ -16,7 +16,6 @@
 #include "world/step/gear_rows.h"
 
 static const double RATIO_LEAST = 1e-9, RATIO_MOST = 1e9;
-enum { MOST_GEARS = 1 << 24 };
 
 static const sadmm_gear_def defaults = {SADMM_GEAR_FIELDS(SADMM_FIELD_DEFAULT, )};
 static const struct sadmm_growing growing = SADMM_GROWING(sadmm_gear_def, &defaults, enabled);
@@ -58,8 +57,9 @@ static int count_bodies(const sadmm_world *world, const struct sadmm_world_joint
     return count;
 }
 
-sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_def *def, struct sadmm_error *error)
+sadmm_status sadmm_world_read_gear(const sadmm_world *world, struct sadmm_world_gear *gear, struct sadmm_error *error)
 {
+    const sadmm_gear_def *def = &gear->def;
     const struct sadmm_world_joint *const joints[2] = {
         sadmm_world_find_joint(world, def->joint_1, "def->joint_1", error),
         sadmm_world_find_joint(world, def->joint_2, "def->joint_2", error)};
@@ -81,6 +81,8 @@ sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_d
             "def->joint_1, def->joint_2: between %d dynamic bodies, must be 2 at most, or 3 of which one is "
             "of both joints",
             bodies);
+    gear->joint[0] = def->joint_1.slot - 1;
+    gear->joint[1] = def->joint_2.slot - 1;
     return SADMM_OK;
 }
 
@@ -99,35 +101,26 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *give
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
-    struct sadmm_world_gear made = {.alive = true, .generation = 1};
-    sadmm_gear_def taken;
-    const sadmm_gear_def *const def = &taken;
-    TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
-    TRY(sadmm_world_check_gear(world, def, error));
+    struct sadmm_world_gear made = {.acts = false};
+    size_t slot;
+    TRY(sadmm_growing_take(&growing, &made.def, given, "def", error));
+    TRY(sadmm_world_read_gear(world, &made, error));
     TRY(sadmm_world_detach(world));
-    made.def = *def;
-    made.joint[0] = def->joint_1.slot - 1;
-    made.joint[1] = def->joint_2.slot - 1;
     if (!sadmm_world_gear_reaches(world, &made))
         return sadmm_fail(
             error, SADMM_ERROR_INVALID_ARGUMENT,
             "def->joint_1, def->joint_2: on a dynamic body, with the same axis or the same direction: no force "
             "between the other two bodies moves both (a wheel in between, with two gears, does)");
-    if (isnan(def->offset)) {
-        TRY(measure(world, def, &made.def.offset));
+    if (isnan(made.def.offset)) {
+        TRY(measure(world, &made.def, &made.def.offset));
         TRY(check_offset("def->offset (NaN: as it is)", made.def.offset, error));
     }
-    const size_t slot = sadmm_slots_free(&world->gears_taken);
-    if (slot >= MOST_GEARS)
-        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d gears: a world holds at most 2^24", world->gear_count);
-    if (!SADMM_GROW(world->gears, world->gear_slots, slot + 1) || !sadmm_slots_reserve(&world->gears_taken, slot + 1))
-        return sadmm_fail_memory(error, "a gear");
-    if (slot < world->gear_slots) made.generation = world->gears[slot].generation;
-    else ++world->gear_slots;
+    TRY(sadmm_ids_next(&world->gear_ids, &slot, error));
+    if (!SADMM_GROW(world->gears, world->gear_ids.slots, slot + 1)) return sadmm_fail_memory(error, "a gear");
+    sadmm_ids_take(&world->gear_ids, slot);
     world->gears[slot] = made;
     sadmm_world_link_gear(world, slot);
-    ++world->gear_count;
-    if (id) *id = (sadmm_gear_id){(uint32_t)slot + 1, made.generation};
+    if (id) *id = sadmm_world_gear_id(world, slot);
     return SADMM_OK;
 }
 
@@ -137,17 +130,6 @@ sadmm_status sadmm_world_remove_gear(sadmm_world *world, sadmm_gear_id id)
     if (!sadmm_world_find_gear(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_world_detach(world));
     sadmm_world_kill_gear(world, id.slot - 1);
-    return SADMM_OK;
-}
-
-int32_t sadmm_world_gear_count(const sadmm_world *world) { return world ? world->gear_count : 0; }
-
-sadmm_status sadmm_world_gear_at(sadmm_world *world, int32_t index, sadmm_gear_id *id)
-{
-    size_t slot;
-    TRY(sadmm_check_given(world, "world", NULL));
-    TRY(sadmm_world_slot_at(&world->gears_taken, world->gear_count, index, id, &slot, &world->error));
-    *id = (sadmm_gear_id){(uint32_t)slot + 1, world->gears[slot].generation};
     return SADMM_OK;
 }
 

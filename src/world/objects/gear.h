@@ -4,7 +4,7 @@
 
 #include "world/state/world_state.h"
 
-/* May there be such a gear? Else INVALID_ARGUMENT, STALE_ID. */
-sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_def *def, struct sadmm_error *error);
+/* What a gear is between, by its definition. May there be such a gear? Else INVALID_ARGUMENT, STALE_ID. */
+sadmm_status sadmm_world_read_gear(const sadmm_world *world, struct sadmm_world_gear *gear, struct sadmm_error *error);
 
 #endif

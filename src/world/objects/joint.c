@@ -11,7 +11,6 @@
 #include "core/math/rigid.h"
 #include "joint.h"
 #include "joint_slots.h"
-#include "subadmm/arrays.h"
 #include "world/resident/resident.h"
 #include "world/resident/resident_joints.h"
 #include "world/state/ids.h"
@@ -113,16 +112,11 @@ static sadmm_status find_sides(const sadmm_world *world, const sadmm_joint_def *
     return SADMM_OK;
 }
 
-static sadmm_status check_frames(const sadmm_joint_def *def, struct joint_frame frames[2], struct sadmm_error *error)
+static void set_frames(struct sadmm_world_joint *joint)
 {
-    for (int s = 0; s < 2; ++s) {
-        double unit[4];
-        TRY(sadmm_check_orientation(s ? "def->orientation_b" : "def->orientation_a",
-                                    s ? def->orientation_b : def->orientation_a, unit, error));
-        frames[s].position = v3_load(s ? def->position_b : def->position_a);
-        frames[s].orientation = q_load(unit);
-    }
-    return SADMM_OK;
+    const sadmm_joint_def *def = &joint->def;
+    joint->frame[0] = (struct joint_frame){v3_load(def->position_a), q_load(def->orientation_a)};
+    joint->frame[1] = (struct joint_frame){v3_load(def->position_b), q_load(def->orientation_b)};
 }
 
 static sadmm_status check_length(const char *name, double length, struct sadmm_error *error)
@@ -142,13 +136,16 @@ static sadmm_status check_def(const sadmm_joint_def *def, uint32_t *locks, struc
     return check_coordinates(def, *locks, error);
 }
 
-sadmm_status sadmm_world_check_joint_def(const sadmm_joint_def *def, struct sadmm_error *error)
+sadmm_status sadmm_world_read_joint(const sadmm_world *world, struct sadmm_world_joint *joint,
+                                    struct sadmm_error *error)
 {
     uint32_t locks = 0;
-    TRY(check_def(def, &locks, error));
-    return locks == def->locks ? SADMM_OK
-                               : sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                                            "def->locks = %u: must be %u, by its kind", def->locks, locks);
+    TRY(check_def(&joint->def, &locks, error));
+    if (locks != joint->def.locks)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->locks = %u: must be %u, by its kind",
+                          joint->def.locks, locks);
+    set_frames(joint);
+    return find_sides(world, &joint->def, joint->body, error);
 }
 
 /* ---- life -------------------------------------------------------------------------------------------------------- */
@@ -169,7 +166,7 @@ sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *gi
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
-    struct sadmm_world_joint made = {.alive = true};
+    struct sadmm_world_joint made = {.coupling = 0};
     sadmm_joint_def taken;
     const sadmm_joint_def *const def = &taken;
     size_t slot;
@@ -177,19 +174,16 @@ sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *gi
     made.def = *def;
     TRY(check_def(def, &made.def.locks, error));
     TRY(find_sides(world, def, made.body, error));
-    TRY(check_frames(def, made.frame, error));
+    TRY(sadmm_check_orientation("def->orientation_a", def->orientation_a, made.def.orientation_a, error));
+    TRY(sadmm_check_orientation("def->orientation_b", def->orientation_b, made.def.orientation_b, error));
     TRY(sadmm_world_detach(world));
-    q_store(made.frame[0].orientation, made.def.orientation_a);
-    q_store(made.frame[1].orientation, made.def.orientation_b);
+    set_frames(&made);
     if (def->length == -1 && joint_is_radial(def->kind)) {
         made.def.length = geometry_now(world, &made).value[0];
         TRY(check_length("def->length (-1: as it is)", made.def.length, error));
     }
     TRY(sadmm_world_insert_joint(world, &made, &slot));
-    if (id) {
-        id->slot = (uint32_t)slot + 1;
-        id->generation = world->joints[slot].generation;
-    }
+    if (id) *id = sadmm_world_joint_id(world, slot);
     return SADMM_OK;
 }
 
@@ -199,29 +193,6 @@ sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_id id)
     if (!sadmm_world_find_joint(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_world_detach(world));
     sadmm_world_kill_joint(world, id.slot - 1);
-    return SADMM_OK;
-}
-
-int32_t sadmm_world_joint_count(const sadmm_world *world)
-{
-    return world ? world->joint_count - world->coupling_count : 0;
-}
-
-sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint_id *id)
-{
-    size_t slot;
-    TRY(sadmm_check_given(world, "world", NULL));
-    TRY(sadmm_world_slot_at(&world->own_joints, sadmm_world_joint_count(world), index, id, &slot, &world->error));
-    *id = (sadmm_joint_id){(uint32_t)slot + 1, world->joints[slot].generation};
-    return SADMM_OK;
-}
-
-sadmm_status sadmm_world_joint_index(sadmm_world *world, sadmm_joint_id id, int32_t *index)
-{
-    TRY(sadmm_check_given(world, "world", NULL));
-    if (!sadmm_world_find_joint(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(index, "index", &world->error));
-    *index = sadmm_slots_index(&world->own_joints, id.slot - 1);
     return SADMM_OK;
 }
 

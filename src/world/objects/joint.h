@@ -4,8 +4,10 @@
 
 #include "world/state/world_state.h"
 
-/* Definitions as they are kept: may they be? Else INVALID_ARGUMENT. */
-sadmm_status sadmm_world_check_joint_def(const sadmm_joint_def *def, struct sadmm_error *error);
+/* A joint's bodies and frames, by its definition as it is kept. May there be such a joint? Else INVALID_ARGUMENT,
+ * STALE_ID. */
+sadmm_status sadmm_world_read_joint(const sadmm_world *world, struct sadmm_world_joint *joint,
+                                    struct sadmm_error *error);
 sadmm_status sadmm_world_check_table(const double *positions, const double *forces, int32_t count,
                                      struct sadmm_error *error);
 /* May that be set of a joint's coordinate? Else INVALID_ARGUMENT. */

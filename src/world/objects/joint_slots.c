@@ -3,8 +3,6 @@
 #include "core/base/memory.h"
 #include "world/state/ids.h"
 
-enum { MOST_JOINTS = 1 << 24 };
-
 /* The pair that does not meet for this joint. */
 static bool leaves_out(const struct sadmm_world_joint *joint, uint64_t *key)
 {
@@ -27,22 +25,6 @@ static void remove_pair(sadmm_world *world, const struct sadmm_world_joint *join
     if (leaves_out(joint, &key)) sadmm_pair_table_lower(&world->jointed_pairs, key);
 }
 
-bool sadmm_world_reserve_joints(sadmm_world *world, size_t slots)
-{
-    return SADMM_GROW(world->joints, world->joint_slots, slots) && sadmm_slots_reserve(&world->joints_taken, slots) &&
-           sadmm_slots_reserve(&world->own_joints, slots);
-}
-
-static sadmm_status new_slot(sadmm_world *world, size_t *slot)
-{
-    *slot = sadmm_slots_free(&world->joints_taken);
-    if (*slot >= MOST_JOINTS)
-        return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d joints and couplings: a world holds at most 2^24",
-                          world->joint_count);
-    if (!sadmm_world_reserve_joints(world, *slot + 1)) return sadmm_fail_memory(&world->error, "a joint");
-    return SADMM_OK;
-}
-
 static struct sadmm_link *joint_link(sadmm_world *world, uint32_t name)
 {
     return &world->joints[(name - 1) / 2].on_body[(name - 1) % 2];
@@ -58,8 +40,6 @@ static uint32_t link_name(size_t slot, int side) { return 2 * (uint32_t)slot + (
 void sadmm_world_link_joint(sadmm_world *world, size_t slot)
 {
     const struct sadmm_world_joint *joint = &world->joints[slot];
-    sadmm_slots_take(&world->joints_taken, slot);
-    if (!joint->coupling) sadmm_slots_take(&world->own_joints, slot);
     for (int s = 0; s < 2; ++s)
         if (joint->body[s] >= 0)
             sadmm_link_add(world, joint_link, &world->bodies[joint->body[s]].first_joint, link_name(slot, s));
@@ -68,8 +48,6 @@ void sadmm_world_link_joint(sadmm_world *world, size_t slot)
 static void unlink_joint(sadmm_world *world, size_t slot)
 {
     const struct sadmm_world_joint *joint = &world->joints[slot];
-    sadmm_slots_release(&world->joints_taken, slot);
-    if (!joint->coupling) sadmm_slots_release(&world->own_joints, slot);
     for (int s = 0; s < 2; ++s)
         if (joint->body[s] >= 0)
             sadmm_link_remove(world, joint_link, &world->bodies[joint->body[s]].first_joint, link_name(slot, s));
@@ -77,32 +55,20 @@ static void unlink_joint(sadmm_world *world, size_t slot)
 
 void sadmm_world_link_gear(sadmm_world *world, size_t slot)
 {
-    sadmm_slots_take(&world->gears_taken, slot);
     for (int s = 0; s < 2; ++s)
         sadmm_link_add(world, gear_link, &world->joints[world->gears[slot].joint[s]].first_gear, link_name(slot, s));
 }
 
 sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot)
 {
-    TRY(new_slot(world, slot));
+    TRY(sadmm_ids_next(&world->joint_ids, slot, &world->error));
+    if (!SADMM_GROW(world->joints, world->joint_ids.slots, *slot + 1))
+        return sadmm_fail_memory(&world->error, "a joint");
     TRY(add_pair(world, joint));
-    struct sadmm_world_joint *made = &world->joints[*slot];
-    const uint32_t generation = *slot < world->joint_slots ? made->generation : 1;
-    *made = *joint;
-    made->generation = generation;
-    if (*slot == world->joint_slots) ++world->joint_slots;
+    sadmm_ids_take(&world->joint_ids, *slot);
+    world->joints[*slot] = *joint;
     sadmm_world_link_joint(world, *slot);
-    ++world->joint_count;
     return SADMM_OK;
-}
-
-static void kill_coupling(sadmm_world *world, size_t slot)
-{
-    struct sadmm_world_coupling *coupling = &world->couplings[slot];
-    coupling->alive = false;
-    ++coupling->generation;
-    --world->coupling_count;
-    sadmm_slots_release(&world->couplings_taken, slot);
 }
 
 void sadmm_world_put_table(sadmm_world *world, size_t slot, int index, double *table, int32_t count)
@@ -116,19 +82,16 @@ void sadmm_world_put_table(sadmm_world *world, size_t slot, int index, double *t
 
 void sadmm_world_free_tables(sadmm_world *world)
 {
-    for (size_t slot = 0; slot < world->joint_slots; ++slot)
+    for (size_t slot = 0; slot < world->joint_ids.slots; ++slot)
         for (int k = 0; k < JOINT_COORDINATES; ++k) sadmm_world_put_table(world, slot, k, NULL, 0);
 }
 
 void sadmm_world_kill_gear(sadmm_world *world, size_t slot)
 {
-    struct sadmm_world_gear *gear = &world->gears[slot];
+    const struct sadmm_world_gear *gear = &world->gears[slot];
     for (int s = 0; s < 2; ++s)
         sadmm_link_remove(world, gear_link, &world->joints[gear->joint[s]].first_gear, link_name(slot, s));
-    gear->alive = false;
-    ++gear->generation;
-    --world->gear_count;
-    sadmm_slots_release(&world->gears_taken, slot);
+    sadmm_ids_release(&world->gear_ids, slot);
 }
 
 void sadmm_world_kill_joint(sadmm_world *world, size_t slot)
@@ -138,10 +101,7 @@ void sadmm_world_kill_joint(sadmm_world *world, size_t slot)
     while (joint->first_gear) sadmm_world_kill_gear(world, (joint->first_gear - 1) / 2);
     unlink_joint(world, slot);
     for (int k = 0; k < JOINT_COORDINATES; ++k) sadmm_world_put_table(world, slot, k, NULL, 0);
-    joint->alive = false;
-    ++joint->generation;
-    --world->joint_count;
-    if (joint->coupling) kill_coupling(world, (size_t)joint->coupling - 1);
+    sadmm_ids_release(&world->joint_ids, slot);
 }
 
 void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body)

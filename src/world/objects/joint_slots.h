@@ -5,17 +5,15 @@
 
 #include "world/state/world_state.h"
 
-/* Room for so many slots of joints; false when memory runs out. */
-bool sadmm_world_reserve_joints(sadmm_world *world, size_t slots);
 /* A joint in a slot is on its bodies' lists, a gear on its joints', from here on. */
 void sadmm_world_link_joint(sadmm_world *world, size_t slot);
 void sadmm_world_link_gear(sadmm_world *world, size_t slot);
 /* Put a joint that has been checked into a slot. */
 sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot);
-/* With its coupling, if it is of one, and the gears on it. */
+/* With the gears on it. */
 void sadmm_world_kill_joint(sadmm_world *world, size_t slot);
 void sadmm_world_kill_gear(sadmm_world *world, size_t slot);
-/* The joints and couplings of a body that is removed. */
+/* The joints of a body that is removed. */
 void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body);
 /* The spring table of a coordinate, which the joint owns from here on, in place of the one it has; NULL: none. */
 void sadmm_world_put_table(sadmm_world *world, size_t slot, int index, double *table, int32_t count);

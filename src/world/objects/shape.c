@@ -9,7 +9,6 @@
 #include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "shape.h"
-#include "subadmm/arrays.h"
 #include "world/resident/resident.h"
 #include "world/state/ids.h"
 #include "world/state/shape_form.h"
@@ -74,12 +73,11 @@ static void keep_given(sadmm_world *world, size_t slot, const sadmm_shape_def *d
 
 static struct sadmm_link *link_at(sadmm_world *world, uint32_t name) { return &world->shape_links[name - 1]; }
 
-bool sadmm_world_reserve_shapes(sadmm_world *world, size_t slots)
+static bool reserve(sadmm_world *world, size_t slots)
 {
-    const size_t used = world->shape_slots;
-    return SADMM_GROW(world->shapes, used, slots) && SADMM_GROW(world->shape_generations, used, slots) &&
-           SADMM_GROW(world->geometries, used, slots) && SADMM_GROW(world->shape_links, used, slots) &&
-           sadmm_slots_reserve(&world->shapes_taken, slots);
+    const size_t used = world->shape_ids.slots;
+    return SADMM_GROW(world->shapes, used, slots) && SADMM_GROW(world->geometries, used, slots) &&
+           SADMM_GROW(world->shape_links, used, slots);
 }
 
 sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body_slot, const sadmm_shape_def *def,
@@ -108,11 +106,9 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     shape->body = body_slot;
     shape->alive = true;
     shape->revision = ++world->shape_revisions;
-    ++world->shape_count;
     world->sensor_count += def->sensor;
     world->bouncing_count += def->restitution > 0;
     sadmm_world_reshaped(world);
-    sadmm_slots_take(&world->shapes_taken, slot);
     sadmm_link_add(world, link_at, &body->first_shape, (uint32_t)slot + 1);
     return SADMM_OK;
 }
@@ -125,24 +121,17 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     const struct sadmm_world_body *body = sadmm_world_find_body(world, body_id, "body", error);
     sadmm_shape_def def;
     double ignored[4];
+    size_t slot;
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_growing_take(&sadmm_growing_shape, &def, given, "def", error));
     TRY(check_def(body, &def, ignored, error)); /* before the world is detached */
     TRY(sadmm_world_detach(world));
 
-    const size_t slot = sadmm_slots_free(&world->shapes_taken);
-    if (slot >= (size_t)1 << 28)
-        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d shapes: a world holds at most 2^28", world->shape_count);
-    if (!sadmm_world_reserve_shapes(world, slot + 1)) return sadmm_fail_memory(error, "a shape");
+    TRY(sadmm_ids_next(&world->shape_ids, &slot, error));
+    if (!reserve(world, slot + 1)) return sadmm_fail_memory(error, "a shape");
     TRY(sadmm_world_put_shape(world, slot, (int32_t)body_id.slot - 1, &def, error));
-    if (slot == world->shape_slots) {
-        ++world->shape_slots;
-        world->shape_generations[slot] = 1;
-    }
-    if (id) {
-        id->slot = (uint32_t)slot + 1;
-        id->generation = world->shape_generations[slot];
-    }
+    sadmm_ids_take(&world->shape_ids, slot);
+    if (id) *id = sadmm_world_shape_id(world, slot);
     return SADMM_OK;
 }
 
@@ -151,7 +140,7 @@ static void remove_block(sadmm_world *world, size_t slot)
     const struct sadmm_world_block_shape *kept = &world->block_shapes[slot];
     const void *owner = kept->hull ? (const void *)kept->hull : kept->mesh;
     world->geometries[world->shapes[slot].geometry].hull = 0;
-    sadmm_shape_data_remove(&world->shape_data, owner, world->geometries, world->shape_slots);
+    sadmm_shape_data_remove(&world->shape_data, owner, world->geometries, world->shape_ids.slots);
 }
 
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
@@ -161,12 +150,10 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
     else if (geometry_is_smooth(geometry)) sadmm_shape_data_release(&world->shape_data);
     world->shapes[slot].alive = false;
     sadmm_world_reshaped(world);
-    ++world->shape_generations[slot];
-    --world->shape_count;
     world->sensor_count -= world->shapes[slot].sensor;
     world->bouncing_count -= world->shapes[slot].restitution > 0;
     sadmm_link_remove(world, link_at, &world->bodies[world->shapes[slot].body].first_shape, (uint32_t)slot + 1);
-    sadmm_slots_release(&world->shapes_taken, slot);
+    sadmm_ids_release(&world->shape_ids, slot);
     sadmm_pair_table_forget(&world->friction_pairs, (uint32_t)slot);
     world->contacts_readable = false;
 }
@@ -177,29 +164,6 @@ sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id)
     if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_world_detach(world));
     sadmm_world_kill_shape(world, id.slot - 1);
-    return SADMM_OK;
-}
-
-int32_t sadmm_world_shape_count(const sadmm_world *world)
-{
-    return world ? world->shape_count : 0;
-}
-
-sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape_id *id)
-{
-    size_t slot;
-    TRY(sadmm_check_given(world, "world", NULL));
-    TRY(sadmm_world_slot_at(&world->shapes_taken, world->shape_count, index, id, &slot, &world->error));
-    *id = sadmm_world_shape_id(world, (int32_t)slot);
-    return SADMM_OK;
-}
-
-sadmm_status sadmm_world_shape_index(sadmm_world *world, sadmm_shape_id id, int32_t *index)
-{
-    TRY(sadmm_check_given(world, "world", NULL));
-    if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(index, "index", &world->error));
-    *index = sadmm_slots_index(&world->shapes_taken, id.slot - 1);
     return SADMM_OK;
 }
 
@@ -228,10 +192,7 @@ sadmm_status sadmm_world_shape_def_sized(sadmm_world *world, sadmm_shape_id id, 
         memcpy(def.orientation, kept->orientation, sizeof def.orientation);
     }
     TRY(sadmm_growing_give(&sadmm_growing_shape, out, size, 0, &def, "def", error));
-    if (body) {
-        body->slot = (uint32_t)shape->body + 1;
-        body->generation = world->bodies[shape->body].generation;
-    }
+    if (body) *body = sadmm_world_body_id(world, (size_t)shape->body);
     return SADMM_OK;
 }
 
@@ -247,46 +208,5 @@ sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id i
     world->bouncing_count += (restitution > 0) - (shape->restitution > 0);
     shape->friction = friction;
     shape->restitution = restitution;
-    return SADMM_OK;
-}
-
-sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b, double friction)
-{
-    TRY(sadmm_check_given(world, "world", NULL));
-    struct sadmm_error *error = &world->error;
-    if (!sadmm_world_find_shape(world, a, "a", error) || !sadmm_world_find_shape(world, b, "b", error))
-        return SADMM_ERROR_STALE_ID;
-    if (a.slot == b.slot) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "a and b are the same shape");
-    uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
-    if (friction == -1) {
-        TRY(sadmm_world_detach(world));
-        sadmm_pair_table_remove(&world->friction_pairs, key);
-        return SADMM_OK;
-    }
-    TRY(sadmm_numbers_check(SADMM_SHAPE_FIELD(friction), &friction, "friction (or -1 for the geometric mean)", error));
-    TRY(sadmm_world_detach(world));
-    return sadmm_pair_table_set(&world->friction_pairs, key, friction, error);
-}
-
-int32_t sadmm_world_pair_friction_count(const sadmm_world *world)
-{
-    return world ? (int32_t)sadmm_pair_table_count(&world->friction_pairs) : 0;
-}
-
-sadmm_status sadmm_world_pair_friction_at(sadmm_world *world, int32_t index, sadmm_shape_id *a, sadmm_shape_id *b,
-                                          double *friction)
-{
-    TRY(sadmm_check_given(world, "world", NULL));
-    struct sadmm_error *error = &world->error;
-    TRY(sadmm_check_given(a, "a", error));
-    TRY(sadmm_check_given(b, "b", error));
-    TRY(sadmm_check_given(friction, "friction", error));
-    const size_t count = sadmm_pair_table_count(&world->friction_pairs);
-    if (index < 0 || (size_t)index >= count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %zu)", index, count);
-    const uint64_t key = sadmm_pair_table_at(&world->friction_pairs, (size_t)index, friction);
-    const uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
-    *a = (sadmm_shape_id){low + 1, world->shape_generations[low]};
-    *b = (sadmm_shape_id){high + 1, world->shape_generations[high]};
     return SADMM_OK;
 }

@@ -4,9 +4,7 @@
 
 #include "world/state/world_state.h"
 
-/* Room for so many slots of shapes; false when memory runs out. */
-bool sadmm_world_reserve_shapes(sadmm_world *world, size_t slots);
-/* A shape into a slot that there is room for and that has a generation. body: the slot of a live one. Errors as of
+/* A shape into a slot that there is room for. body: the slot of a live one. Errors as of
  * sadmm_world_add_shape, with nothing changed. */
 sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body, const sadmm_shape_def *def,
                                    struct sadmm_error *error);

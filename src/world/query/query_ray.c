@@ -8,6 +8,7 @@
 #include "core/base/memory.h"
 #include "query_scene.h"
 #include "subadmm/query.h"
+#include "world/state/ids.h"
 
 static const double ORIGIN_LIMIT = 1e9;
 
@@ -63,10 +64,8 @@ static void give_hit(const sadmm_world *world, const struct sadmm_ray_line *line
 {
     const struct sadmm_ray_find *find = &found->find;
     memset(hit, 0, sizeof *hit);
-    hit->shape.slot = found->slot + 1;
-    hit->shape.generation = world->shape_generations[found->slot];
-    hit->body.slot = (uint32_t)found->body + 1;
-    hit->body.generation = world->bodies[found->body].generation;
+    hit->shape = sadmm_world_shape_id(world, found->slot);
+    hit->body = sadmm_world_body_id(world, (size_t)found->body);
     hit->distance = find->distance;
     for (int k = 0; k < 3; ++k) {
         hit->point[k] = line->origin[k] + find->distance * line->direction[k];
@@ -123,7 +122,7 @@ sadmm_status sadmm_world_cast_ray_all(sadmm_world *world, const sadmm_ray *ray, 
     TRY(check_ray(ray, "ray->", error));
     TRY(sadmm_world_take_filter(world, filter, &taken, &given));
     TRY(sadmm_world_place_shapes(world));
-    const int32_t room = capacity < world->shape_count ? capacity : world->shape_count;
+    const int32_t room = capacity < world->shape_ids.count ? capacity : world->shape_ids.count;
     if (!SADMM_GROW(world->query.hits, 0, (size_t)room)) return sadmm_fail_memory(error, "a query");
     const struct sadmm_ray_line line = line_of(ray, &given);
     *count = sadmm_query_tree_cast(&world->query.tree, &line, &taken, false, room, world->query.hits);

@@ -67,7 +67,7 @@ static void place_share(void *argument, int thread, int threads)
     const sadmm_world *world = (const sadmm_world *)argument;
     const struct sadmm_query_tree *tree = &world->query.tree;
     size_t begin, end;
-    sadmm_share((size_t)world->shape_count, thread, threads, &begin, &end);
+    sadmm_share((size_t)world->shape_ids.count, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) sadmm_world_place_shape(world, tree->shapes[i].slot, &tree->shapes[i]);
 }
 
@@ -75,7 +75,7 @@ static void place_share(void *argument, int thread, int threads)
 static void place_all(sadmm_world *world)
 {
     const int threads = sadmm_team_threads(&world->team, world->def.settings.threads,
-                                           (size_t)world->shape_count / SHAPES_PER_THREAD + 1);
+                                           (size_t)world->shape_ids.count / SHAPES_PER_THREAD + 1);
     sadmm_parallel(&world->team, threads, place_share, world);
 }
 
@@ -84,9 +84,8 @@ static sadmm_status list(sadmm_world *world)
     struct sadmm_query_tree *tree = &world->query.tree;
     size_t count = 0;
     world->query.listed = false;
-    TRY(sadmm_query_tree_reserve(tree, (size_t)world->shape_count, &world->error));
-    for (size_t slot = 0; slot < world->shape_slots; ++slot)
-        if (world->shapes[slot].alive) tree->shapes[count++].slot = (uint32_t)slot;
+    TRY(sadmm_query_tree_reserve(tree, (size_t)world->shape_ids.count, &world->error));
+    for (SADMM_OBJECTS(slot, &world->shape_ids)) tree->shapes[count++].slot = (uint32_t)slot;
     place_all(world);
     TRY(sadmm_query_tree_make(tree, count, &world->error));
     world->query.listed = world->query.current = true;

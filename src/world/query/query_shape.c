@@ -81,7 +81,7 @@ sadmm_status sadmm_world_list_overlaps(sadmm_world *world, const struct sadmm_bo
                                        const struct sadmm_placed *shape, const struct sadmm_shape_filter *filter,
                                        size_t *count)
 {
-    const size_t most = (size_t)world->shape_count;
+    const size_t most = (size_t)world->shape_ids.count;
     if (!SADMM_GROW(world->query.slots, 0, most) || !SADMM_GROW(world->query.spare, 0, most))
         return sadmm_fail_memory(&world->error, "a query");
     const struct sadmm_placed *other;
@@ -98,10 +98,8 @@ sadmm_status sadmm_world_list_overlaps(sadmm_world *world, const struct sadmm_bo
 void sadmm_world_give_overlaps(const sadmm_world *world, size_t found, int32_t capacity, sadmm_shape_id *shapes,
                                int32_t *count)
 {
-    for (size_t i = 0; i < found && i < (size_t)capacity; ++i) {
-        shapes[i].slot = (uint32_t)world->query.slots[i] + 1;
-        shapes[i].generation = world->shape_generations[world->query.slots[i]];
-    }
+    for (size_t i = 0; i < found && i < (size_t)capacity; ++i)
+        shapes[i] = sadmm_world_shape_id(world, world->query.slots[i]);
     *count = (int32_t)found;
 }
 

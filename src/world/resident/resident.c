@@ -36,7 +36,7 @@ bool sadmm_world_may_reside(const sadmm_world *world)
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
     if (fast && !world->stepped) return false;
-    if (s->ncp_points > 0 && world->joint_count > 0) return false;
+    if (s->ncp_points > 0 && world->joint_ids.count + world->coupling_ids.count > 0) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
 }
@@ -132,8 +132,8 @@ static void begin_updates(struct sadmm_world_body *body)
 /* Which bodies joints hold. */
 static sadmm_status list_held(sadmm_world *world)
 {
-    if (!SADMM_GROW(world->resident.held, 0, world->body_slots)) return sadmm_fail_memory(&world->error, "hits");
-    if (world->body_slots > 0) memset(world->resident.held, 0, world->body_slots);
+    if (!SADMM_GROW(world->resident.held, 0, world->body_ids.slots)) return sadmm_fail_memory(&world->error, "hits");
+    if (world->body_ids.slots > 0) memset(world->resident.held, 0, world->body_ids.slots);
     sadmm_world_mark_held(world, world->resident.held, 1);
     return SADMM_OK;
 }

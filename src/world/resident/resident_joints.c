@@ -40,8 +40,7 @@ static bool list_tables(sadmm_world *world, const struct sadmm_world_joint *join
 
 sadmm_status sadmm_world_list_joints(sadmm_world *world)
 {
-    const size_t count = (size_t)world->joint_count;
-    size_t i = 0;
+    const size_t count = world->step_joint_count;
     world->resident.joint_count = world->resident.joint_constraints = world->resident.coupling_count = 0;
     world->resident.dirty_joint_count = 0;
     world->resident.table_numbers = 0;
@@ -49,12 +48,11 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
         return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d tables of springs: a backend holds at most %d",
                           world->table_count, INT32_MAX / (2 * SADMM_MOST_SPRING_POINTS));
     if (!SADMM_GROW(world->resident.joints, 0, count) || !SADMM_GROW(world->resident.memory, 0, count) ||
-        !SADMM_GROW(world->resident.coupling_memory, 0, (size_t)world->coupling_count) ||
-        !SADMM_GROW(world->resident.joint_slots, 0, count) || !SADMM_GROW(world->resident.dirty_joints, 0, count))
+        !SADMM_GROW(world->resident.coupling_memory, 0, (size_t)world->coupling_ids.count) ||
+        !SADMM_GROW(world->resident.dirty_joints, 0, count))
         return sadmm_fail_memory(&world->error, "joints for the backend");
-    for (size_t slot = 0; i < count && slot < world->joint_slots; ++slot) {
-        struct sadmm_world_joint *joint = &world->joints[slot];
-        if (!joint->alive) continue;
+    for (size_t i = 0; i < count; ++i) {
+        struct sadmm_world_joint *joint = world->step_joints[i];
         world->resident.joints[i] = joint_for_backend(world, joint);
         if (!list_tables(world, joint, &world->resident.joints[i]))
             return sadmm_fail_memory(&world->error, "joints for the backend");
@@ -64,14 +62,12 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
             world->resident.coupling_memory[world->resident.coupling_count++] =
                 world->couplings[joint->coupling - 1].last;
         }
-        world->resident.joint_slots[i] = (int32_t)slot;
-        joint->resident = (int32_t)i;
-        joint->resident_constraints = world->resident.joints[i++].constraints;
+        joint->resident_constraints = world->resident.joints[i].constraints;
         world->resident.joint_constraints += joint->resident_constraints;
         joint->dirty = 0;
         for (int update = 0; update < SADMM_JOINT_UPDATES; ++update) joint->set_at[update] = -1;
     }
-    world->resident.joint_count = (int32_t)i;
+    world->resident.joint_count = (int32_t)count;
     return SADMM_OK;
 }
 
@@ -84,7 +80,7 @@ static struct sadmm_resident_gear gear_for_backend(const sadmm_world *world, con
                                       .enabled = def->enabled};
     int32_t side[GEAR_JOINTS][2];
     for (int i = 0; i < GEAR_JOINTS; ++i) {
-        out.joint[i] = world->joints[gear->joint[i]].resident;
+        out.joint[i] = world->joints[gear->joint[i]].number;
         for (int s = 0; s < 2; ++s) {
             const int32_t body = world->resident.joints[out.joint[i]].body[s];
             side[i][s] = body >= 0 ? body : -1;
@@ -96,13 +92,12 @@ static struct sadmm_resident_gear gear_for_backend(const sadmm_world *world, con
 
 sadmm_status sadmm_world_list_gears(sadmm_world *world)
 {
-    const size_t count = (size_t)world->gear_count;
+    const size_t count = (size_t)world->gear_ids.count;
     size_t g = 0;
     if (!SADMM_GROW(world->resident.gears, 0, count) || !SADMM_GROW(world->resident.gear_force, 0, count))
         return sadmm_fail_memory(&world->error, "gears for the backend");
-    for (size_t slot = 0; g < count && slot < world->gear_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->gear_ids)) {
         struct sadmm_world_gear *gear = &world->gears[slot];
-        if (!gear->alive) continue;
         world->resident.gears[g] = gear_for_backend(world, gear);
         world->resident.gear_force[g++] = gear->last.force;
         gear->dirty = false;
@@ -125,9 +120,9 @@ void sadmm_world_update_gear(sadmm_world *world, struct sadmm_world_gear *gear)
 
 static void update_gears_again(sadmm_world *world)
 {
-    for (size_t slot = 0; world->resident.gear_count > 0 && slot < world->gear_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->gear_ids)) {
         struct sadmm_world_gear *gear = &world->gears[slot];
-        if (!gear->alive || gear->set_at < world->resident.done) continue;
+        if (gear->set_at < world->resident.done) continue;
         gear->dirty = world->resident.gears_dirty = true;
         gear->set_at = world->resident.done;
     }
@@ -135,8 +130,7 @@ static void update_gears_again(sadmm_world *world)
 
 static void forget_gear_updates(sadmm_world *world)
 {
-    for (size_t slot = 0; world->resident.gears_dirty && slot < world->gear_slots; ++slot)
-        world->gears[slot].dirty = false;
+    for (SADMM_OBJECTS(slot, &world->gear_ids)) world->gears[slot].dirty = false;
     world->resident.gears_dirty = false;
 }
 
@@ -144,9 +138,9 @@ static void forget_gear_updates(sadmm_world *world)
 static void list_gear_updates(sadmm_world *world, size_t *count)
 {
     int32_t g = 0;
-    for (size_t slot = 0; world->resident.gears_dirty && slot < world->gear_slots; ++slot) {
+    if (!world->resident.gears_dirty) return;
+    for (SADMM_OBJECTS(slot, &world->gear_ids)) {
         const struct sadmm_world_gear *gear = &world->gears[slot];
-        if (!gear->alive) continue;
         if (gear->dirty)
             world->resident.updates[(*count)++] =
                 (struct sadmm_resident_update){SADMM_UPDATE_GEAR, g, {gear->def.enabled}};
@@ -156,8 +150,7 @@ static void list_gear_updates(sadmm_world *world, size_t *count)
 
 static void mark(sadmm_world *world, struct sadmm_world_joint *joint, uint32_t updates)
 {
-    if (updates && !joint->dirty)
-        world->resident.dirty_joints[world->resident.dirty_joint_count++] = (uint32_t)(joint - world->joints);
+    if (updates && !joint->dirty) world->resident.dirty_joints[world->resident.dirty_joint_count++] = joint->number;
     joint->dirty |= updates;
 }
 
@@ -173,7 +166,7 @@ bool sadmm_world_update_joint(sadmm_world *world, struct sadmm_world_joint *join
 void sadmm_world_update_joints_again(sadmm_world *world)
 {
     for (int32_t i = 0; i < world->resident.joint_count; ++i) {
-        struct sadmm_world_joint *joint = &world->joints[world->resident.joint_slots[i]];
+        struct sadmm_world_joint *joint = world->step_joints[i];
         for (int update = 0; update < SADMM_JOINT_UPDATES; ++update) {
             if (joint->set_at[update] < world->resident.done) continue;
             mark(world, joint, UINT32_C(1) << update);
@@ -186,7 +179,7 @@ void sadmm_world_update_joints_again(sadmm_world *world)
 void sadmm_world_forget_joint_updates(sadmm_world *world)
 {
     for (size_t k = 0; k < world->resident.dirty_joint_count; ++k)
-        world->joints[world->resident.dirty_joints[k]].dirty = 0;
+        world->step_joints[world->resident.dirty_joints[k]]->dirty = 0;
     world->resident.dirty_joint_count = 0;
     forget_gear_updates(world);
 }
@@ -205,13 +198,13 @@ sadmm_status sadmm_world_list_joint_updates(sadmm_world *world, size_t *count)
                     *count + SADMM_JOINT_UPDATES * world->resident.dirty_joint_count + gears))
         return sadmm_fail_memory(&world->error, "changes of joints");
     for (size_t k = 0; k < world->resident.dirty_joint_count; ++k) {
-        const struct sadmm_world_joint *joint = &world->joints[world->resident.dirty_joints[k]];
+        const struct sadmm_world_joint *joint = world->step_joints[world->resident.dirty_joints[k]];
         for (int update = 0; update < SADMM_JOINT_UPDATES; ++update) {
             if (!(joint->dirty >> update & 1)) continue;
             struct sadmm_resident_update *out = &world->resident.updates[(*count)++];
             memset(out, 0, sizeof *out);
             out->kind = SADMM_UPDATE_JOINT;
-            out->target = SADMM_JOINT_TARGETS * joint->resident + update;
+            out->target = SADMM_JOINT_TARGETS * joint->number + update;
             if (update == SADMM_JOINT_TARGET)
                 put_target(&world->couplings[joint->coupling - 1].last.target, out->values);
             else if (update == SADMM_JOINT_ENABLED) out->values[0] = joint->def.enabled;
@@ -237,12 +230,12 @@ static void take_coupling(struct sadmm_world_coupling *coupling, bool target_set
 sadmm_status sadmm_world_read_joints(sadmm_world *world)
 {
     int32_t coupling = 0;
+    size_t g = 0;
     TRY(world->kernels->resident->read_joints(world->context, world->resident.memory, world->resident.coupling_memory,
                                               world->resident.gear_force, &world->error));
-    for (size_t slot = 0, g = 0; g < (size_t)world->resident.gear_count; ++slot)
-        if (world->gears[slot].alive) world->gears[slot].last.force = world->resident.gear_force[g++];
+    for (SADMM_OBJECTS(slot, &world->gear_ids)) world->gears[slot].last.force = world->resident.gear_force[g++];
     for (int32_t i = 0; i < world->resident.joint_count; ++i) {
-        struct sadmm_world_joint *joint = &world->joints[world->resident.joint_slots[i]];
+        struct sadmm_world_joint *joint = world->step_joints[i];
         joint->last = world->resident.memory[i];
         if (joint->set_at[SADMM_JOINT_ENABLED] < world->resident.done)
             joint->def.enabled = joint->def.enabled && !joint->last.broken;

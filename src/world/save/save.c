@@ -13,7 +13,7 @@
 #include "world/resident/resident.h"
 
 /* Raised with every change of what is written. */
-enum { FORMAT = 5 };
+enum { FORMAT = 6 };
 
 struct header {
     char magic[8];
@@ -141,11 +141,10 @@ static sadmm_status check_header(const void *buffer, size_t size, struct sadmm_e
 
 static void keep_user_data(sadmm_world *fresh, const sadmm_world *world)
 {
-    for (size_t slot = 0; slot < fresh->body_slots && slot < world->body_slots; ++slot) {
-        const struct sadmm_world_body *old = &world->bodies[slot];
-        struct sadmm_world_body *body = &fresh->bodies[slot];
-        if (old->alive && body->alive && old->generation == body->generation) body->user_data = old->user_data;
-    }
+    for (SADMM_OBJECTS(slot, &fresh->body_ids))
+        if (sadmm_ids_has(&world->body_ids, slot) &&
+            fresh->body_ids.generations[slot] == world->body_ids.generations[slot])
+            fresh->bodies[slot].user_data = world->bodies[slot].user_data;
 }
 
 /* The world that was read becomes `world`, and the other way round. What is the caller's stays, and so does a backend's

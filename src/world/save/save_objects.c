@@ -83,9 +83,6 @@ static bool body_fits(const sadmm_world *world, const struct sadmm_world_body *b
 static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size_t slot)
 {
     struct sadmm_world_body *body = &world->bodies[slot];
-    sadmm_archive_flag(archive, &body->alive);
-    SADMM_ARCHIVE(archive, body->generation);
-    if (!body->alive) return;
     SADMM_ARCHIVE(archive, body->type);
     SADMM_ARCHIVE(archive, body->environment);
     rolling_clear(&body->rigid); /* equal worlds have equal saves */
@@ -98,14 +95,9 @@ static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size
     archive_name(archive, &body->name);
     if (!archive->reading) return;
     body->system_body = -1;
-    if (archive->status != SADMM_OK ||
-        !sadmm_archive_expect(archive, body_fits(world, body, archive->error), "a body")) {
-        body->alive = false;
+    if (archive->status != SADMM_OK || !sadmm_archive_expect(archive, body_fits(world, body, archive->error), "a body"))
         return;
-    }
-    ++world->body_count;
     world->dynamic_count += body->type == SADMM_BODY_DYNAMIC;
-    sadmm_slots_take(&world->bodies_taken, slot);
     if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_count_kinematic(world, 1);
 }
 
@@ -113,18 +105,10 @@ static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size
 
 void sadmm_archive_objects(struct sadmm_archive *archive, sadmm_world *world)
 {
-    size_t slots = world->body_slots;
     archive_def(archive, &world->def);
-    sadmm_archive_count(archive, &slots, 5, SADMM_MOST_SLOTS);
-    if (archive->reading && !(sadmm_archive_room(archive, &world->bodies, slots, sizeof *world->bodies) &&
-                              sadmm_slots_reserve(&world->bodies_taken, slots))) {
-        sadmm_archive_fail_memory(archive);
-        return;
-    }
-    world->body_slots = slots;
-    for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot) archive_body(archive, world, slot);
+    sadmm_archive_list(archive, world, &world->body_ids, &world->bodies, sizeof *world->bodies, archive_body);
     sadmm_archive_shapes(archive, world);
-    sadmm_archive_pairs(archive, &world->disabled_pairs, world->body_slots);
-    sadmm_archive_pairs(archive, &world->friction_pairs, world->shape_slots);
+    sadmm_archive_pairs(archive, &world->disabled_pairs, world->body_ids.slots);
+    sadmm_archive_pairs(archive, &world->friction_pairs, world->shape_ids.slots);
     sadmm_archive_joints(archive, world);
 }

@@ -26,6 +26,33 @@ void sadmm_archive_fail_memory(struct sadmm_archive *archive)
     if (archive->status == SADMM_OK) archive->status = sadmm_fail_memory(archive->error, "the state of a world");
 }
 
+bool sadmm_archive_ids(struct sadmm_archive *archive, struct sadmm_id_pool *pool, void *array, size_t size)
+{
+    size_t slots = pool->slots;
+    sadmm_archive_count(archive, &slots, 5, (size_t)1 << pool->most);
+    if (archive->reading) {
+        if (!sadmm_archive_room(archive, array, slots, size)) return false;
+        if (!sadmm_ids_reserve(pool, slots)) sadmm_archive_fail_memory(archive);
+        else pool->slots = slots;
+    }
+    for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot) {
+        bool taken = !archive->reading && sadmm_ids_has(pool, slot);
+        sadmm_archive_flag(archive, &taken);
+        SADMM_ARCHIVE(archive, pool->generations[slot]);
+        if (archive->reading && sadmm_archive_expect(archive, pool->generations[slot] > 0, "an id") && taken)
+            sadmm_ids_take(pool, slot);
+    }
+    return archive->status == SADMM_OK;
+}
+
+void sadmm_archive_list(struct sadmm_archive *archive, sadmm_world *world, struct sadmm_id_pool *pool, void *array,
+                        size_t size, void (*one)(struct sadmm_archive *archive, sadmm_world *world, size_t slot))
+{
+    if (!sadmm_archive_ids(archive, pool, array, size)) return;
+    for (SADMM_OBJECTS(slot, pool))
+        if (archive->status == SADMM_OK) one(archive, world, slot);
+}
+
 static bool pairs_fit(const struct sadmm_pair_table *table, size_t count, size_t slots)
 {
     for (size_t k = 0; k < count; ++k) {

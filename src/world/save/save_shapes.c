@@ -27,7 +27,7 @@ static const void *owner_of(const sadmm_world *world, size_t slot)
 static bool has_owner(const sadmm_world *world, size_t slot)
 {
     const int32_t type = world->geometries[world->shapes[slot].geometry].type;
-    return world->shapes[slot].alive && (type == SADMM_SHAPE_HULL || type == SADMM_SHAPE_MESH);
+    return type == SADMM_SHAPE_HULL || type == SADMM_SHAPE_MESH;
 }
 
 /* Its number; NULL: it has none yet. */
@@ -38,7 +38,7 @@ static const double *find_owner(const struct owners *owners, const void *owner)
 
 static void list_owners(struct sadmm_archive *archive, const sadmm_world *world, struct owners *owners)
 {
-    for (size_t slot = 0; slot < world->shape_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->shape_ids)) {
         if (!has_owner(world, slot)) continue;
         const void *owner = owner_of(world, slot);
         if (find_owner(owners, owner)) continue;
@@ -57,7 +57,7 @@ static void archive_owners(struct sadmm_archive *archive, const sadmm_world *wor
 {
     if (!archive->reading) list_owners(archive, world, owners);
     size_t count = owners->count;
-    sadmm_archive_count(archive, &count, 64, SADMM_MOST_SLOTS);
+    sadmm_archive_count(archive, &count, 64, INT32_MAX);
     if (archive->reading && !(sadmm_archive_room(archive, &owners->of, count, sizeof *owners->of) &&
                               sadmm_archive_room(archive, &owners->is_mesh, count, sizeof *owners->is_mesh)))
         return;
@@ -123,7 +123,7 @@ static bool shape_fits(const sadmm_world *world, const struct kept_shape *kept, 
     const sadmm_shape_def *def = &kept->def;
     const bool mesh = def->type == SADMM_SHAPE_MESH, owned = mesh || def->type == SADMM_SHAPE_HULL;
     double ignored[4];
-    if (kept->body < 0 || (size_t)kept->body >= world->body_slots || !world->bodies[kept->body].alive) return false;
+    if (kept->body < 0 || !sadmm_ids_has(&world->body_ids, (size_t)kept->body)) return false;
     if (!owned) /* contact finding has it where it is */
         return memcmp(def->position, kept->position, sizeof kept->position) == 0 &&
                memcmp(def->orientation, kept->orientation, sizeof kept->orientation) == 0;
@@ -152,11 +152,7 @@ static sadmm_status put_shape(struct sadmm_archive *archive, sadmm_world *world,
 
 static void archive_shape(struct sadmm_archive *archive, sadmm_world *world, size_t slot, const struct owners *owners)
 {
-    bool alive = !archive->reading && world->shapes[slot].alive;
     struct kept_shape kept = {.revision = 0};
-    sadmm_archive_flag(archive, &alive);
-    SADMM_ARCHIVE(archive, world->shape_generations[slot]);
-    if (!alive) return;
     if (!archive->reading) kept = keep_shape(world, slot, owners);
     sadmm_archive_fields(archive, sadmm_shape_table, SADMM_SHAPE_FIELDS_COUNT, &kept.def);
     SADMM_ARCHIVE(archive, kept.owner);
@@ -173,15 +169,14 @@ static void archive_shape(struct sadmm_archive *archive, sadmm_world *world, siz
 void sadmm_archive_shapes(struct sadmm_archive *archive, sadmm_world *world)
 {
     struct owners owners = {.count = 0};
-    size_t slots = world->shape_slots;
+    const struct sadmm_id_pool *ids = &world->shape_ids;
     archive_owners(archive, world, &owners);
-    sadmm_archive_count(archive, &slots, 5, SADMM_MOST_SLOTS);
-    if (archive->reading && !sadmm_world_reserve_shapes(world, slots)) sadmm_archive_fail_memory(archive);
-    if (archive->status == SADMM_OK) {
-        world->shape_slots = slots;
-        for (size_t slot = 0; slot < slots && archive->status == SADMM_OK; ++slot)
-            archive_shape(archive, world, slot, &owners);
-    }
+    if (sadmm_archive_ids(archive, &world->shape_ids, &world->shapes, sizeof *world->shapes) &&
+        (!archive->reading ||
+         (sadmm_archive_room(archive, &world->geometries, ids->slots, sizeof *world->geometries) &&
+          sadmm_archive_room(archive, &world->shape_links, ids->slots, sizeof *world->shape_links))))
+        for (SADMM_OBJECTS(slot, ids))
+            if (archive->status == SADMM_OK) archive_shape(archive, world, slot, &owners);
     SADMM_ARCHIVE(archive, world->shape_revisions);
     release_owners(archive, &owners);
 }

@@ -16,7 +16,8 @@ static bool side_fits(const sadmm_world *world, int32_t body)
 
 static bool shape_fits(const sadmm_world *world, int32_t slot)
 {
-    return slot >= 0 && (size_t)slot < world->shape_slots && (!world->contacts_readable || world->shapes[slot].alive);
+    return slot >= 0 && (world->contacts_readable ? sadmm_ids_has(&world->shape_ids, (size_t)slot)
+                                                  : (size_t)slot < world->shape_ids.slots);
 }
 
 /* A triangle of a mesh: read-outs look it up. */

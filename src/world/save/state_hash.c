@@ -24,9 +24,8 @@ sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *out)
     TRY(sadmm_check_given(world, "world", NULL));
     TRY(sadmm_check_given(out, "hash", &world->error));
     TRY(sadmm_world_download_bodies(world));
-    for (size_t slot = 0; slot < world->body_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->body_ids)) {
         const struct sadmm_world_body *body = &world->bodies[slot];
-        if (!body->alive) continue;
         hash = hash_doubles(hash, body->rigid.position, 3);
         hash = hash_doubles(hash, body->rigid.orientation, 4);
         hash = hash_doubles(hash, body->rigid.velocity, 6);

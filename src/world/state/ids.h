@@ -4,12 +4,16 @@
 
 #include "world_state.h"
 
-sadmm_shape_id sadmm_world_shape_id(const sadmm_world *world, int32_t slot);
-sadmm_body_id sadmm_world_body_id(const sadmm_world *world, int32_t slot);
+/* The id of the object in a slot. */
+sadmm_body_id sadmm_world_body_id(const sadmm_world *world, size_t slot);
+sadmm_shape_id sadmm_world_shape_id(const sadmm_world *world, size_t slot);
+sadmm_joint_id sadmm_world_joint_id(const sadmm_world *world, size_t slot);
+sadmm_gear_id sadmm_world_gear_id(const sadmm_world *world, size_t slot);
+sadmm_coupling_id sadmm_world_coupling_id(const sadmm_world *world, size_t slot);
+/* Of the body of the shape in a slot. */
+sadmm_body_id sadmm_world_body_of(const sadmm_world *world, int32_t shape);
 
-/* "" where it has none. */
-const char *sadmm_world_body_name(const struct sadmm_world_body *body);
-/* The slot of a live object, or NULL with SADMM_ERROR_STALE_ID set on `error`. */
+/* The object of an id, in its slot, id.slot - 1; NULL, with SADMM_ERROR_STALE_ID set on `error`: there is none. */
 struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_body_id id, const char *argument,
                                                struct sadmm_error *error);
 struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape_id id, const char *argument,
@@ -21,8 +25,7 @@ struct sadmm_world_gear *sadmm_world_find_gear(const sadmm_world *world, sadmm_g
 struct sadmm_world_coupling *sadmm_world_find_coupling(const sadmm_world *world, sadmm_coupling_id id,
                                                        const char *argument, struct sadmm_error *error);
 
-/* The slot of the index-th of `count` live objects; `id`, where its id is to go, is not NULL. INVALID_ARGUMENT. */
-sadmm_status sadmm_world_slot_at(const struct sadmm_slot_set *taken, int32_t count, int32_t index, const void *id,
-                                 size_t *slot, struct sadmm_error *error);
+/* "" where it has none. */
+const char *sadmm_world_body_name(const struct sadmm_world_body *body);
 
 #endif

@@ -12,13 +12,12 @@ enum { SADMM_NAME_SIZE = 64 }; /* a name is cut to what fits, with its final 0 *
 
 /* A body slot. Dynamic bodies are numbered in slot order for the solver at every step. */
 struct sadmm_world_body {
-    bool alive;
-    uint32_t generation; /* of the next id when dead, of the current one when alive */
     sadmm_body_type type;
     int32_t environment;
     int32_t system_body; /* in the last step, -1: static or not there, below: kinematic (core/base/contact_set.h) */
     struct sadmm_rigid rigid;
-    uint32_t first_shape, first_joint; /* links: names of a shape are its slot + 1, of a joint below */
+    uint32_t first_shape, first_coupling; /* links: their names are slot + 1; */
+    uint32_t first_joint;                 /* of a joint (world_joint.h) */
     double contact_wrench[6];
     struct sadmm_extrapolation extrapolation;
     struct {

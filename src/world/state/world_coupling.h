@@ -4,13 +4,13 @@
 
 #include "core/model/coupling_law.h"
 #include "subadmm/coupling.h"
+#include "world_joint.h"
 
 /* A coupling slot. */
 struct sadmm_world_coupling {
-    bool alive;
-    uint32_t generation;
-    sadmm_coupling_def def; /* its target is that in `last` */
-    size_t joint;           /* slot */
+    sadmm_coupling_def def;         /* its target is that in `last` */
+    struct sadmm_world_joint joint; /* what a step makes its rows of: position drives of all six coordinates, from the
+                                       target, a, whose motion is prescribed, to the frame on the body, b */
     struct sadmm_coupling_memory last, next;
 };
 

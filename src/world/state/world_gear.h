@@ -7,8 +7,6 @@
 
 /* A gear slot. */
 struct sadmm_world_gear {
-    bool alive;
-    uint32_t generation;
     sadmm_gear_def def;
     size_t joint[2]; /* slots */
     struct sadmm_link on_joint[2]; /* their names: 2 x slot + side + 1 */

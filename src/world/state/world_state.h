@@ -13,9 +13,9 @@
 #include "core/solve/ncp.h"
 #include "core/solve/push.h"
 #include "core/solve/schedule.h"
+#include "id_pool.h"
 #include "pair_table.h"
 #include "shape_data.h"
-#include "slots.h"
 #include "step_start.h"
 #include "subadmm/events.h"
 #include "subadmm/world.h"
@@ -34,19 +34,20 @@ struct sadmm_world {
     struct sadmm_error error;
     struct sadmm_team team;
 
+    /* Objects, by the slots of their ids. */
+    struct sadmm_id_pool body_ids, shape_ids, joint_ids, gear_ids, coupling_ids;
     struct sadmm_world_body *bodies;
-    size_t body_slots;
-    int32_t body_count, dynamic_count, kinematic_count;
+    struct sadmm_shape *shapes;
+    struct sadmm_world_joint *joints;
+    struct sadmm_world_gear *gears;
+    struct sadmm_world_coupling *couplings;
+
+    int32_t dynamic_count, kinematic_count;
     int32_t *kinematic_slots; /* of these, ascending, as of the last step */
     bool kinematic_listed;    /* none has come or gone since */
-    struct sadmm_slot_set bodies_taken;
-    struct sadmm_shape *shapes;
-    uint32_t *shape_generations;
     struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */
-    size_t shape_slots;
-    int32_t shape_count, sensor_count; /* sensors: of these */
-    int32_t bouncing_count; /* shapes with restitution */
-    struct sadmm_slot_set shapes_taken;
+    int32_t sensor_count;              /* shapes that are sensors */
+    int32_t bouncing_count;            /* shapes with restitution */
     struct sadmm_link *shape_links; /* by slot: the shapes of a body */
     uint32_t shape_revisions;
     struct sadmm_shape_data shape_data;
@@ -54,20 +55,8 @@ struct sadmm_world {
     size_t block_shape_slots;
     struct sadmm_pair_table disabled_pairs, friction_pairs;
 
-    struct sadmm_world_joint *joints;
-    size_t joint_slots;
-    int32_t joint_count;                  /* live slots, those of couplings among them */
-    struct sadmm_slot_set joints_taken, own_joints; /* all; those that are of no coupling */
-    int32_t table_count;                  /* tables of springs, of all joints */
-    struct sadmm_world_gear *gears;
-    size_t gear_slots;
-    int32_t gear_count;
-    struct sadmm_slot_set gears_taken;
-    size_t joint_rows;                    /* of the step's rows: the first ones; those of gears follow */
-    struct sadmm_world_coupling *couplings;
-    size_t coupling_slots;
-    int32_t coupling_count;
-    struct sadmm_slot_set couplings_taken;
+    int32_t table_count;                   /* tables of springs, of all joints */
+    size_t joint_rows;                     /* of the step's rows: the first ones; those of gears follow */
     struct sadmm_pair_table jointed_pairs; /* bodies that do not meet for their joints; values: how many joints */
     uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
     size_t filtered_count;
@@ -83,7 +72,9 @@ struct sadmm_world {
     struct joint_closing_cost *closing_costs; /* dynamic bodies: what that costs (joint_close.c) */
     struct sadmm_row_constraint *joint_constraints; /* all that joints may have, in order; most have rows in the step */
     size_t joint_constraint_count;
-    struct acting_joint *acting_joints;       /* by slot: in the (sub-)step at hand; */
+    struct sadmm_world_joint **step_joints; /* of a step: joints, then those of couplings, in slot order */
+    size_t step_joint_count;
+    struct acting_joint *acting_joints;         /* these, in the (sub-)step at hand; */
     struct sadmm_world_joint_side *joint_sides; /* dynamic bodies: theirs, if it is of this number */
     int64_t joint_sides_made;
     struct spin_system *spins;                /* dynamic bodies: spin_of_system, in a (sub-)step where spins_known */
@@ -136,10 +127,9 @@ struct sadmm_world {
         size_t dirty_count;
         struct sadmm_resident_joint *joints; /* as they were loaded; */
         struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
-        int32_t *joint_slots;                /* their slots */
         struct sadmm_coupling_memory *coupling_memory; /* of those that are of couplings, in their order */
         double *solution;                    /* of their rows */
-        uint32_t *dirty_joints;              /* slots of joints with `dirty`; capacity: all */
+        int32_t *dirty_joints;               /* step_joints with `dirty`; capacity: all */
         double *tables;                      /* of springs, joint by joint */
         size_t table_numbers;
         struct sadmm_resident_gear *gears;   /* in slot order */

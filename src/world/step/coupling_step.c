@@ -3,7 +3,7 @@
 
 void sadmm_world_begin_couplings(sadmm_world *world)
 {
-    for (size_t slot = 0; world->coupling_count > 0 && slot < world->coupling_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->coupling_ids)) {
         struct sadmm_world_coupling *coupling = &world->couplings[slot];
         coupling->next = coupling->last;
         coupling_begin(&coupling->next);
@@ -12,15 +12,13 @@ void sadmm_world_begin_couplings(sadmm_world *world)
 
 void sadmm_world_move_targets(sadmm_world *world, double dt)
 {
-    for (size_t slot = 0; world->coupling_count > 0 && slot < world->coupling_slots; ++slot)
-        coupling_move(&world->couplings[slot].next.target, dt);
+    for (SADMM_OBJECTS(slot, &world->coupling_ids)) coupling_move(&world->couplings[slot].next.target, dt);
 }
 
 void sadmm_world_commit_couplings(sadmm_world *world, int substeps)
 {
-    for (size_t slot = 0; world->coupling_count > 0 && slot < world->coupling_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->coupling_ids)) {
         struct sadmm_world_coupling *coupling = &world->couplings[slot];
-        if (!coupling->alive) continue;
         coupling->last = coupling->next;
         coupling_end(&coupling->last, substeps);
     }

@@ -12,12 +12,15 @@
 #include "joint_rows.h"
 #include "kinematic.h"
 
-static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type == SADMM_BODY_DYNAMIC; }
+static bool moves(const sadmm_world *world, size_t slot)
+{
+    return sadmm_ids_has(&world->body_ids, slot) && world->bodies[slot].type == SADMM_BODY_DYNAMIC;
+}
 
 static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
 {
     int32_t count = 0;
-    for (size_t slot = begin; slot < end; ++slot) count += moves(&world->bodies[slot]);
+    for (size_t slot = begin; slot < end; ++slot) count += moves(world, slot);
     return count;
 }
 
@@ -56,8 +59,8 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
         out->placed = body->extrapolation.placed;
         out->environment = body->environment;
         out->system_body = body->system_body = -1;
-        place(out, &body->rigid, moves(body), &settings);
-        if (!moves(body)) continue;
+        place(out, &body->rigid, moves(world, slot), &settings);
+        if (!moves(world, slot)) continue;
         out->system_body = body->system_body = dynamic;
         start_body(world, dynamic, &body->rigid, &body->extrapolation, settings.dt);
         if (settings.substeps > 1) world->extrapolation[dynamic] = body->extrapolation;
@@ -81,7 +84,7 @@ static void gather_share(void *argument, int thread, int threads)
     struct gathering *g = (struct gathering *)argument;
     size_t begin, end;
     int32_t first = 0;
-    sadmm_share(g->world->body_slots, thread, threads, &begin, &end);
+    sadmm_share(g->world->body_ids.slots, thread, threads, &begin, &end);
     g->moving[thread] = count_moving(g->world, begin, end);
     sadmm_barrier_wait(&g->barrier, threads);
     for (int t = 0; t < thread; ++t) first += g->moving[t];
@@ -91,7 +94,7 @@ static void gather_share(void *argument, int thread, int threads)
 sadmm_status sadmm_world_gather(sadmm_world *world)
 {
     /* One at least: a system without bodies is still one of rigid bodies. */
-    size_t n = (size_t)world->dynamic_count + 1, slots = world->body_slots;
+    size_t n = (size_t)world->dynamic_count + 1, slots = world->body_ids.slots;
     const size_t several = world->def.settings.substeps > 1 ? n : 0;
     if (!SADMM_GROW(world->collision_bodies, 0, slots) || !SADMM_GROW(world->start.rigid, 0, n) ||
         !SADMM_GROW(world->next, 0, n) || !SADMM_GROW(world->velocity, 0, 6 * n) ||
@@ -153,14 +156,14 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
     const bool jointed = sadmm_pair_table_count(&world->jointed_pairs) > 0;
     struct sadmm_collision_input input = {
         .shapes = world->shapes,
-        .shape_count = world->shape_slots,
+        .shape_count = world->shape_ids.slots,
         .geometries = world->geometries,
-        .geometry_count = world->shape_slots,
+        .geometry_count = world->shape_ids.slots,
         .hulls = world->shape_data.doubles > 0 ? world->shape_data.blocks : NULL,
         .hull_doubles = world->shape_data.doubles,
         .hull_revision = world->shape_data.revision,
         .bodies = world->collision_bodies,
-        .body_count = world->body_slots,
+        .body_count = world->body_ids.slots,
         .dt = settings.dt,
         .substeps_left = settings.substeps - 1 - substep,
         .margin = world->def.contact_margin,

@@ -9,8 +9,7 @@
 
 static bool acts(const sadmm_world *world, const struct sadmm_world_gear *gear)
 {
-    return gear->alive && gear->def.enabled && world->joints[gear->joint[0]].def.enabled &&
-           world->joints[gear->joint[1]].def.enabled;
+    return gear->def.enabled && world->joints[gear->joint[0]].def.enabled && world->joints[gear->joint[1]].def.enabled;
 }
 
 /* What it is between, in the (sub-)step at hand. */
@@ -28,7 +27,7 @@ static struct acting_gear act(sadmm_world *world, const struct sadmm_world_gear 
     const struct gear_joint joints[GEAR_JOINTS] = {gear_joint_of(world, gear, 0), gear_joint_of(world, gear, 1)};
     struct acting_gear out;
     for (int i = 0; i < GEAR_JOINTS; ++i)
-        out.joint[i] = *sadmm_world_act_joint(world, (int32_t)gear->joint[i], settings);
+        out.joint[i] = *sadmm_world_act_joint(world, &world->joints[gear->joint[i]], settings);
     gear_act(joints, gear->def.offset, settings, &out);
     *reaches = out.count < GEAR_BODIES || gear_leave_carrier(joints, settings, &out);
     return out;
@@ -70,10 +69,9 @@ sadmm_status sadmm_world_make_gear_rows(sadmm_world *world, const sadmm_settings
 {
     struct sadmm_rows *rows = &world->start.rows;
     world->joint_rows = rows->row_count;
-    for (size_t slot = 0; world->gear_count > 0 && slot < world->gear_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->gear_ids)) {
         struct sadmm_world_gear *gear = &world->gears[slot];
         const size_t r = rows->row_count;
-        if (!gear->alive) continue;
         bool reaches;
         int a, b;
         const struct acting_gear acting = act(world, gear, settings, &reaches);
@@ -94,15 +92,15 @@ sadmm_status sadmm_world_make_gear_rows(sadmm_world *world, const sadmm_settings
         sadmm_row_hard(rows, (int32_t)r, acting.bias);
         rows->lambda[r] = world->start.multiplier[r] = gear->next.force * settings->dt;
         /* of its islands it is a row of the first joint's as any other */
-        world->joint_sources[r] =
-            (struct sadmm_joint_source){.joint = (int32_t)gear->joint[0], .role = SADMM_ROLE_LOCK, .sign = 1};
+        world->joint_sources[r] = (struct sadmm_joint_source){
+            .joint = world->joints[gear->joint[0]].number, .role = SADMM_ROLE_LOCK, .sign = 1};
     }
     return SADMM_OK;
 }
 
 void sadmm_world_begin_gears(sadmm_world *world)
 {
-    for (size_t slot = 0; world->gear_count > 0 && slot < world->gear_slots; ++slot) {
+    for (SADMM_OBJECTS(slot, &world->gear_ids)) {
         world->gears[slot].next = world->gears[slot].last;
         if (!acts(world, &world->gears[slot])) world->gears[slot].next.force = 0;
     }
@@ -111,13 +109,11 @@ void sadmm_world_begin_gears(sadmm_world *world)
 void sadmm_world_keep_gear_rows(sadmm_world *world, double dt)
 {
     size_t r = world->joint_rows;
-    for (size_t slot = 0; world->gear_count > 0 && slot < world->gear_slots; ++slot)
-        if (world->gears[slot].alive && world->gears[slot].acts)
-            world->gears[slot].next.force = world->start.rows.lambda[r++] / dt;
+    for (SADMM_OBJECTS(slot, &world->gear_ids))
+        if (world->gears[slot].acts) world->gears[slot].next.force = world->start.rows.lambda[r++] / dt;
 }
 
 void sadmm_world_commit_gears(sadmm_world *world)
 {
-    for (size_t slot = 0; world->gear_count > 0 && slot < world->gear_slots; ++slot)
-        if (world->gears[slot].alive) world->gears[slot].last = world->gears[slot].next;
+    for (SADMM_OBJECTS(slot, &world->gear_ids)) world->gears[slot].last = world->gears[slot].next;
 }

@@ -247,15 +247,15 @@ static bool reserve(struct sadmm_hits *h, size_t slots)
 
 static unsigned char swept_kind(const struct sadmm_world_body *body, double dt)
 {
-    if (!body->alive || body->type != SADMM_BODY_DYNAMIC) return SADMM_SWEPT_FIXED;
+    if (body->type != SADMM_BODY_DYNAMIC) return SADMM_SWEPT_FIXED;
     return swept_body_is_damped(&body->rigid, dt) ? SADMM_SWEPT_NONE : SADMM_SWEPT_DYNAMIC;
 }
 
 void sadmm_world_mark_held(const sadmm_world *world, unsigned char *bodies, unsigned char mark)
 {
-    for (size_t k = 0; k < world->joint_slots; ++k) {
-        const struct sadmm_world_joint *joint = &world->joints[k];
-        for (int side = 0; joint->alive && side < 2; ++side)
+    for (size_t k = 0; k < world->step_joint_count; ++k) {
+        const struct sadmm_world_joint *joint = world->step_joints[k];
+        for (int side = 0; side < 2; ++side)
             if (joint->body[side] >= 0 && world->bodies[joint->body[side]].type == SADMM_BODY_DYNAMIC)
                 bodies[joint->body[side]] = mark;
     }
@@ -265,8 +265,9 @@ static void mark_bodies(struct taking *t)
 {
     const sadmm_world *world = t->world;
     unsigned char *kinds = t->hits->kinds;
-    for (size_t slot = 0; slot < world->body_slots; ++slot)
-        kinds[slot] = swept_kind(&world->bodies[slot], t->settings.dt);
+    for (size_t slot = 0; slot < world->body_ids.slots; ++slot)
+        kinds[slot] = sadmm_ids_has(&world->body_ids, slot) ? swept_kind(&world->bodies[slot], t->settings.dt)
+                                                            : SADMM_SWEPT_FIXED;
     sadmm_world_mark_held(world, kinds, SADMM_SWEPT_NONE);
     sadmm_collision_mark_pressed(world->collision, &world->contacts, kinds);
 }
@@ -418,7 +419,7 @@ sadmm_status sadmm_world_take_hits(sadmm_world *world, int substep)
     world->start.hit_first = world->start.hit_count;
     if (t.settings.hits == 0) return SADMM_OK;
     if (!world->hits) world->hits = (struct sadmm_hits *)sadmm_alloc(1, sizeof *world->hits);
-    if (!world->hits || !reserve(world->hits, world->body_slots)) return sadmm_fail_memory(&world->error, "hits");
+    if (!world->hits || !reserve(world->hits, world->body_ids.slots)) return sadmm_fail_memory(&world->error, "hits");
     t.hits = world->hits;
     t.input = sadmm_world_collision_input(world, substep);
     t.input.team = &world->team;

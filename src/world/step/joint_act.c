@@ -20,7 +20,7 @@ struct joint_body sadmm_world_joint_body(const sadmm_world *world, int32_t slot)
     return out;
 }
 
-static bool has_room(const sadmm_world *world) { return (size_t)world->dynamic_count <= 4 * world->joint_slots; }
+static bool has_room(const sadmm_world *world) { return (size_t)world->dynamic_count <= 4 * world->step_joint_count; }
 
 /* Of a dynamic body once a (sub-)step, however many joints it has; there is no room where few bodies have any. */
 static struct joint_side side_of(sadmm_world *world, struct joint_body body, const sadmm_settings *settings)
@@ -37,7 +37,7 @@ static struct joint_side side_of(sadmm_world *world, struct joint_body body, con
 bool sadmm_world_begin_acting(sadmm_world *world, const sadmm_settings *settings)
 {
     const size_t n = has_room(world) ? (size_t)world->dynamic_count : 0, before = SADMM_ROOM(world->joint_sides);
-    if (!SADMM_GROW(world->acting_joints, 0, world->joint_slots) || !SADMM_GROW(world->joint_sides, 0, n) ||
+    if (!SADMM_GROW(world->acting_joints, 0, world->step_joint_count) || !SADMM_GROW(world->joint_sides, 0, n) ||
         !SADMM_GROW(world->spins, 0, n))
         return false;
     if (SADMM_ROOM(world->joint_sides) != before)
@@ -48,10 +48,10 @@ bool sadmm_world_begin_acting(sadmm_world *world, const sadmm_settings *settings
     return true;
 }
 
-const struct acting_joint *sadmm_world_act_joint(sadmm_world *world, int32_t slot, const sadmm_settings *settings)
+const struct acting_joint *sadmm_world_act_joint(sadmm_world *world, const struct sadmm_world_joint *joint,
+                                                 const sadmm_settings *settings)
 {
-    const struct sadmm_world_joint *joint = &world->joints[slot];
-    struct acting_joint *acting = &world->acting_joints[slot];
+    struct acting_joint *acting = &world->acting_joints[joint->number];
     struct joint_body bodies[2] = {sadmm_world_joint_body(world, joint->body[0]),
                                    sadmm_world_joint_body(world, joint->body[1])};
     if (joint->coupling)

@@ -43,10 +43,7 @@ static struct ends ends_of(const sadmm_world *world, const struct sadmm_world_jo
     return e;
 }
 
-static bool closes(const struct sadmm_world_joint *joint)
-{
-    return joint->alive && joint->def.enabled && joint->def.locks;
-}
+static bool closes(const struct sadmm_world_joint *joint) { return joint->def.enabled && joint->def.locks; }
 
 static struct joint_closing closing_of(const sadmm_world *world, const struct sadmm_world_joint *joint,
                                        const sadmm_settings *settings)
@@ -96,8 +93,8 @@ static bool find_open(sadmm_world *world, const sadmm_settings *settings, double
 {
     bool any = false;
     *off = 0;
-    for (size_t slot = 0; slot < world->joint_slots; ++slot) {
-        const struct sadmm_world_joint *joint = &world->joints[slot];
+    for (size_t j = 0; j < world->step_joint_count; ++j) {
+        const struct sadmm_world_joint *joint = world->step_joints[j];
         if (!closes(joint)) continue;
         const struct joint_end end[2] = {end_of(world, joint, 0), end_of(world, joint, 1)};
         const double own = joint_opening(&joint->def, end);
@@ -133,7 +130,7 @@ static sadmm_status find_folding(sadmm_world *world, bool *any)
     sadmm_articulations_find_left(world->articulations, world->joint_constraints, world->row_left);
     for (size_t r = 0; r < world->joint_rows; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
-        struct sadmm_world_joint *joint = &world->joints[source->joint];
+        struct sadmm_world_joint *joint = world->step_joints[source->joint];
         double *was = &joint->next.left[source->coordinate];
         if (source->role != SADMM_ROLE_LOCK) continue;
         if (joint_row_folds(*was, world->row_left[r])) {
@@ -177,9 +174,8 @@ static bool make_rows(sadmm_world *world, const sadmm_settings *settings)
         world->closing_slots[k] = world->joint_constraints[k];
         world->closing_slots[k].first = world->closing_slots[k].count = 0;
     }
-    for (size_t slot = 0; slot < world->joint_slots; ++slot) {
-        const struct sadmm_world_joint *joint = &world->joints[slot];
-        if (!joint->alive) continue;
+    for (size_t j = 0; j < world->step_joint_count; ++j) {
+        const struct sadmm_world_joint *joint = world->step_joints[j];
         const size_t before = world->closing.constraint_count, places = (size_t)sadmm_joint_constraints(joint);
         if (places > 0 && closes(joint) && !add_rows(world, &world->closing_slots[at], joint, settings)) return false;
         if (world->closing.constraint_count > before) world->closing_slots[at] = world->closing.constraints[before];

@@ -65,11 +65,11 @@ static sadmm_joint_rates *best_rates(void)
 
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 
-static bool add_constraints(sadmm_world *world, int32_t slot, const struct acting_joint *acting,
-                            const struct joint_rates *rates, const struct all_laws *laws, double dt)
+static bool add_constraints(sadmm_world *world, const struct sadmm_world_joint *joint,
+                            const struct acting_joint *acting, const struct joint_rates *rates,
+                            const struct all_laws *laws, double dt)
 {
     struct sadmm_rows *rows = &world->start.rows;
-    const struct sadmm_world_joint *joint = &world->joints[slot];
     const size_t all = rows->row_count + (size_t)laws->count;
     if (!SADMM_GROW(world->joint_sources, rows->row_count, all) ||
         !SADMM_GROW(world->start.multiplier, rows->row_count, all))
@@ -93,9 +93,9 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
         sadmm_row_set(rows, (int32_t)r, law->gain, law->bias, law->compliance, law->lo, law->hi);
         rows->lambda[r] = world->start.multiplier[r] =
             law->sign * joint->next.force[law->role][law->coordinate] * dt;
-        world->joint_sources[r] = (struct sadmm_joint_source){slot, (int8_t)law->role, (int8_t)law->coordinate,
-                                                              (int8_t)law->sign, law->separation, law->slack,
-                                                              law->prescribed};
+        world->joint_sources[r] =
+            (struct sadmm_joint_source){joint->number,   (int8_t)law->role, (int8_t)law->coordinate, (int8_t)law->sign,
+                                        law->separation, law->slack,        law->prescribed};
     }
     return true;
 }
@@ -133,23 +133,22 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
     world->joints_acting = world->couplings_acting = 0;
     world->joint_constraint_count = 0;
     world->spins_known = false;
-    if (world->joint_count > 0 && !sadmm_world_begin_acting(world, settings))
+    if (world->step_joint_count > 0 && !sadmm_world_begin_acting(world, settings))
         return sadmm_fail_memory(&world->error, "the joints' rows");
-    for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
-        struct sadmm_world_joint *joint = &world->joints[slot];
+    for (size_t j = 0; j < world->step_joint_count; ++j) {
+        struct sadmm_world_joint *joint = world->step_joints[j];
         struct all_laws laws;
         struct joint_rates rates;
-        if (!joint->alive) continue;
         const size_t before = world->start.rows.constraint_count;
         if (!joint->def.enabled) {
             if (!add_slots(world, joint, before)) return sadmm_fail_memory(&world->error, "the joints' rows");
             continue;
         }
-        const struct acting_joint *acting = sadmm_world_act_joint(world, (int32_t)slot, settings);
+        const struct acting_joint *acting = sadmm_world_act_joint(world, joint, settings);
         find_rates(acting, &rates);
         find_laws(joint, acting, &rates, settings, &laws);
         if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
-        if (!add_constraints(world, (int32_t)slot, acting, &rates, &laws, settings->dt) ||
+        if (!add_constraints(world, joint, acting, &rates, &laws, settings->dt) ||
             !add_slots(world, joint, before))
             return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution says */
@@ -181,10 +180,25 @@ static sadmm_status filter_pairs(sadmm_world *world)
     return SADMM_OK;
 }
 
+/* All that a step makes rows of. */
+static bool list_step_joints(sadmm_world *world)
+{
+    const int32_t count = world->joint_ids.count + world->coupling_ids.count;
+    int32_t number = 0;
+    world->step_joint_count = 0;
+    if (!SADMM_GROW(world->step_joints, 0, (size_t)count)) return false;
+    for (SADMM_OBJECTS(slot, &world->joint_ids)) world->step_joints[number++] = &world->joints[slot];
+    for (SADMM_OBJECTS(slot, &world->coupling_ids)) world->step_joints[number++] = &world->couplings[slot].joint;
+    for (int32_t j = 0; j < count; ++j) world->step_joints[j]->number = j;
+    world->step_joint_count = (size_t)count;
+    return true;
+}
+
 sadmm_status sadmm_world_begin_joints(sadmm_world *world)
 {
-    for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
-        struct sadmm_world_joint *joint = &world->joints[slot];
+    if (!list_step_joints(world)) return sadmm_fail_memory(&world->error, "joints");
+    for (size_t j = 0; j < world->step_joint_count; ++j) {
+        struct sadmm_world_joint *joint = world->step_joints[j];
         joint->next = joint->last;
         if (!joint->def.enabled) joint_forget_forces(&joint->next);
     }
@@ -208,9 +222,9 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
     const struct acting_joint *acting = NULL;
     for (size_t r = 0; r < world->joint_rows; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
-        if (!joint || joint != &world->joints[source->joint]) {
+        if (!joint || joint != world->step_joints[source->joint]) {
             if (joint) end_joint(world, joint, acting, settings->dt);
-            joint = &world->joints[source->joint];
+            joint = world->step_joints[source->joint];
             acting = &world->acting_joints[source->joint];
             v3_store(acting->middle.point, joint->next.point);
         }
@@ -229,7 +243,6 @@ static void commit_joint(struct sadmm_world_joint *joint)
 
 void sadmm_world_commit_joints(sadmm_world *world)
 {
-    for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot)
-        if (world->joints[slot].alive) commit_joint(&world->joints[slot]);
+    for (size_t j = 0; j < world->step_joint_count; ++j) commit_joint(world->step_joints[j]);
     sadmm_world_commit_gears(world);
 }

@@ -4,8 +4,8 @@
 
 #include "world/state/world_state.h"
 
-/* Pairs of bodies that are not to meet, into `filtered_pairs`, and frictions of pairs as lists; and what joints kept of
- * the last step into what they keep of this one. */
+/* Pairs of bodies that are not to meet, into `filtered_pairs`, and frictions of pairs as lists; the joints of the step
+ * as a list, and what they kept of the last step into what they keep of this one. */
 sadmm_status sadmm_world_begin_joints(sadmm_world *world);
 /* The most constraints that a joint's rows may take; those of couplings have room for all of their drives. */
 int32_t sadmm_joint_constraints(const struct sadmm_world_joint *joint);

@@ -24,7 +24,7 @@ static void each_force(sadmm_world *world, double dt, on_force *f)
     size_t end;
     for (size_t r = 0; r < world->joint_rows; r = end) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
-        const struct sadmm_world_joint *joint = &world->joints[source->joint];
+        const struct sadmm_world_joint *joint = world->step_joints[source->joint];
         for (end = r + 1; end < world->joint_rows && world->joint_sources[end].joint == source->joint;) ++end;
         for (int s = 0; s < 2; ++s) {
             const int32_t body = world->acting_joints[source->joint].side[s].system_body;

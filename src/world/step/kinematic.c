@@ -21,9 +21,8 @@ static sadmm_status list_kinematic(sadmm_world *world)
     if (world->kinematic_listed) return SADMM_OK;
     if (!SADMM_GROW(world->kinematic_slots, 0, (size_t)world->kinematic_count))
         return sadmm_fail_memory(&world->error, "kinematic bodies");
-    for (size_t slot = 0; slot < world->body_slots; ++slot)
-        if (world->bodies[slot].alive && world->bodies[slot].type == SADMM_BODY_KINEMATIC)
-            world->kinematic_slots[count++] = (int32_t)slot;
+    for (SADMM_OBJECTS(slot, &world->body_ids))
+        if (world->bodies[slot].type == SADMM_BODY_KINEMATIC) world->kinematic_slots[count++] = (int32_t)slot;
     world->kinematic_listed = true;
     return SADMM_OK;
 }
@@ -32,7 +31,7 @@ sadmm_status sadmm_world_slot_not_finite(sadmm_world *world, int32_t slot)
 {
     return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
                       "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it",
-                      slot + 1, world->bodies[slot].generation, sadmm_world_body_name(&world->bodies[slot]));
+                      slot + 1, world->body_ids.generations[slot], sadmm_world_body_name(&world->bodies[slot]));
 }
 
 sadmm_status sadmm_world_gather_kinematic(sadmm_world *world)
