@@ -14,6 +14,7 @@
 #include "cli/output.h"
 #include "core/base/error.h"
 #include "core/base/memory.h"
+#include "core/base/settings_fields.h"
 #include "joint_cases.h"
 #include "subadmm/world.h"
 
@@ -95,12 +96,12 @@ static sadmm_status run_case(const struct options *o, const struct joint_case *w
     sadmm_world *world = NULL;
     def.backend = (sadmm_backend)o->backend;
     def.precision = (sadmm_precision)o->precision;
+    sadmm_settings_fix_work(&def.settings);
     def.settings.dt = dt;
     def.settings.gravity[2] = -gravity;
     def.settings.method = (sadmm_method)o->method;
     def.settings.iterations = (int)o->iterations;
-    def.settings.certificate_tolerance = o->tolerance;
-    def.settings.certificate_momentum_tolerance = 1e-9;
+    def.settings.tolerance = o->tolerance;
     sadmm_status status = joint_case_build(which, &def, &world);
     if (status == SADMM_OK) status = joint_case_run(which, world, steps_of(dt), ROWS, samples);
     if (status != SADMM_OK)

@@ -12,6 +12,7 @@
 #include "cli/output.h"
 #include "core/base/clock.h"
 #include "core/base/parallel.h"
+#include "core/base/settings_fields.h"
 #include "core/solve/certificate.h"
 #include "core/solve/schedule.h"
 #include "lattice.h"
@@ -111,6 +112,7 @@ static sadmm_status run_row(const struct sadmm_kernels *k, struct lattice *latti
                             struct row *row, struct sadmm_error *error)
 {
     struct sadmm_settings settings = sadmm_settings_default();
+    sadmm_settings_fix_work(&settings);
     settings.method = method;
     settings.threads = row->threads;
     settings.penalty_period = 0;

@@ -10,6 +10,7 @@
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/base/memory.h"
+#include "core/base/settings_fields.h"
 #include "known_rows.h"
 #include "motion_rows.h"
 
@@ -161,6 +162,7 @@ static int run_known(const struct options *o)
 {
     struct sadmm_error error = {SADMM_OK, ""};
     sadmm_world_def def = sadmm_world_def_default();
+    sadmm_settings_fix_work(&def.settings);
     if (o->json || o->scene != default_scene) return wrong("--known takes neither --scene nor --json");
     if (o->halvings < 1 || o->halvings >= KNOWN_LEVELS)
         return bad_number("halvings", o->halvings, "1 to 4 with --known");

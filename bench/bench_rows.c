@@ -11,6 +11,7 @@
 #include "cli/interrupt.h"
 #include "core/base/error.h"
 #include "core/base/memory.h"
+#include "core/base/settings_fields.h"
 #include "scenes/scenes.h"
 #include "subadmm/subadmm.h"
 
@@ -115,6 +116,7 @@ static sadmm_status measure(sadmm_problem *const problems[2], const struct optio
 {
     double us[2][MOST_PAIRS], ratio[MOST_PAIRS];
     sadmm_settings settings = sadmm_settings_default();
+    sadmm_settings_fix_work(&settings);
     settings.method = method;
     settings.threads = (int)o->threads;
     settings.penalty_period = 0;

@@ -4,6 +4,7 @@
 
 #include "cli/interrupt.h"
 #include "core/base/clock.h"
+#include "core/base/settings_fields.h"
 #include "core/solve/schedule.h"
 
 enum { MOST_SAMPLES = 1280, MOST_REPEATS = 15 };
@@ -115,6 +116,7 @@ sadmm_status cold_convergence(const struct set_problem *problem, sadmm_method me
     struct cold c = {
         .problem = problem, .plan = plan, .series = series, .settings = sadmm_settings_default(), .error = error};
     int count = 0, density = density_for(problem);
+    sadmm_settings_fix_work(&c.settings);
     c.settings.method = method;
     c.settings.dt = problem->dt;
     c.settings.penalty_period = problem->penalty_period;

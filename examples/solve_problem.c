@@ -24,7 +24,7 @@ int main(void)
     }
     sadmm_settings settings = sadmm_settings_default();
     settings.dt = dt;
-    settings.certificate_tolerance = 1e-12;
+    settings.tolerance = 1e-12;
     settings.iterations = 10000;
 
     sadmm_problem *problem = NULL;

@@ -46,7 +46,7 @@ static sadmm_status print_report(sadmm_world *world)
 int main(void)
 {
     sadmm_world_def def = sadmm_world_def_default();
-    def.settings.certificate_tolerance = 1e-6; /* m/s */
+    def.settings.tolerance = 1e-6;             /* m/s */
     def.settings.iterations = 1000;            /* at most; a step ends when the tolerance is met */
     def.settings.certify = true;
 

@@ -3,11 +3,12 @@
 #ifndef SADMM_TESTS_BETWEEN_STEPS_H
 #define SADMM_TESTS_BETWEEN_STEPS_H
 
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static inline sadmm_world_def between_def(double dt, double gravity)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.settings.dt = dt;
     def.settings.gravity[2] = -gravity;

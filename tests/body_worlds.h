@@ -7,6 +7,7 @@
 #ifdef BODIES_ON_CUDA
 #include "cuda_worlds.h"
 #endif
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static const struct {
@@ -36,7 +37,7 @@ static const double G = 9.81;
 
 static inline sadmm_world_def bodies_def(void)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.settings.threads = 1;
     def.settings.iterations = 100;
     return def;

@@ -13,6 +13,7 @@
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
+#include "fixed_work.h"
 #define force_tier cuda_emulation_force_tier
 #define force_cluster cuda_emulation_force_cluster
 #define tier_of cuda_emulation_tier_of
@@ -213,7 +214,7 @@ static inline void runner_create(struct runner *r, const struct sadmm_kernels *k
 
 static inline sadmm_status runner_begin(struct runner *r, const struct scene *scene, sadmm_method method)
 {
-    r->settings = sadmm_settings_default();
+    r->settings = fixed_settings();
     r->settings.method = method;
     r->settings.iterations = 100; /* more than the penalty period: plans of the method paper have updates */
     r->settings.warm_start = scene->warm;
@@ -280,7 +281,7 @@ static inline bool device_has_clusters(const struct sadmm_kernels *table)
     (void)table;
     return true;
 #else
-    const sadmm_settings settings = sadmm_settings_default();
+    const sadmm_settings settings = fixed_settings();
     struct contact_problem *p = make_problem(&scenes[0], &settings);
     struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
     struct sadmm_context *c = NULL;
@@ -331,7 +332,7 @@ static inline bool solve_fails_at(const struct sadmm_kernels *table, enum sadmm_
     sadmm_status status = table->create(1, &c, &error);
     if (status == SADMM_OK) {
         force_tier(table, c, tier);
-        status = sadmm_schedule_solve(table, c, &p->system, settings, &plan, &report, &error);
+        status = sadmm_schedule_solve(table, c, &p->system, settings, &plan, NULL, &report, &error);
     } else {
         ck_assert_ptr_null(c);
     }

@@ -13,6 +13,7 @@
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
+#include "fixed_work.h"
 #define force_tier cuda_emulation_force_tier
 #define tier_of cuda_emulation_tier_of
 #define tune_capacities cuda_emulation_tune_capacities
@@ -90,7 +91,7 @@ static inline sadmm_body_id add_box(sadmm_world *world, double x, double y, doub
 /* Towers of boxes that fall a little and land in different steps; every third one leans on its neighbour. */
 static inline sadmm_world *towers_on(int count, int height, double friction, int precision, int device)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)precision;
     def.settings.method = SADMM_METHOD_PAPER; /* use_fast for the other one */

@@ -5,6 +5,7 @@
 #define TESTS_DROPS_H
 
 #include "core/math/quat.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 enum drop_ground { DROP_PLANE, DROP_PLATE, DROP_SHEET, DROP_HEIGHTS, DROP_GRID, DROP_FLOATING, DROP_GROUNDS };
@@ -200,7 +201,7 @@ static inline vec3 drop_seen_from(const sadmm_body_state *ground, double offset,
 static inline struct drop_result drop_all(const struct drop_case *c)
 {
     uint64_t seed = c->seed * UINT64_C(0x9E3779B97F4A7C15) + 1;
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     struct drop_result result = {0, 0, 0, 0, 0};
     const bool floating = c->ground == DROP_FLOATING;
     double size[DROP_BODIES];

@@ -9,12 +9,13 @@
 
 #define FIRST_settings(M) \
     M(size_t, struct_size, ) M(double, dt, ) M(int, substeps, ) M(double, gravity, [3]) M(sadmm_method, method, ) \
-    M(int, iterations, ) M(double, relaxation, ) M(int, penalty_period, ) M(double, penalty_mass_factor, ) \
-    M(double, penalty_offset, ) M(double, penalty_ratio_limit, ) M(bool, penalty_update_warm, ) \
-    M(bool, warm_start, ) M(int, ncp_points, ) M(double, residual_tolerance, ) M(double, certificate_tolerance, ) \
-    M(double, certificate_momentum_tolerance, ) M(int, check_period, ) M(bool, measure_residuals, ) \
-    M(bool, certify, ) M(bool, recover_wrenches, ) M(double, correction_factor, ) M(double, slop, ) \
-    M(double, correction_speed, ) M(double, restitution_threshold, ) M(int, hits, ) M(int, threads, )
+    M(double, tolerance, ) M(int, iterations, ) M(double, relaxation, ) M(int, penalty_period, ) \
+    M(double, penalty_mass_factor, ) M(double, penalty_offset, ) M(double, penalty_ratio_limit, ) \
+    M(bool, penalty_update_warm, ) \
+    M(bool, warm_start, ) M(int, ncp_points, ) M(double, residual_tolerance, ) M(int, check_period, ) \
+    M(bool, measure_residuals, ) M(bool, certify, ) M(bool, recover_wrenches, ) \
+    M(double, correction_factor, ) M(double, slop, ) M(double, correction_speed, ) \
+    M(double, restitution_threshold, ) M(int, hits, ) M(int, threads, )
 
 #define FIRST_world_def(M) \
     M(size_t, struct_size, ) M(sadmm_backend, backend, ) M(sadmm_precision, precision, ) M(int, device, ) \
@@ -86,7 +87,8 @@
 #define FIRST_step_report(M) \
     M(sadmm_backend, backend, ) M(sadmm_precision, precision, ) M(int, threads, ) M(int64_t, step, ) \
     M(double, time, ) M(int32_t, bodies, ) M(int32_t, joints, ) M(int32_t, couplings, ) M(int32_t, contacts, ) \
-    M(int32_t, pairs, ) M(int, iterations, ) M(double, iterations_mean, ) M(bool, converged, ) M(int32_t, limited, ) \
+    M(int32_t, pairs, ) M(int, iterations, ) M(double, iterations_mean, ) M(double, error, ) \
+    M(sadmm_step_error, error_kind, ) M(int64_t, unsolved, ) M(bool, converged, ) M(int32_t, limited, ) \
     M(int64_t, repeated, ) M(double, penetration_max, ) M(double, joint_drift, ) M(sadmm_phase_times, ms, ) \
     M(double, certify_ms, ) M(sadmm_residual, residual, ) M(sadmm_certificate, certificate, )
 

@@ -2,13 +2,14 @@
 #ifndef SADMM_TESTS_QUERY_WORLDS_H
 #define SADMM_TESTS_QUERY_WORLDS_H
 
+#include "fixed_work.h"
 #include "manifold_tools.h"
 #include "mesh_tools.h"
 #include "scene_tools.h"
 
 static inline sadmm_world *empty_world(void)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.settings.threads = 1;
     return create_world(&def);

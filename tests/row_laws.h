@@ -9,6 +9,7 @@
 
 #include "core/model/rows.h"
 #include "core/solve/schedule.h"
+#include "fixed_work.h"
 
 static const sadmm_method law_methods[] = {SADMM_METHOD_PAPER, SADMM_METHOD_FAST};
 
@@ -21,7 +22,7 @@ static struct sadmm_solve_report solve_rows(const struct sadmm_kernels *table, s
     struct sadmm_solve_report report;
     struct sadmm_plan plan = sadmm_plan_make(system, settings);
     ck_assert_int_eq(table->create(0, &c, &error), SADMM_OK);
-    sadmm_status status = sadmm_schedule_solve(table, c, system, settings, &plan, &report, &error);
+    sadmm_status status = sadmm_schedule_solve(table, c, system, settings, &plan, NULL, &report, &error);
     ck_assert_msg(status == SADMM_OK, "%s", error.message);
     table->destroy(c);
     return report;
@@ -29,7 +30,7 @@ static struct sadmm_solve_report solve_rows(const struct sadmm_kernels *table, s
 
 static sadmm_settings settings_of(sadmm_method method, int iterations)
 {
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     s.method = method;
     s.iterations = iterations;
     s.threads = 1;

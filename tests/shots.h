@@ -6,6 +6,7 @@
 #define TESTS_SHOTS_H
 
 #include "drops.h"
+#include "fixed_work.h"
 
 enum { SHOT_PAIRS = 40, SHOT_STEPS = 20 };
 
@@ -70,7 +71,7 @@ static inline int shots_through(uint64_t number, bool hulls)
 {
     static const double steps[] = {0.001, 0.005, 0.01, 0.02};
     uint64_t seed = number * UINT64_C(0x9E3779B97F4A7C15) + 1;
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     struct shot shots[SHOT_PAIRS];
     int through = 0;
     for (int k = 0; k < 20; ++k) drop_unit(&seed);

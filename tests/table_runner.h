@@ -8,6 +8,7 @@
 
 #include "config.h"
 #include "core/base/parallel.h"
+#include "fixed_work.h"
 #include "runner.h"
 
 /* ---- tables -------------------------------------------------------------------------------------------------- */
@@ -120,7 +121,7 @@ static inline double scene_tolerance(const struct scene *scene, const struct sad
 
 static sadmm_settings scene_settings(const struct scene *scene)
 {
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     double angle = scene->tilt * 0.017453292519943295;
     s.gravity[0] = 9.81 * sin(angle);
     s.gravity[2] = -9.81 * cos(angle);

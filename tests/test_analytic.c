@@ -14,8 +14,9 @@
 #include "run_suite.h"
 enum { EMULATED = 0 };
 #endif
-#include "scenes/place.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
+#include "scenes/place.h"
 
 static const struct {
     sadmm_backend backend;
@@ -81,7 +82,7 @@ static const double degree = 0.017453292519943295;
 /* `iterations` are the paper's; a fifth of them is enough for fast, to the same tolerances. */
 static sadmm_world_def world_def(int solver, double dt, int iterations)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = solvers[solver].backend;
     def.precision = solvers[solver].precision;
     def.settings.method = solvers[solver].method;

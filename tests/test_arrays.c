@@ -2,6 +2,7 @@
  * may not be set is refused as a whole. */
 #include <stdint.h>
 
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 enum { MOST = 64 * 13 };
@@ -33,7 +34,7 @@ static sadmm_body_id add_body(sadmm_world *world, sadmm_body_type type, double x
 static struct machine build_machine(void)
 {
     struct machine m = {0};
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.settings.threads = 1;
     m.world = create_world(&def);
     sadmm_body_def ground = sadmm_body_def_default();

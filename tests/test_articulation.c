@@ -1,6 +1,7 @@
 /* Articulations and their block direct solve (core/solve/articulation.h): where loads and masses are far beyond what an
  * iteration of few steps brings along a mechanism. */
 #include "failed_step.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 #include "solvers.h"
 
@@ -13,7 +14,7 @@ static const sadmm_body_id WORLD = {0, 0};
 
 static sadmm_world *new_world(int solver, double dt, int iterations)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = solvers[solver].backend;
     def.precision = solvers[solver].precision;
     def.settings.method = solvers[solver].method;

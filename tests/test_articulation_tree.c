@@ -8,6 +8,7 @@
 #include "core/model/system_math.h"
 #include "core/solve/articulation.h"
 #include "core/solve/articulation_part.h"
+#include "fixed_work.h"
 #include "run_suite.h"
 #include "subadmm/settings.h"
 
@@ -150,7 +151,7 @@ static void make_tree(struct tree *t, uint64_t seed)
 {
     memset(t, 0, sizeof *t);
     state = seed * UINT64_C(0x9e3779b97f4a7c15) + 1;
-    t->settings = sadmm_settings_default();
+    t->settings = fixed_settings();
     t->settings.ncp_points = 1; /* rows to rounding */
     t->bodies = 2 + below(MOST_BODIES - 1);
     const bool anchored = below(2);

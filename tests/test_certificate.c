@@ -5,11 +5,13 @@
 #include <string.h>
 
 #include "contact_problems.h"
-#include "core/solve/certificate.h"
 #include "core/base/memory.h"
 #include "core/model/system_math.h"
-#include "subadmm/problem.h"
+#include "core/solve/certificate.h"
+#include "core/solve/solve_error.h"
+#include "fixed_work.h"
 #include "run_suite.h"
+#include "subadmm/problem.h"
 
 /* Expected values below are exact in real arithmetic with factors near 1: a few roundings. */
 #define ROUNDING 1e-14
@@ -238,7 +240,7 @@ END_TEST
 /* The same data in its different clothes: rigid bodies and separations, A and b and e, contacts as Jacobian rows. */
 START_TEST(one_value_for_every_form)
 {
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     struct sadmm_error error;
     sadmm_certificate rigid, raw, rows;
     struct contact_problem *p = contact_problem_mixed((uint64_t)_i, 0.4);
@@ -282,7 +284,7 @@ END_TEST
 START_TEST(not_a_number_shows)
 {
     static const double masses[] = {1, 1, 1};
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     struct sadmm_error error;
     sadmm_certificate c = sadmm_certificate_none();
     struct contact_problem *p = contact_problem_stack(masses, 3, 0.5);
@@ -300,7 +302,7 @@ END_TEST
 
 START_TEST(workspace_is_kept_and_failures_change_nothing)
 {
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     struct sadmm_error error;
     struct sadmm_certificate_workspace workspace = {0};
     sadmm_certificate c = sadmm_certificate_none(), first;
@@ -326,39 +328,69 @@ START_TEST(workspace_is_kept_and_failures_change_nothing)
 }
 END_TEST
 
-/* Three boxes side by side on exact impulses, a fourth on top of the last: three islands. Then one impulse is wrong,
- * then a velocity. Momentum is inspected as in momentum_max, relative to the largest. */
-START_TEST(islands_above_tolerance)
+static int64_t unsolved(struct contact_problem *p, const sadmm_settings *s)
 {
+    struct sadmm_solve_errors errors = {0};
     struct sadmm_error error = {SADMM_OK, ""};
+    ck_assert_int_eq(sadmm_solve_errors_find(&errors, &p->system, s, SADMM_F64, &error), SADMM_OK);
+    const int64_t count = sadmm_solve_errors_sum(&errors, s->tolerance).unsolved;
+    sadmm_solve_errors_free(&errors);
+    return count;
+}
+
+/* Three boxes side by side on exact impulses, a fourth on top of the last: three islands. Then one impulse is wrong, by
+ * so much of a box's weight: what the box owes is as much of g dt; then a velocity. */
+START_TEST(islands_that_miss_the_tolerance)
+{
     struct contact_problem *p = contact_problem_new();
-    sadmm_settings s = sadmm_settings_default();
-    sadmm_certificate c;
+    sadmm_settings s = fixed_settings();
+    const double weight = 9.81 * s.dt, off = 0.01;
+    s.tolerance = 1e-9;
     for (int i = 0; i < 4; ++i) {
         double x = i < 3 ? i : 2, z = i < 3 ? 0 : 0.2;
         contact_problem_box(p, 1, 0.1, 0.1, 0.1, x, 0, z + 0.1);
         contact_problem_touch(p, i < 3 ? -1 : 2, i, (double[]){x, 0, z}, (double[]){0, 0, 1}, 0, 0.5, 0);
-        p->contacts.points[i].impulse[2] = (i == 2 ? 2 : 1) * 9.81 * s.dt;
+        p->contacts.points[i].impulse[2] = (i == 2 ? 2 : 1) * weight;
     }
-    ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
-    ck_assert_int_eq(c.islands_above, -1);
-    s.certificate_tolerance = s.certificate_momentum_tolerance = 1e-9;
-    ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
-    ck_assert_int_eq(c.islands_above, 0);
-    p->contacts.points[3].impulse[2] *= 1.01; /* both boxes of one island */
-    ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
-    ck_assert_int_eq(c.islands_above, 1);
-    p->system.velocity[2] = -1e-6;
-    ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
-    ck_assert_int_eq(c.islands_above, 2);
-    p->system.velocity[2] = 0;
-    const double momentum = 0.01 / 1.01; /* the wrong impulse's share of itself */
+    ck_assert_int_eq(unsolved(p, &s), 0);
+    p->contacts.points[3].impulse[2] += off * weight; /* both boxes of one island */
     for (int above = 0; above < 2; ++above) {
-        s.certificate_momentum_tolerance = above ? 0.99 * momentum : 1.01 * momentum;
-        ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
-        ck_assert_double_eq_tol(c.momentum_max, momentum, 1e-14); /* rounding of shares of 1 */
-        ck_assert_int_eq(c.islands_above, above);
+        s.tolerance = (above ? 0.999 : 1.001) * off * weight;
+        ck_assert_int_eq(unsolved(p, &s), above);
     }
+    s.tolerance = 1e-9;
+    ck_assert_int_eq(unsolved(p, &s), 1);
+    p->system.velocity[2] = -1e-6;
+    ck_assert_int_eq(unsolved(p, &s), 2);
+    contact_problem_free(p);
+}
+END_TEST
+
+/* The same natural map as the certificate's, and where a number is not one, the tolerance is missed. */
+START_TEST(errors_of_islands_are_the_certificates)
+{
+    struct sadmm_solve_errors errors = {0};
+    struct sadmm_error error = {SADMM_OK, ""};
+    struct contact_problem *p = contact_problem_new();
+    sadmm_settings s = fixed_settings();
+    sadmm_certificate c;
+    for (int i = 0; i < 3; ++i) {
+        contact_problem_box(p, 1 + i, 0.1, 0.15, 0.2, 0, 0, 0.2 * i + 0.1);
+        for (int k = 0; k < 3; ++k)
+            contact_problem_touch(p, i - 1, i, (double[]){0.1 * k, 0.05 * k * k, 0.2 * i}, (double[]){0, 0.6, 0.8},
+                                  -1e-3 * k, k == 2 ? 0 : 0.5, 0);
+        for (int k = 0; k < 6; ++k) p->system.velocity[6 * i + k] = 0.01 * (k + 1) * (i - 1);
+    }
+    for (size_t k = 0; k < p->contacts.point_count; ++k)
+        for (int j = 0; j < 3; ++j) p->contacts.points[k].impulse[j] = 0.01 * (double)(k % 4) * (j + 1);
+    ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
+    ck_assert_int_eq(sadmm_solve_errors_find(&errors, &p->system, &s, SADMM_F64, &error), SADMM_OK);
+    ck_assert_double_gt(c.ncp_max, 1e-3);
+    ck_assert_double_eq_tol(sadmm_solve_errors_sum(&errors, 1).law, c.ncp_max, 1e-14); /* rounding of 0.1 m/s */
+    p->system.velocity[0] = NAN;
+    ck_assert_int_eq(sadmm_solve_errors_find(&errors, &p->system, &s, SADMM_F64, &error), SADMM_OK);
+    ck_assert_int_eq(sadmm_solve_errors_sum(&errors, 1e300).unsolved, 1);
+    sadmm_solve_errors_free(&errors);
     contact_problem_free(p);
 }
 END_TEST
@@ -371,7 +403,8 @@ int main(void)
     tcase_add_test(cases, known_contact_errors);
     tcase_add_test(cases, momentum_error);
     tcase_add_test(cases, siconos_measure);
-    tcase_add_test(cases, islands_above_tolerance);
+    tcase_add_test(cases, islands_that_miss_the_tolerance);
+    tcase_add_test(cases, errors_of_islands_are_the_certificates);
     tcase_add_test(cases, hard_and_soft_rows);
     tcase_add_test(cases, worst_constraint);
     tcase_add_loop_test(cases, one_value_for_every_form, 1, 5);

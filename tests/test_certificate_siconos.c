@@ -10,8 +10,9 @@
 #include <gfc3d_compute_error.h>
 
 #include "contact_problems.h"
-#include "core/solve/certificate.h"
 #include "core/model/system_math.h"
+#include "core/solve/certificate.h"
+#include "fixed_work.h"
 #include "run_suite.h"
 
 /* Dense matrices are stored by columns; NM_zentry's arguments changed between versions. */
@@ -95,7 +96,7 @@ static double siconos_error(const struct sadmm_system *system)
 START_TEST(same_value)
 {
     static const double speeds[] = {0, 1e-3, 1, 50}, impulses[] = {0, 1e-6, 0.1, 30};
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     struct sadmm_error error;
     struct contact_problem *p = contact_problem_mixed(10 + (uint64_t)_i, _i % 3 == 0 ? 0 : 0.3 * (1 + _i % 3));
     p->block_count = 4; /* the contacts; siconos has no joints */

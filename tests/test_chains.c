@@ -2,6 +2,7 @@
  * joints closed at the end of a step (core/model/joint_close.h). */
 #include "core/math/rigid.h"
 #include "fewer.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 #include "solvers.h"
 
@@ -11,7 +12,7 @@ static const double GRAVITY = 9.81;
 
 static sadmm_world *new_world(int solver, double dt)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = solvers[solver].backend;
     def.precision = solvers[solver].precision;
     def.settings.method = solvers[solver].method;

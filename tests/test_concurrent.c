@@ -3,6 +3,7 @@
 #include <check.h>
 #include <pthread.h>
 
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 enum { THREADS = 4 };
@@ -11,7 +12,7 @@ enum { THREADS = 4 };
 static void *create_and_step(void *hash)
 {
     for (int k = 0; k < 20; ++k) {
-        sadmm_world_def def = sadmm_world_def_default();
+        sadmm_world_def def = fixed_world_def();
         sadmm_backend_info info;
         def.precision = k % 2 ? SADMM_F32 : SADMM_F64;
         def.settings.threads = 1;

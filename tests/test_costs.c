@@ -3,6 +3,7 @@
  * a call at every branch (-fsanitize-coverage=trace-pc), and what it copies and clears counts by the cache line. */
 #include <stdint.h>
 
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 /* ---- counting ---------------------------------------------------------------------------------------------------- */
@@ -343,7 +344,7 @@ static const struct {
 
 static double cost(int which, int n)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.settings.threads = 1;
     def.settings.gravity[2] = 0;
     struct many m = {create_world(&def), n, calloc((size_t)n, sizeof *m.bodies), calloc((size_t)n, sizeof *m.shapes)};

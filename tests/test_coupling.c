@@ -4,6 +4,7 @@
 #include "core/base/parallel.h"
 #include "core/math/rigid.h"
 #include "failed_step.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static const double G = 9.81, UNIT[4] = {1, 0, 0, 0}, ORIGIN[3] = {0, 0, 0};
@@ -22,7 +23,7 @@ enum { SOLVERS = 3 };
 /* exact: iterations until nothing changes any more. */
 static sadmm_world *new_world(int solver, double dt, bool exact)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = solvers[solver].backend;
     def.precision = solvers[solver].precision;
     def.settings.threads = 1;

@@ -7,6 +7,7 @@
  * why.
  */
 #include "cuda_runner.h"
+#include "fixed_work.h"
 #include "row_laws.h"
 
 /* ---- entries against the literal form -------------------------------------------------------------------------- */
@@ -281,7 +282,7 @@ END_TEST
 static void solve(struct runner *r, const struct scene *scene)
 {
     struct sadmm_solve_report report;
-    r->settings = sadmm_settings_default();
+    r->settings = fixed_settings();
     r->settings.method = SADMM_METHOD_PAPER;
     r->settings.warm_start = scene->warm;
     r->settings.measure_residuals = true;
@@ -290,7 +291,7 @@ static void solve(struct runner *r, const struct scene *scene)
     contact_problem_free(r->p);
     r->p = make_problem(scene, &r->settings);
     r->plan = sadmm_plan_make(&r->p->system, &r->settings);
-    CALL(r, sadmm_schedule_solve(r->k, r->c, &r->p->system, &r->settings, &r->plan, &report, &r->error));
+    CALL(r, sadmm_schedule_solve(r->k, r->c, &r->p->system, &r->settings, &r->plan, NULL, &report, &r->error));
 }
 
 static void check_same_solution(struct runner *a, struct runner *b, const char *what)
@@ -365,7 +366,7 @@ START_TEST(calls_that_fail)
 {
     const struct sadmm_kernels *table = tables[_i];
     const struct scene *scene = &scenes[0];
-    sadmm_settings settings = sadmm_settings_default();
+    sadmm_settings settings = fixed_settings();
     settings.method = SADMM_METHOD_PAPER;
     settings.warm_start = false;
     settings.measure_residuals = true;

@@ -4,13 +4,14 @@
 #include "core/model/joint_trapezoid.h"
 #include "cuda_worlds.h"
 #include "fewer.h"
+#include "fixed_work.h"
 
 static const sadmm_body_id WORLD = {0, 0};
 static const double LENGTH = 0.2; /* of a link */
 
 static sadmm_world *new_world(int precision, sadmm_method method, int substeps, double dt)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)precision;
     def.settings.method = method;

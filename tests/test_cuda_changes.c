@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "core/base/memory.h"
 #include "cuda_worlds.h"
 
 static sadmm_world *small_world(int precision, int fast)
@@ -323,10 +324,7 @@ static void change_numbers(sadmm_world *world, int step)
     s.penalty_mass_factor = 16 + step % 2;
     s.penalty_offset = 1e5 + 1e3 * (step % 3);
     s.penalty_ratio_limit = 4 + step % 2;
-    if (s.certificate_tolerance > 0) {
-        s.certificate_tolerance = 1e-5 * (1 + step % 3);
-        s.certificate_momentum_tolerance = 1e-5 * (1 + step % 2);
-    }
+    if (s.tolerance > 0) s.tolerance = 1e-5 * (1 + step % 3);
     MUST(world, sadmm_world_set_settings(world, &s));
 }
 
@@ -346,7 +344,7 @@ START_TEST(numbers_of_the_settings_change_at_every_step)
             s.penalty_period = 4;
             s.warm_start = at != PAPER_COLD && at != FAST_COLD;
             s.check_period = 4;
-            s.certificate_tolerance = at == STOPPING ? 1e-5 : 0;
+            s.tolerance = at == STOPPING ? 1e-5 : 0;
             /* sends the world through the host; never met, or always where the certificate is to decide */
             s.residual_tolerance = w > 0 ? 0 : at == STOPPING ? 1e300 : 1e-300;
             if (w == 0 && at != STOPPING) s.check_period = 1000000;

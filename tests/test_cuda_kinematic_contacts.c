@@ -4,6 +4,7 @@
  * rounding, so that there worlds in which kinematic bodies turn are compared for a short while and closely; those in
  * which none turns are equal there, too. */
 #include "cuda_worlds.h"
+#include "fixed_work.h"
 
 enum { LIFT, BELT, PUSHER, REST, LEFT, RIGHT, POST, TABLE, KINEMATIC, FIRST_DYNAMIC = KINEMATIC + 1 };
 
@@ -27,7 +28,7 @@ static sadmm_body_id add_kinematic(sadmm_world *world, double x, double z, doubl
  * a door on it, and a turntable. turns: the last two turn. */
 static sadmm_world *yard(int precision, sadmm_method method, int substeps, bool turns)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)precision;
     def.settings.method = method;
@@ -288,7 +289,7 @@ END_TEST
 /* A world of one plate, and a box of 0.2 m above (x, y). */
 static sadmm_world *plate_and_box(int precision, int substeps, double length, double x, double y, double z)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)precision;
     def.settings.substeps = substeps;
@@ -346,7 +347,7 @@ START_TEST(many_bodies_on_one)
 {
     sadmm_world *worlds[2];
     for (int w = 0; w < 2; ++w) {
-        sadmm_world_def def = sadmm_world_def_default();
+        sadmm_world_def def = fixed_world_def();
         def.backend = SADMM_BACKEND_CPU;
         def.precision = (sadmm_precision)_i;
         def.settings.iterations = 3;

@@ -11,6 +11,7 @@
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
+#include "fixed_work.h"
 #define CUDA(name) sadmm_cuda_##name##_emulated_f32
 #include "backend_cuda/device/entries.h"
 #undef CUDA
@@ -397,7 +398,7 @@ struct device {
 
 static void device_begin(struct device *d, struct contact_problem *p, bool warm)
 {
-    d->settings = sadmm_settings_default();
+    d->settings = fixed_settings();
     d->settings.method = SADMM_METHOD_PAPER; /* fast asks for islands everywhere; here the partition does */
     d->settings.iterations = 100;
     d->settings.warm_start = warm;

@@ -1,6 +1,7 @@
 /* Momentum that no contact may change on the device: in every tier, the same bits, as on the host. */
 #include "cuda_worlds.h"
 #include "fewer.h"
+#include "fixed_work.h"
 #include "momentum_worlds.h"
 
 static const enum sadmm_cuda_tier tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_CLUSTER, SADMM_CUDA_TIER_GRID,
@@ -16,7 +17,7 @@ enum { RUNS = sizeof runs / sizeof *runs };
 
 static sadmm_world *begin_world(int precision, int run, bool gravity)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)precision;
     def.settings.method = runs[run].method;

@@ -1,5 +1,6 @@
 /* The order of convergence on the device, of a motion of some kinds. */
 #include "cuda_worlds.h"
+#include "fixed_work.h"
 #include "known_order.h"
 
 static int used_precision;
@@ -10,7 +11,7 @@ START_TEST(errors_have_their_order)
 {
     static const char *const names[] = {"a ball skids until it rolls", "a ball rolls, off centre",
                                         "a ball off centre on triangles", "a ball rocks on a ball that rocks"};
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     used_precision = _i;
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)_i;

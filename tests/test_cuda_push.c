@@ -2,6 +2,7 @@
 #include "core/model/push_law.h"
 #include "cuda_worlds.h"
 #include "fewer.h"
+#include "fixed_work.h"
 
 static const enum sadmm_cuda_tier tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_CLUSTER, SADMM_CUDA_TIER_GRID,
                                              SADMM_CUDA_TIER_STREAM};
@@ -9,7 +10,7 @@ enum { TIERS = sizeof tiers / sizeof *tiers, STEPS = 3 };
 
 static sadmm_world *begin_world(int precision, sadmm_method method, int substeps)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)precision;
     def.settings.method = method;

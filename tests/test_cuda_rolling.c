@@ -1,10 +1,11 @@
 /* Bodies that roll and rock on the device: as on the host, step by step and in the queue. */
 #include "cuda_worlds.h"
+#include "fixed_work.h"
 #include "rolling_worlds.h"
 
 static sadmm_world *new_world(int precision, bool device)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)precision;
     def.settings.threads = 1;

@@ -13,9 +13,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "core/math/vec3.h"
 #include "core/base/memory.h"
+#include "core/math/vec3.h"
 #include "fclib/fclib.h"
+#include "fixed_work.h"
 #include "public_problems.h"
 #include "scenes/scenes.h"
 
@@ -484,7 +485,7 @@ END_TEST
 
 static void solve(sadmm_problem *problem, double tolerance)
 {
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     sadmm_certificate c = {.siconos = INFINITY};
     s.dt = 1;
     s.method = SADMM_METHOD_PAPER; /* the penalty below suits problems that are scaled to masses of 1 */

@@ -1,6 +1,7 @@
 /* Gears (gear.h): wheels, racks and screws against closed forms, no drift over 1e5 steps, energy and momentum; what the
  * calls say and refuse. */
 #include "core/base/memory.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static const double UNIT[4] = {1, 0, 0, 0};
@@ -17,7 +18,7 @@ enum { SOLVERS = 3 };
 
 static sadmm_world *new_world(int solver, double dt)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = solvers[solver].backend;
     def.precision = solvers[solver].precision;
     def.settings.threads = 1;

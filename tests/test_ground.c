@@ -4,6 +4,7 @@
 
 #include "core/math/quat.h"
 #include "fewer.h"
+#include "fixed_work.h"
 #include "hull_tools.h"
 #include "mesh_tools.h"
 #include "scene_tools.h"
@@ -12,7 +13,7 @@ static const double size = 0.1; /* of bodies, m */
 
 static sadmm_world *make_world(double dt, double gravity)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.settings.threads = 1;
     def.settings.dt = dt;

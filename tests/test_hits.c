@@ -15,6 +15,7 @@ enum { EMULATED = 0 };
 #include "core/math/rigid.h"
 #include "fewer.h"
 #ifndef HITS_ON_CUDA
+#include "fixed_work.h"
 #include "run_suite.h"
 #endif
 
@@ -65,7 +66,7 @@ static sadmm_world *world_of(sadmm_world_def *def, sadmm_backend backend)
 
 static sadmm_world *new_world(int table, double dt, double gravity)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.precision = backends[table].precision;
     def.settings.dt = dt;
     def.settings.threads = 1;
@@ -677,7 +678,7 @@ END_TEST
  * they do: 0.1 m/s of 2. */
 START_TEST(an_elastic_gas_keeps_its_energy)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     double start = 0, now = 0;
     def.settings.dt = 0.001;
     def.settings.gravity[2] = 0;

@@ -5,6 +5,7 @@
 #include "collision/hull/hull_write.h"
 #include "core/base/definition_fields.h"
 #include "core/base/memory.h"
+#include "fixed_work.h"
 #include "hull_tools.h"
 #include "scene_tools.h"
 #include "world/step/gather.h"
@@ -19,7 +20,7 @@ static sadmm_hull *make_hull(int corners)
 
 static sadmm_world *make_world(void)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.settings.threads = 1; /* failures are injected into the calling thread */
     return create_world(&def);

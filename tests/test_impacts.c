@@ -9,6 +9,7 @@
 enum { EMULATED = 0 };
 #endif
 #include "bouncing.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static const struct {
@@ -26,7 +27,7 @@ enum { SOLVERS = sizeof solvers / sizeof solvers[0] };
 
 static sadmm_world *world_in(int solver, sadmm_precision precision, double dt, int iterations, bool gravity)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.precision = precision;
     def.settings.method = solvers[solver].method;
     def.settings.dt = dt;

@@ -1,10 +1,11 @@
 /* Initialised impulses (core/solve/impulse_initialisation.h): a solution where bodies rest on what is nearer to the
  * ground, and nothing anywhere else. */
 #include "contact_problems.h"
+#include "core/model/system_math.h"
 #include "core/solve/certificate.h"
 #include "core/solve/impulse_initialisation.h"
 #include "core/solve/plan.h"
-#include "core/model/system_math.h"
+#include "fixed_work.h"
 #include "run_suite.h"
 
 #include <check.h>
@@ -34,7 +35,7 @@ START_TEST(piles_at_rest_are_solved)
     static const double masses[] = {100, 1, 0.01, 3};
     struct contact_problem *problems[] = {contact_problem_stack(masses, 4, 0.5), contact_problem_pyramid(12, 0.5),
                                           contact_problem_stack(masses, 4, 0), contact_problem_plates(1, 0.5)};
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     for (size_t k = 0; k < sizeof problems / sizeof *problems; ++k) {
         sadmm_certificate c = initialise(problems[k], &s);
         ck_assert_msg(c.ncp_max <= 1e-5 * g_dt, "%zu: natural map %g", k, c.ncp_max);
@@ -49,7 +50,7 @@ END_TEST
 START_TEST(loads_add_up)
 {
     struct contact_problem *problem = contact_problem_pyramid(10, 0.5);
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     double sum = 0;
     initialise(problem, &s);
     for (size_t p = 0; p < problem->contacts.pair_count; ++p) {
@@ -67,7 +68,7 @@ END_TEST
 START_TEST(others_start_from_nothing)
 {
     static const double one[] = {1, 1};
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     struct contact_problem *problems[5];
     for (int k = 0; k < 5; ++k) problems[k] = contact_problem_stack(one, 2, k == 0 ? 0.1 : 0.5);
     s.gravity[0] = 5;
@@ -103,7 +104,7 @@ END_TEST
 START_TEST(small_errors_are_left_to_the_iteration)
 {
     static const double one[] = {1}, shares[] = {5e-4, 1e-2};
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     for (int k = 0; k < 4; ++k) {
         struct contact_problem *problem = contact_problem_stack(one, 1, 0.5);
         const double off = shares[k % 2] * g_dt * s.dt, separation = k < 2 ? off : -s.slop - off / s.correction_factor;
@@ -122,7 +123,7 @@ START_TEST(plans_that_initialise)
     static const double one[] = {1, 1};
     struct contact_problem *p = contact_problem_stack(one, 2, 0.5);
     for (int warm = 0; warm < 2; ++warm) {
-        sadmm_settings s = sadmm_settings_default();
+        sadmm_settings s = fixed_settings();
         s.warm_start = warm;
         s.method = SADMM_METHOD_FAST;
         p->system.first = true;

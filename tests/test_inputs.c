@@ -42,8 +42,7 @@ static const struct bad_setting {
     REAL(penalty_offset, -1, 1.1e15, NAN, END),
     REAL(penalty_ratio_limit, 0.99, 1.1e6, NAN, END),
     REAL(residual_tolerance, -1e-9, NAN, INFINITY, END),
-    REAL(certificate_tolerance, -1e-9, NAN, INFINITY, END),
-    REAL(certificate_momentum_tolerance, 0, -1, NAN, INFINITY, END),
+    REAL(tolerance, -1e-9, NAN, INFINITY, END),
     INTEGER(ncp_points, -1, 129, END),
     INTEGER(check_period, 0, -10, 1000001, END),
     REAL(correction_factor, -0.1, 1.1, NAN, END),
@@ -157,7 +156,6 @@ START_TEST(settings_are_numbers_or_not)
     do {                                                                                               \
         sadmm_settings s = plain;                                                                      \
         s.name += 1;                                                                                   \
-        if (!strcmp(#name, "certificate_tolerance")) s.name = 0;                                       \
         ck_assert_msg(sadmm_settings_same_but_numbers(&plain, &s), "%s", #name);                       \
         sadmm_settings_numbers(&s, after);                                                             \
         for (int k = 0; k < SADMM_SETTING_NUMBERS; ++k)                                                \
@@ -180,10 +178,10 @@ START_TEST(settings_are_numbers_or_not)
     s.penalty_ratio_limit = 1; /* no update */
     ck_assert(!sadmm_settings_same_but_numbers(&plain, &s));
     s = plain;
-    s.certificate_tolerance = 1e-3;
+    s.tolerance = 0; /* no rule */
     ck_assert(!sadmm_settings_same_but_numbers(&plain, &s));
-    t.certificate_tolerance = 2e-3;
-    ck_assert(sadmm_settings_same_but_numbers(&t, &s));
+    t.tolerance = 2e-3;
+    ck_assert(sadmm_settings_same_but_numbers(&plain, &t));
     s = plain;
     s.residual_tolerance = 1e-3;
     ck_assert(!sadmm_settings_same_but_numbers(&plain, &s));

@@ -7,13 +7,14 @@
 #include "core/base/parallel.h"
 #include "core/model/joint_law.h"
 #include "failed_step.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static const double G = 9.81, UNIT[4] = {1, 0, 0, 0};
 
 static sadmm_world_def joint_world(sadmm_backend backend, sadmm_precision precision)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = backend;
     def.precision = precision;
     def.settings.threads = 1;

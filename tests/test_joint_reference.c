@@ -1,6 +1,7 @@
 /* Motions and reactions of joints against ADAMS' (joint_reference.h): root mean squares over the instants are within
  * what Project Chrono's own tests accept, and errors are of second order in the step. */
 #include "../bench/joint_cases.h"
+#include "fixed_work.h"
 #include "joint_reference.h"
 #include "scene_tools.h"
 
@@ -33,15 +34,14 @@ static const struct joint_case *find_case(const char *name)
 /* Samples 0 to `count` - 1, every 0.2 s. */
 static void run_case(const struct joint_case *which, double step, int count, struct joint_sample *samples)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_world *world;
     def.backend = SADMM_BACKEND_CPU;
     def.settings.threads = 1;
     def.settings.dt = step;
     def.settings.gravity[2] = -9.80665;
     def.settings.iterations = 200;
-    def.settings.certificate_tolerance = 1e-10;
-    def.settings.certificate_momentum_tolerance = 1e-9;
+    def.settings.tolerance = 1e-10;
     ck_assert_msg(joint_case_build(which, &def, &world) == SADMM_OK, "%s", sadmm_last_message());
     MUST(world, joint_case_run(which, world, (int)(0.2 / step + 0.5), count, samples));
     sadmm_world_destroy(world);

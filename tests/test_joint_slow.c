@@ -1,5 +1,6 @@
 /* Joints for long: every kind under loads that turn, 1e5 steps. */
 #include "core/model/joint_law.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static const double UNIT[4] = {1, 0, 0, 0};
@@ -22,7 +23,7 @@ START_TEST(kinds_hold_for_long)
 {
     enum { STEPS = 100000 };
     const sadmm_joint_kind kind = (sadmm_joint_kind)_i;
-    sadmm_world_def world_def = sadmm_world_def_default();
+    sadmm_world_def world_def = fixed_world_def();
     world_def.backend = SADMM_BACKEND_CPU;
     world_def.settings.threads = 1;
     world_def.settings.dt = 0.001;

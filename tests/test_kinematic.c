@@ -1,6 +1,7 @@
 /* Kinematic bodies: what they do to others against formulas, on every CPU backend here, on CUDA in
  * test_cuda_kinematic.c (BODIES_ON_CUDA), which includes this file. */
 #include "body_worlds.h"
+#include "fixed_work.h"
 
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
@@ -224,7 +225,7 @@ START_TEST(what_rides_stands_as_on_the_ground)
     const double *v = velocities[_i / SOLVERS];
     const int solver = _i % SOLVERS;
     sadmm_world_def def = bodies_def();
-    def.settings.iterations = _i / SOLVERS == 2 ? 5 : sadmm_settings_default().iterations;
+    def.settings.iterations = _i / SOLVERS == 2 ? 5 : fixed_settings().iterations;
     def.settings.dt = 1.0 / 60;
     sadmm_world *world = bodies_world(&def, solver);
     static const double half[3] = {1, 1, 0.1};
@@ -554,7 +555,7 @@ START_TEST(a_frozen_step_has_its_velocity)
     ck_assert_msg(certificate.ncp_max < small, "%g", certificate.ncp_max);
     memset(impulse, 0, 3 * (size_t)count * sizeof *impulse);
     ck_assert_int_eq(sadmm_problem_set_solution(problem, NULL, impulse, NULL), SADMM_OK);
-    sadmm_settings settings = sadmm_settings_default();
+    sadmm_settings settings = fixed_settings();
     settings.iterations = 1000;
     ck_assert_int_eq(sadmm_problem_solve(problem, SADMM_BACKEND_CPU, SADMM_F64, &settings, &report), SADMM_OK);
     ck_assert_msg(report.certificate.ncp_max < 1e-6, "%g", report.certificate.ncp_max);
@@ -674,7 +675,7 @@ START_TEST(a_step_that_fails_changes_nothing)
     const uint64_t before = state_hash(world);
     ck_assert_int_eq(sadmm_world_step(world), SADMM_ERROR_NON_FINITE);
     ck_assert(state_hash(world) == before && world_report(world).step == 3);
-    def.settings = sadmm_settings_default();
+    def.settings = fixed_settings();
     MUST(world, sadmm_world_set_settings(world, &def.settings));
     MUST(world, sadmm_world_set_body_state(world, belt, &s));
     step_world(world, 3);
@@ -740,7 +741,7 @@ START_TEST(problems_have_velocities)
         ck_assert(read.body_a == c[k].body_a && read.body_b == c[k].body_b);
         ck_assert(memcmp(read.velocity, c[k].velocity, sizeof read.velocity) == 0);
     }
-    sadmm_settings settings = sadmm_settings_default();
+    sadmm_settings settings = fixed_settings();
     settings.iterations = 500;
     ck_assert_int_eq(sadmm_problem_solve(problem, solvers[_i].backend, solvers[_i].precision, &settings, &report),
                      SADMM_OK);

@@ -1,6 +1,7 @@
 /* Mass, centre and principal axes of solids (mass.h) against closed forms, in any frame; bodies made of several. */
 #include <check.h>
 
+#include "fixed_work.h"
 #include "hull_tools.h"
 #include "run_suite.h"
 
@@ -43,7 +44,7 @@ static void expect_same(const sadmm_mass *got, const sadmm_mass *wanted, double 
 /* A world takes it for a body. */
 static void expect_accepted(const sadmm_mass *mass)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_body_def body = sadmm_body_def_default();
     sadmm_world *world = NULL;
     sadmm_body_id id;

@@ -3,6 +3,7 @@
 
 #include "core/base/memory.h"
 #include "core/math/quat.h"
+#include "fixed_work.h"
 #include "hull_tools.h"
 #include "mesh_tools.h"
 #include "scene_tools.h"
@@ -11,7 +12,7 @@ static const double dt = 0.005, side = 0.2; /* s; of bodies, m */
 
 static sadmm_world *make_world(void)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.settings.threads = 1;
     def.settings.dt = dt;

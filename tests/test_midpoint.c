@@ -1,10 +1,11 @@
 /* Where contacts are taken within a step (collision/base/midpoint.h, advance.h): halfway through it, or where what is
  * fast first touches. Separations of turning bodies, what passes by, bullets, momentum of fast impacts. */
+#include "fixed_work.h"
 #include "momentum_worlds.h"
 
 static sadmm_world *empty_world(double dt, int iterations)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.settings.threads = 1;
     def.settings.dt = dt;
@@ -200,7 +201,7 @@ START_TEST(rocking_gains_no_energy)
 {
     static const double cylinder[3] = {0.5, 1, 0}, half[3] = {0.2, 0.1, 0.05};
     const double dt = 0.005 / (1 << _i), tilt = 0.2, radius = cylinder[0], g = 9.81;
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_body_def body = sadmm_body_def_default();
     sadmm_shape_def shape = sadmm_shape_def_default();
     sadmm_body_id id;

@@ -4,6 +4,7 @@
 
 #include "core/base/parallel.h"
 #include "core/math/energy_limit.h"
+#include "fixed_work.h"
 #include "momentum_worlds.h"
 #include "runner.h"
 
@@ -13,7 +14,7 @@ enum { BUDGETS = sizeof budgets / sizeof *budgets };
 static sadmm_world *empty_world(sadmm_backend backend, sadmm_precision precision, sadmm_method method, int iterations,
                                 bool gravity)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = backend;
     def.precision = precision;
     def.settings.method = method;
@@ -371,7 +372,7 @@ START_TEST(anchored_islands_are_left_alone)
                 struct sadmm_contact_pair *pair = &r.p->contacts.pairs[k];
                 if (pair->body_a < 0 || pair->body_b < 0) pair->friction = 0;
             }
-            r.settings = sadmm_settings_default();
+            r.settings = fixed_settings();
             r.settings.method = SADMM_METHOD_PAPER;
             r.settings.warm_start = false;
             r.settings.gravity[0] = 3;

@@ -1,5 +1,6 @@
 /* Islands of the dense contact solve (NCP) before and after the iterations (core/solve/ncp.h): contacts and rows to
  * rounding, whatever the iterations. */
+#include "fixed_work.h"
 #include "scene_tools.h"
 #include "solvers.h"
 
@@ -280,7 +281,7 @@ static int expect_wrenches_of_contacts(sadmm_world *world, const sadmm_body_id *
  * momentum. */
 START_TEST(momentum_is_kept)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = solvers[_i].backend, def.precision = solvers[_i].precision, def.settings.method = solvers[_i].method;
     def.settings.gravity[2] = 0, def.settings.iterations = 1, def.settings.ncp_points = 128;
     sadmm_world *world = create_world(&def);
@@ -336,7 +337,7 @@ static sadmm_body_id add_cube(sadmm_world *world, double x, double z, double hal
 
 static sadmm_world *floor_world(int solver)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_body_def ground = sadmm_body_def_default();
     sadmm_shape_def plane = sadmm_shape_def_default();
     sadmm_body_id id;

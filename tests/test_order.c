@@ -2,6 +2,7 @@
  * constant and where bodies in flight hit. */
 #include "../bench/known_make.h"
 #include "fewer.h"
+#include "fixed_work.h"
 #include "known_order.h"
 
 static const struct {
@@ -17,7 +18,7 @@ enum { TABLES = sizeof tables / sizeof *tables };
 
 START_TEST(errors_have_their_order)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = tables[_i].backend;
     def.precision = tables[_i].precision;
     def.settings.threads = 1;

@@ -1,6 +1,7 @@
 /* Rims are round: a body whose centre of mass is over a round support stays, one whose is not tips, to a thousandth of
  * the radius, whichever way it is turned (collision/convex/convex_clip.h). */
 #include "core/math/quat.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static const double INSIDE = 1e-3; /* of the radius */
@@ -16,7 +17,7 @@ static double between(double low, double high)
 
 static sadmm_world *open_world(sadmm_precision precision)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = precision;
     def.settings.iterations = 40; /* the impulses' error is below the margin */

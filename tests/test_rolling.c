@@ -1,4 +1,5 @@
 /* Bodies that roll and rock on curved surfaces: energy stays, what no step resolves dies away. */
+#include "fixed_work.h"
 #include "rolling_worlds.h"
 #include "runner.h"
 
@@ -15,7 +16,7 @@ enum { SOLVERS = sizeof solvers / sizeof *solvers };
 
 static sadmm_world *new_world(int solver, double dt)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = solvers[solver].backend;
     def.precision = solvers[solver].precision;
     def.settings.method = solvers[solver].method;

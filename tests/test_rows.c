@@ -7,13 +7,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "contact_problems.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "core/model/rows.h"
 #include "core/model/system_math.h"
 #include "core/solve/certificate.h"
 #include "core/solve/schedule.h"
-#include "contact_problems.h"
+#include "fixed_work.h"
 #include "row_laws.h"
 #include "run_suite.h"
 #include "runner.h"
@@ -83,7 +84,7 @@ END_TEST
 static struct contact_problem *bounded_problem(uint64_t seed)
 {
     struct contact_problem *p = contact_problem_mixed(seed, 0.5);
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     contact_problem_seed(42);
     contact_problem_raw(p, &s, 0.1);
     return p;

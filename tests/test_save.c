@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "core/base/memory.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 #include "world/state/world_state.h"
 
@@ -27,7 +28,7 @@ static struct saved save_world(sadmm_world *world)
 
 static sadmm_world *empty_world(void)
 {
-    const sadmm_world_def def = sadmm_world_def_default();
+    const sadmm_world_def def = fixed_world_def();
     return create_world(&def);
 }
 
@@ -182,7 +183,7 @@ static sadmm_body_id add_ball(sadmm_world *world, double x, double z, const char
 /* Holes among the slots, things set that no step has seen, pairs with settings of their own. */
 START_TEST(what_was_changed_is_kept)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_world *world = create_world(&def);
     sadmm_body_id ids[8], made[2];
     sadmm_shape_id shapes[2];
@@ -240,7 +241,7 @@ END_TEST
  * a length may be taken from them. (Any calls: test_save_calls.c.) */
 START_TEST(whatever_can_be_reached_is_restored)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_world *world = create_world(&def);
     sadmm_coupling_def pull = sadmm_coupling_def_default();
     sadmm_joint_def distance = sadmm_joint_def_default();
@@ -278,7 +279,7 @@ static int go_on(int steps)
 {
     static unsigned char bytes[1 << 22];
     const size_t size = fread(bytes, 1, sizeof bytes, stdin);
-    const sadmm_world_def def = sadmm_world_def_default();
+    const sadmm_world_def def = fixed_world_def();
     sadmm_world *world = NULL;
     uint64_t hash = 0;
     if (sadmm_world_create(&def, &world) != SADMM_OK || sadmm_world_restore(world, bytes, size) != SADMM_OK) return 1;
@@ -360,7 +361,7 @@ END_TEST
 /* Enumerations index lists of names, sizes and functions. */
 START_TEST(values_of_no_name_are_refused)
 {
-    const sadmm_world_def def = sadmm_world_def_default();
+    const sadmm_world_def def = fixed_world_def();
     sadmm_world *world = create_world(&def), *other = empty_world();
     sadmm_joint_def hinge = sadmm_joint_def_default();
     add_floor(world, 0.5);
@@ -409,7 +410,7 @@ END_TEST
 /* Steps are counted from what was saved; errors of contacts are those that this world has measured. */
 START_TEST(counts_of_steps_go_on)
 {
-    const sadmm_world_def def = sadmm_world_def_default();
+    const sadmm_world_def def = fixed_world_def();
     sadmm_world *world = create_world(&def), *other = empty_world();
     add_floor(world, 0.5);
     add_ball(world, 0, 0.1, "");

@@ -6,6 +6,7 @@
 
 #include "core/base/memory.h"
 #include "core/model/joint_law.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 enum { RUNS = 16, CALLS = 400, MOST_BODIES = 14, MOST_JOINTS = 16 };
@@ -360,7 +361,7 @@ static sadmm_status set_settings(struct draw *d, sadmm_world *world)
     case 7: s.recover_wrenches = below(d, 2); break;
     case 8: s.measure_residuals = below(d, 2); break;
     case 9: s.residual_tolerance = number(d, -1e-7, 1e-6); break;
-    case 10: s.certificate_tolerance = number(d, -1e-7, 1e-6); break;
+    case 10: s.tolerance = number(d, -1e-7, 1e-6); break;
     case 11: vector(d, 10, s.gravity, 3); break;
     case 12: s.penalty_update_warm = below(d, 2); break;
     case 13: s.relaxation = number(d, 1, 2); break;
@@ -476,7 +477,7 @@ static void hand_over(struct draw *d, sadmm_world *world, sadmm_world **other, i
 {
     struct saved saved = save_world(world);
     if (rarely(d, 2)) {
-        const sadmm_world_def def = sadmm_world_def_default();
+        const sadmm_world_def def = fixed_world_def();
         sadmm_world_destroy(*other);
         *other = create_world(&def);
     }
@@ -548,7 +549,7 @@ static bool make_call(struct draw *d, sadmm_world *world, sadmm_world *other, in
 START_TEST(goes_on_after_any_calls)
 {
     struct draw d = {(uint64_t)_i * 1000003 + 17};
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = _i % 4 == 3 ? SADMM_BACKEND_REF : SADMM_BACKEND_CPU;
     def.precision = _i % 3 == 2 && def.backend == SADMM_BACKEND_CPU ? SADMM_F32 : SADMM_F64;
     def.settings.threads = 1;

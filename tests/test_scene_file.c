@@ -474,7 +474,7 @@ START_TEST(methods_have_their_numbers)
         const char *text;
         int fast, paper, fast_substeps, paper_substeps;
     } cases[] = {
-        {HEAD "}", 20, 100, 1, 1},
+        {HEAD "}", 200, 100, 1, 1},
         {HEAD ", \"iterations\": {\"fast\": 7, \"paper\": 8}, \"substeps\": {\"fast\": 2}}", 7, 8, 2, 1},
         {HEAD ", \"iterations\": {\"fast\": 7}, \"settings\": {\"iterations\": 9, \"substeps\": 3}}", 9, 100, 3, 1},
         {HEAD

@@ -1,5 +1,6 @@
 /* The scene library: what it promises about bodies and contacts, repeatability, bad specs. */
 #include "core/base/parallel.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static int32_t dynamic_bodies(sadmm_world *world)
@@ -21,7 +22,7 @@ START_TEST(every_scene_builds_and_steps)
 
     ck_assert_str_eq(scene.info->name, info->name);
     ck_assert(info->description[0] && info->duration > 0 && scene.duration == info->duration);
-    ck_assert_int_eq(scene.def.settings.method, sadmm_settings_default().method);
+    ck_assert_int_eq(scene.def.settings.method, fixed_settings().method);
     for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
         struct sadmm_scene other = scene;
         sadmm_scene_set_method(&other, (sadmm_method)method);

@@ -15,6 +15,7 @@
 #include <gfc3d_compute_error.h>
 
 #include "fclib/global_problem.h"
+#include "fixed_work.h"
 #include "public_problems.h"
 
 /* ---- the same problem for siconos -------------------------------------------------------------------------------- */
@@ -93,7 +94,7 @@ static struct sadmm_global_solution solution_of(sadmm_problem *problem)
 
 static void solve(sadmm_problem *problem, sadmm_backend backend, sadmm_method method, int iterations, bool warm)
 {
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     s.dt = 1;
     s.method = method;
     s.penalty_mass_factor = 0;

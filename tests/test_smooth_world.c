@@ -8,6 +8,7 @@
 #include "collision/hull/hull_data.h"
 #include "core/base/definition_fields.h"
 #include "core/math/quat.h"
+#include "fixed_work.h"
 #include "mesh_tools.h"
 #include "run_suite.h"
 #include "subadmm/subadmm.h"
@@ -29,7 +30,7 @@ static sadmm_world *make_world_for(sadmm_backend backend, double dt, double angl
 {
     struct soup *soup = on == MESH ? soup_ground(41, 41, 0.5, 0.24, 3, soup_flat) : NULL;
     sadmm_mesh *mesh = soup ? soup_mesh(soup) : NULL;
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_body_def ground = sadmm_body_def_default();
     sadmm_shape_def shape = sadmm_shape_def_default();
     sadmm_world *world = NULL;

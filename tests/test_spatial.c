@@ -6,6 +6,7 @@
 
 #include "core/math/rigid.h"
 #include "fewer.h"
+#include "fixed_work.h"
 #include "momentum_worlds.h"
 #include "solvers.h"
 
@@ -13,7 +14,7 @@ static const double G = 9.81;
 
 static sadmm_world *new_world(int solver, double dt, double gravity)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = solvers[solver].backend;
     def.precision = solvers[solver].precision;
     def.settings.method = solvers[solver].method;

@@ -2,6 +2,7 @@
  * is the hard joint, none is nothing; along a line between two points, along axes, and in all six coordinates. */
 #include "core/base/memory.h"
 #include "core/math/rigid.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 #ifndef M_PI
@@ -19,7 +20,7 @@ enum { SOLVERS = 3 };
 
 static sadmm_world *new_world(int solver, double dt, int iterations)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = solvers[solver].backend;
     def.precision = solvers[solver].precision;
     def.settings.threads = 1;

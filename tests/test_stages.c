@@ -3,6 +3,7 @@
 
 #include "core/math/weight.h"
 #include "core/solve/stages.h"
+#include "fixed_work.h"
 #include "run_suite.h"
 
 enum { MOST_STAGES = 4096 };
@@ -52,7 +53,7 @@ static struct sadmm_plan contacts_plan(const sadmm_settings *settings, bool warm
 START_TEST(substeps_repeat_what_a_step_does)
 {
     static struct list one, three;
-    sadmm_settings settings = sadmm_settings_default();
+    sadmm_settings settings = fixed_settings();
     settings.certify = true;
     settings.iterations = 20; /* of a sub-step */
     const struct sadmm_plan plan = contacts_plan(&settings, false);
@@ -82,7 +83,7 @@ END_TEST
 START_TEST(a_world_without_constraints)
 {
     static struct list list;
-    sadmm_settings settings = sadmm_settings_default();
+    sadmm_settings settings = fixed_settings();
     struct sadmm_plan plan = {.bodies = 1, .rigid = true, .threads = 1};
     settings.recover_wrenches = false;
     sadmm_plan_complete(&plan, &settings, false);
@@ -100,7 +101,7 @@ END_TEST
 START_TEST(a_solve_has_nothing_of_a_world)
 {
     static struct list list;
-    sadmm_settings settings = sadmm_settings_default();
+    sadmm_settings settings = fixed_settings();
     settings.certify = true;
     struct sadmm_plan plan = contacts_plan(&settings, false);
     take_list(&list, &plan, &settings, false, 0);
@@ -117,7 +118,7 @@ static uint32_t random_next(uint32_t *state)
 
 static sadmm_settings random_settings(uint32_t *state)
 {
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     s.method = random_next(state) % 2 ? SADMM_METHOD_FAST : SADMM_METHOD_PAPER;
     s.iterations = 1 + (int)(random_next(state) % 200);
     s.check_period = 1 + (int)(random_next(state) % 40);
@@ -125,7 +126,7 @@ static sadmm_settings random_settings(uint32_t *state)
     s.penalty_update_warm = random_next(state) % 2;
     s.measure_residuals = random_next(state) % 2;
     s.residual_tolerance = random_next(state) % 3 == 0 ? 1e-6 : 0;
-    s.certificate_tolerance = random_next(state) % 3 == 0 ? 1e-6 : 0;
+    s.tolerance = random_next(state) % 3 == 0 ? 1e-6 : 0;
     return s;
 }
 
@@ -147,7 +148,7 @@ START_TEST(everything_stands_where_it_is_due)
     for (int trial = 0; trial < 200; ++trial) {
         const sadmm_settings s = random_settings(&state);
         const struct sadmm_plan plan = contacts_plan(&s, random_next(&state) % 2);
-        const bool stops = s.residual_tolerance > 0 || s.certificate_tolerance > 0;
+        const bool stops = s.residual_tolerance > 0 || s.tolerance > 0;
         int iterations = 0, balances = 0, checks = 0, renewals = 0;
         take_list(&list, &plan, &s, true, 0);
         for (int i = 0; i < list.count; ++i)
@@ -186,11 +187,11 @@ END_TEST
 START_TEST(a_met_check_ends_the_iterations)
 {
     static struct list list;
-    sadmm_settings s = sadmm_settings_default();
+    sadmm_settings s = fixed_settings();
     s.method = SADMM_METHOD_FAST;
     s.iterations = 100;
     s.check_period = 5; /* weights are due there as well */
-    s.certificate_tolerance = 1e-6;
+    s.tolerance = 1e-6;
     struct sadmm_plan plan = contacts_plan(&s, false);
     take_list(&list, &plan, &s, true, WEIGHT_FIRST_UPDATE);
     ck_assert_int_eq(count_of(&list, SADMM_STAGE_ITERATE), 1);

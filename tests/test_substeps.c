@@ -6,6 +6,7 @@
 #include "collision/find/pipeline.h"
 #include "core/base/definition_fields.h"
 #include "core/base/parallel.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 #include "world/state/world_state.h"
 
@@ -142,7 +143,7 @@ START_TEST(impacts_equal_those_of_short_steps)
     sadmm_world *worlds[2];
     double bounced = 0;
     for (int k = 0; k < 2; ++k) {
-        sadmm_world_def def = sadmm_world_def_default();
+        sadmm_world_def def = fixed_world_def();
         def.backend = solvers[solver].backend;
         def.precision = solvers[solver].precision;
         def.settings.method = solvers[solver].method;
@@ -172,7 +173,7 @@ START_TEST(limited_is_the_most_of_any_substep)
     int limited = 0;
     sadmm_world *worlds[2];
     for (int k = 0; k < 2; ++k) {
-        sadmm_world_def def = sadmm_world_def_default();
+        sadmm_world_def def = fixed_world_def();
         def.backend = solvers[_i].backend;
         def.precision = solvers[_i].precision;
         def.settings.method = solvers[_i].method;
@@ -228,7 +229,7 @@ END_TEST
 START_TEST(wrenches_keep_momentum)
 {
     const double force[3] = {0.7, 0, -1.5}, none[3] = {0, 0, 0}, mass = 2, radius = 0.1, dt = 0.01;
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_body_def ground = sadmm_body_def_default(), ball = sadmm_body_def_default();
     sadmm_shape_def plane = sadmm_shape_def_default(), sphere = sadmm_shape_def_default();
     sadmm_body_id id;
@@ -397,7 +398,7 @@ END_TEST
 
 START_TEST(settings_that_are_refused)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     ck_assert_int_eq(def.settings.substeps, 1);
     sadmm_world *world = create_world(&def);

@@ -10,6 +10,7 @@
 
 #include "core/base/barrier.h"
 #include "core/base/parallel.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 #include "task_pool.h"
 
@@ -242,7 +243,7 @@ START_TEST(problems_take_tasks)
 {
     struct pool pool;
     sadmm_problem *problem;
-    sadmm_settings settings = sadmm_settings_default();
+    sadmm_settings settings = fixed_settings();
     sadmm_world *world = open_world("pile:40", 1, NULL);
     step_world(world, 100);
     ck_assert_int_eq(sadmm_problem_create(&problem), SADMM_OK);
@@ -284,7 +285,7 @@ START_TEST(bad_callbacks_are_refused)
     sadmm_problem *problem;
     ck_assert_int_eq(sadmm_problem_create(&problem), SADMM_OK);
     for (size_t k = 0; k < sizeof bad / sizeof *bad; ++k) {
-        sadmm_world_def def = sadmm_world_def_default();
+        sadmm_world_def def = fixed_world_def();
         sadmm_world *world;
         def.tasks = bad[k];
         ck_assert_int_eq(sadmm_world_create(&def, &world), SADMM_ERROR_INVALID_ARGUMENT);

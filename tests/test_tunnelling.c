@@ -2,6 +2,7 @@
  * through by what turns (collision/manifold/advance.h, inner_ball.h); nor do bodies that are shot at one another
  * (world/step/hits.c). */
 #include "fewer.h"
+#include "fixed_work.h"
 #include "shots.h"
 
 /* ---- drops and shots at random --------------------------------------------------------------------------------- */
@@ -76,7 +77,7 @@ END_TEST
 
 static sadmm_world *open_world(double dt, double gravity)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.settings.threads = 1;
     def.settings.dt = dt;

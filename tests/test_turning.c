@@ -4,6 +4,7 @@
 #include <float.h>
 
 #include "core/math/rigid.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 enum { MOST_BODIES = 8, STEPS = 300 };
@@ -136,7 +137,7 @@ static double energy(struct mechanism *m)
 /* Of the energy that there is in motion, or to fall by a link's metre. */
 static double gain(int which, double dt, bool heavy, int beginning)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.settings.threads = 1;
     def.settings.dt = dt;
@@ -181,7 +182,7 @@ END_TEST
 START_TEST(a_balanced_wheel_goes_on)
 {
     for (int d = 0; d < DTS; ++d) {
-        sadmm_world_def def = sadmm_world_def_default();
+        sadmm_world_def def = fixed_world_def();
         def.settings.dt = dts[d];
         def.settings.gravity[2] = 0;
         struct mechanism m = {.world = create_world(&def)};
@@ -240,7 +241,7 @@ START_TEST(a_fast_top_precesses)
 {
     static const double spins[] = {100, 200}, steps[] = {0.001, 0.002, 0.005};
     const double spin = spins[_i % 2], dt = steps[_i / 2], turns = G * TOP_ARM / (TOP_ALONG * spin);
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     def.backend = SADMM_BACKEND_CPU;
     def.settings.threads = 1;
     def.settings.dt = dt;

@@ -163,7 +163,7 @@ START_TEST(programs_of_the_first_version_go_on)
     UNTOUCHED(def);
     ck_assert_uint_eq(def.of.struct_size, sizeof def.of);
     ck_assert_uint_eq(def.of.settings.struct_size, sizeof def.of.settings);
-    ck_assert(def.of.contact_margin == 0.02 && def.of.settings.iterations == 20);
+    ck_assert(def.of.contact_margin == 0.02 && def.of.settings.iterations == 200);
     def.of.settings.dt = 0.001;
     ck_assert_int_eq(sadmm_world_create((const sadmm_world_def *)&def.of, &made), SADMM_OK);
     sadmm_world_settings_sized(made, (sadmm_settings *)&settings.of, sizeof settings.of);

@@ -4,6 +4,7 @@
 #include "core/base/settings_fields.h"
 #include "core/math/rigid.h"
 #include "core/model/settings.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 
 static const double ZERO[3] = {0, 0, 0};
@@ -31,7 +32,7 @@ static sadmm_body_id add_ball(sadmm_world *world, const sadmm_body_def *def)
 static sadmm_world *ground_and_ball(sadmm_backend backend, sadmm_precision precision, sadmm_body_id *ground,
                                     sadmm_body_id *ball)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_body_def floor = sadmm_body_def_default(), resting = ball_def(0.1);
     sadmm_shape_def plane = sadmm_shape_def_default();
     def.backend = backend;
@@ -57,7 +58,7 @@ static sadmm_world *ground_and_ball(sadmm_backend backend, sadmm_precision preci
 /* Read once, and good while bodies come by the thousand, also as the name of others. */
 START_TEST(names_stay_where_they_are)
 {
-    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world_def def = fixed_world_def();
     sadmm_world *world = create_world(&def);
     sadmm_body_def first = ball_def(0), read;
     sadmm_body_id id, other;
@@ -256,7 +257,7 @@ START_TEST(mass_and_material_can_be_set)
     REFUSED(world, sadmm_world_set_body_mass(world, ground, 1, inertia), "is static");
 
     /* On the ground, 1 m/s, held back by mu g m once there is friction: it slides and rolls at 5/7 of its speed. */
-    settings = sadmm_settings_default();
+    settings = fixed_settings();
     MUST(world, sadmm_world_set_settings(world, &settings));
     MUST(world, sadmm_world_set_body_wrench(world, ball, ZERO, ZERO));
     for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
@@ -446,7 +447,7 @@ START_TEST(residuals_are_measured_when_a_stop_rule_ends_the_step)
         settings.method = _i ? SADMM_METHOD_PAPER : SADMM_METHOD_FAST;
         settings.iterations = 500;
         settings.measure_residuals = measured;
-        settings.certificate_tolerance = 1e-3;
+        settings.tolerance = 1e-3;
         MUST(world, sadmm_world_set_settings(world, &settings));
         step_world(world, 1);
         sadmm_step_report report = world_report(world);
@@ -492,7 +493,7 @@ END_TEST
 /* Members count, padding does not. */
 START_TEST(settings_are_compared_by_their_members)
 {
-    const sadmm_settings given = sadmm_settings_default();
+    const sadmm_settings given = fixed_settings();
     sadmm_settings a, b;
     memset(&a, 0x00, sizeof a);
     memset(&b, 0xff, sizeof b);

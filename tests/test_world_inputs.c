@@ -129,8 +129,7 @@ static const struct bad_number bad_settings[] = {
     SETTING(dt, 0), SETTING(dt, NAN, INFINITY, -0.005, 0.99e-6, 1.01), SETTING(gravity[0], NAN, INFINITY, 1.01e6),
     SETTING(penalty_mass_factor, NAN, -1, 1.01e12), SETTING(penalty_offset, NAN, -1, 1.01e15),
     SETTING(penalty_ratio_limit, 0), SETTING(penalty_ratio_limit, NAN, 0.99, 1.01e6),
-    SETTING(residual_tolerance, NAN, INFINITY, -1), SETTING(certificate_tolerance, NAN, INFINITY, -1),
-    SETTING(certificate_momentum_tolerance, 0), SETTING(certificate_momentum_tolerance, NAN, -1),
+    SETTING(residual_tolerance, NAN, INFINITY, -1), SETTING(tolerance, NAN, INFINITY, -1),
     SETTING(correction_factor, NAN, -0.1, 1.01), SETTING(slop, NAN, -1, 1.01),
     SETTING(correction_speed, NAN, -1, 1.01e3), SETTING(restitution_threshold, NAN, INFINITY, -1),
 };

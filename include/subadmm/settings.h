@@ -77,11 +77,13 @@ typedef struct sadmm_settings {
     sadmm_method method;         /* default SADMM_METHOD_FAST: the same solutions in fewer iterations that cost the same
                                     (docs/internals/accuracy.md). PAPER is the paper's own iteration, to compare with;
                                     it needs more iterations, below, and takes the penalty_* settings */
-    int iterations;              /* iterations a step, in [1, 1000000]; sub-steps do iterations / substeps each, rounded
-                                    up; default 20: enough for FAST in a world, where every step is warm started. Bodies
-                                    that collide in many places at once need more (the step report's `limited` says so),
-                                    and so does a problem that is solved once: some 100 to 1000, or a tolerance (below)
-                                    with a large number here. PAPER: 100 to 300 */
+    double tolerance;            /* error at which a step is solved, m/s: iterations end where every island's natural
+                                    map and momentum error, as a velocity, are at most this (sadmm_step_report.error).
+                                    Finite, >= 0; default 1e-6. 0: all `iterations` are made. In single precision no
+                                    less than rounding leaves, some 2e-6 of the speeds of an island */
+    int iterations;              /* iterations a step at most, in [1, 1000000]; sub-steps do iterations / substeps each,
+                                    rounded up; default 200. With tolerance 0 this is their number: 20 are enough for
+                                    FAST in most worlds, where every step is warm started; PAPER: 100 to 300 */
     double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8
                                     (docs/internals/algorithm.md, "Method fast") */
     int penalty_period;          /* PAPER, as all of penalty_*. m of eq. (15): iterations between penalty updates,
@@ -97,20 +99,16 @@ typedef struct sadmm_settings {
                                     without impulses and first steps start from initialised impulses
                                     (docs/internals/algorithm.md) */
 
-    int ncp_points;              /* worlds: islands with joints and at most so many contact points are solved directly
-                                    before the iterations, and need none then (docs/internals/algorithm.md, "Dense
-                                    contact solve (NCP)"), contacts and rows to rounding: robots that stand, walk,
-                                    grasp. In [0, SADMM_MOST_NCP_POINTS = 128]; 0: none; default 0. Up to 20 ms on
-                                    one core are lost on an island that nothing solves. On CUDA such
-                                    steps go through the host */
+    int ncp_points;              /* worlds: islands of at most so many contact points have a dense contact solve
+                                    (docs/internals/algorithm.md, "Dense contact solve (NCP)"), contacts and rows to
+                                    rounding: with joints before the iterations, which they need none of then; without,
+                                    where some iterations miss the tolerance (none with tolerance 0). In [0,
+                                    SADMM_MOST_NCP_POINTS = 128]; 0: none; default 64. Up to 20 ms on one core are lost
+                                    on an island that nothing solves. Not on CUDA, where islands are iterated */
 
     double residual_tolerance;   /* stop when |r_primal|_inf (m/s) and |r_dual|_inf (N s) are both <= this;
                                     0 = never; finite, >= 0; default 0 */
-    double certificate_tolerance;/* stop when the natural map (m/s) is <= this and the momentum error, relative,
-                                    is <= certificate_momentum_tolerance; 0 = never; default 0 */
-    double certificate_momentum_tolerance; /* dimensionless, > 0; default 1e-6. In single precision rounding alone may
-                                              be a few 1e-6: use 1e-5 there */
-    int check_period; /* iterations between convergence checks (of the tolerances above), in [1, 1000000]; default 10 */
+    int check_period; /* iterations between convergence checks (of the tolerances above), in [1, 1000000]; default 20 */
 
     bool measure_residuals;      /* report the residuals of the last iteration; default false */
     bool certify;                /* report the certificate of every step (of its last sub-step); default false */
@@ -155,6 +153,16 @@ typedef struct sadmm_residual {
     double dual;   /* N s (linear) and N m s (angular), |A v - b - J^T lambda| */
 } sadmm_residual;
 
+/* What the error of a step is: a velocity, m/s (or rad/s). */
+typedef enum sadmm_step_error {
+    SADMM_STEP_ERROR_NONE = 0,
+    SADMM_STEP_ERROR_LAW,      /* contacts, limits, drives miss their laws: the natural map */
+    SADMM_STEP_ERROR_MOMENTUM, /* bodies do not move as forces and impulses have it: A^-1 (A v - b - J^T lambda) */
+    SADMM_STEP_ERROR_LIMITER,  /* ... and the energy limiter has slowed islands down (limited) */
+    SADMM_STEP_ERROR_JOINTS,   /* joints are open by more than correction_speed closes in a step: what is beyond it */
+    SADMM_STEP_ERROR_COUNT
+} sadmm_step_error;
+
 /* True error of (v, lambda), computed in double from raw data, the same for every backend
  * (docs/internals/algorithm.md). */
 typedef struct sadmm_certificate {
@@ -167,8 +175,6 @@ typedef struct sadmm_certificate {
     int64_t momentum_worst;  /* index of that body among the dynamic ones; -1: none */
     double siconos;          /* Siconos' global error measure for frictional contact (gfc3d_compute_error),
                                 dimensionless; -1 if the problem has soft constraints, for which it is not defined */
-    int64_t islands_above;   /* islands with an error above the certificate tolerances of the settings; -1: there is no
-                                certificate_tolerance */
 } sadmm_certificate;
 
 #ifdef __cplusplus

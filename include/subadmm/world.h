@@ -202,8 +202,8 @@ SADMM_API sadmm_status sadmm_world_pair_friction_at(sadmm_world *world, int32_t 
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, if the backend can: CUDA, with the method FAST, from the second step
- * on; not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64
- * convergence checks a step. Otherwise the same as sadmm_world_step. A few steps are queued and run in order; states,
+ * on; not with a residual_tolerance, nor with a tolerance in the method PAPER or with more than 64 convergence checks a
+ * step. Otherwise the same as sadmm_world_step. A few steps are queued and run in order; states,
  * wrenches and settings set in between take effect at the next one. Getters wait for the steps begun so far. Errors: as
  * sadmm_world_step; they may be those of an earlier step; no step after that one has been done then
  * (sadmm_step_report.step counts the steps done). With settings.certify, or where events are recorded (events.h), the
@@ -217,9 +217,9 @@ SADMM_API sadmm_status sadmm_world_wait(sadmm_world *world);
  * the total of a step begun with sadmm_world_step_async. */
 typedef struct sadmm_phase_times { double total, collide, assemble, solve, finish; } sadmm_phase_times;
 
-/* With sub-steps: contacts, pairs, residual and certificate are those of the last sub-step; iterations, iterations_mean
- * and times are sums over all, converged holds for all, and the other counts and penetration_max are the largest of
- * any. It may grow (status.h). */
+/* With sub-steps: error and unsolved are the largest of any; contacts, pairs, residual and certificate are those of the
+ * last sub-step; iterations, iterations_mean and times are sums over all, converged holds for all, and the other counts
+ * and penetration_max are the largest of any. It may grow (status.h). */
 typedef struct sadmm_step_report {
     sadmm_backend backend;
     sadmm_precision precision;
@@ -231,11 +231,16 @@ typedef struct sadmm_step_report {
     int32_t couplings;             /* couplings that took part (coupling.h): enabled, with gains */
     int32_t contacts;              /* contact points of the solve, without hits within the step (settings.hits) */
     int32_t pairs;                 /* shape pairs with at least one contact */
-    int iterations;                /* iterations done, 0 where every island was solved directly (settings.ncp_points);
-                                      with a stop rule on CUDA (below): the largest number of any island */
-    double iterations_mean;        /* mean over islands. Differs from `iterations` only on CUDA with a stop rule (method
-                                      FAST, settings.certificate_tolerance, at most 64 convergence checks a step), where
-                                      every island stops on its own */
+    int iterations;                /* iterations done, 0 where every island was solved without (settings.ncp_points);
+                                      with a tolerance on CUDA (below): the largest number of any island */
+    double iterations_mean;        /* mean over islands. Differs from `iterations` only on CUDA with a tolerance (method
+                                      FAST, at most 64 convergence checks a step), where every island stops on its
+                                      own */
+    double error;                  /* how far the step is from the laws, m/s: the largest of what error_kind names. -1:
+                                      not known: tolerance 0 without settings.certify, or made on CUDA, where islands
+                                      are counted alone (unsolved) */
+    sadmm_step_error error_kind;   /* what the largest is */
+    int64_t unsolved;              /* islands that miss settings.tolerance; -1: it is 0 */
     bool converged;                /* a stop rule was met, by every island */
     int32_t limited;               /* islands that ended the iterations with more kinetic energy than contacts can
                                       leave them with. FAST: they were slowed down; and so were those counted here that,
@@ -251,9 +256,7 @@ typedef struct sadmm_step_report {
     double certify_ms;             /* wall time of the certificate on the host, ms; 0: there is none */
     sadmm_residual residual;       /* valid if measured (for settings.measure_residuals, a penalty update or a
                                       tolerance), else -1. Not measured where islands stop on their own */
-    sadmm_certificate
-        certificate; /* valid if settings.certify or a certificate tolerance; else ncp_max = -1. Steps made
-                                      on CUDA with a tolerance and without settings.certify: islands_above alone */
+    sadmm_certificate certificate; /* valid if settings.certify; else ncp_max = -1 */
 } sadmm_step_report;
 
 /* The report of the last step (zeroed before the first). Waits for steps; errors: those of the steps waited for. */

@@ -120,6 +120,7 @@ struct world {
     sadmm_scene scene{};
     sadmm_scene_result result{};
     int64_t steps = 0; // of the scene
+    bool warned = false; // of a step that missed its tolerance
     sadmm_world_def def = sadmm_world_def_default(); // as it was created, with the precision that it has now
     // From now on `made` is its own.
     void take(sadmm_world *made)
@@ -255,6 +256,7 @@ template <class E> struct names_of;
     };
 NAMES_OF(sadmm_backend, sadmm_backend_names, SADMM_BACKEND_COUNT)
 NAMES_OF(sadmm_precision, sadmm_precision_names, SADMM_PRECISION_COUNT)
+NAMES_OF(sadmm_step_error, sadmm_step_error_names, SADMM_STEP_ERROR_COUNT)
 NAMES_OF(sadmm_method, sadmm_method_names, SADMM_METHOD_COUNT)
 NAMES_OF(sadmm_body_type, sadmm_body_type_names, SADMM_BODY_TYPE_COUNT)
 NAMES_OF(sadmm_shape_type, sadmm_shape_type_names, SADMM_SHAPE_TYPE_COUNT)

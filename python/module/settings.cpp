@@ -47,9 +47,7 @@ void bind_settings(nb::module_ &m)
         .def_ro("ncp_worst", &C::ncp_worst, "Index of the worst constraint; -1: none.")
         .def_ro("momentum_max", &C::momentum_max, "Momentum error of the worst body, relative.")
         .def_ro("momentum_worst", &C::momentum_worst, "Index of that body among the dynamic ones; -1: none.")
-        .def_ro("siconos", &C::siconos, "siconos' measure, or -1.")
-        .def_ro("islands_above", &C::islands_above,
-                "Islands above the certificate tolerances; -1: no tolerance is set.");
+        .def_ro("siconos", &C::siconos, "siconos' measure, or -1.");
 
     using R = sadmm_step_report;
     nb::class_<R>(m, "Report", "What the last step did.")
@@ -65,6 +63,10 @@ void bind_settings(nb::module_ &m)
         .def_ro("pairs", &R::pairs, "Pairs of shapes that touch.")
         .def_ro("iterations", &R::iterations, "Iterations done.")
         .def_ro("iterations_mean", &R::iterations_mean, "Mean over islands.")
+        .def_ro("error", &R::error, "How far the step is from the laws, m/s; -1: not known.")
+        .def_prop_ro("error_kind", [](const R &r) { return name_of(r.error_kind); },
+                     "What the error is: 'law', 'momentum', 'limiter', 'joints', or 'none'.")
+        .def_ro("unsolved", &R::unsolved, "Islands that miss settings.tolerance; -1: it is 0.")
         .def_ro("converged", &R::converged, "A stop rule was met, by every island.")
         .def_ro("limited", &R::limited, "Islands that had more energy than contacts can leave them with.")
         .def_ro("repeated", &R::repeated, "Steps that an asynchronous backend repeated since creation.")

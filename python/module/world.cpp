@@ -49,9 +49,26 @@ static sadmm_status step_once(world &w, bool wait, std::string &message)
 }
 
 // Many, with a look at whether the user has interrupted them now and then.
+// Has the last step missed its tolerance, for the first time? Then what the warning says.
+static bool misses_tolerance(world &w, std::string &warning)
+{
+    sadmm_step_report report;
+    if (w.warned || sadmm_world_report(w.handle, &report) != SADMM_OK || report.unsolved <= 0) return false;
+    char text[256], error[64] = "";
+    if (report.error >= 0)
+        snprintf(error, sizeof error, ": error %.2g m/s (%s)", report.error, name_of(report.error_kind));
+    snprintf(text, sizeof text,
+             "step %lld has missed its tolerance in %lld islands%s. Watch report.error and report.unsolved; more "
+             "iterations or a shorter step help. This warning comes once a world",
+             (long long)report.step, (long long)report.unsolved, error);
+    warning = text;
+    return w.warned = true;
+}
+
 static void step(world &w, const whole &steps, bool wait)
 {
     const int64_t n = steps.in("n", 0, INT64_MAX);
+    std::string warning;
     for (int64_t k = 0; k < n;) {
         sadmm_status status = SADMM_OK;
         std::string message;
@@ -62,9 +79,12 @@ static void step(world &w, const whole &steps, bool wait)
             do {
                 status = step_once(w, wait, message);
                 ++k;
+                if (wait && status == SADMM_OK) misses_tolerance(w, warning);
             } while (status == SADMM_OK && k < n && std::chrono::steady_clock::now() < end);
         }
         if (status != SADMM_OK) raise_status(status, message);
+        if (!warning.empty() && PyErr_WarnEx(PyExc_RuntimeWarning, warning.c_str(), 1) < 0) throw nb::python_error();
+        warning.clear();
         if (k < n && PyErr_CheckSignals() != 0) throw nb::python_error();
     }
 }

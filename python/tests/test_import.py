@@ -13,7 +13,6 @@ mujoco = pytest.importorskip("mujoco")
 sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
 import check_models  # noqa: E402
 
-from subadmm.importing.options import settings_of  # noqa: E402
 
 EXACT = 1e-9  # the same numbers by another way: rounding, with room for some hundred operations
 
@@ -707,7 +706,7 @@ def test_feet_of_robots_are_solved_to_rounding():
     for points in (64, 0):
         robot = subadmm.load(mujoco.MjModel.from_xml_string(text), backend="cpu")
         settings = robot.world.settings
-        assert settings.ncp_points == 64
+        assert settings.ncp_points == 64 and settings.tolerance == 1e-6
         settings.certify, settings.ncp_points = True, points
         robot.world.settings = settings
         maps = []
@@ -718,8 +717,3 @@ def test_feet_of_robots_are_solved_to_rounding():
         largest.append(max(maps))
     # Rounding of sums of speeds around 1 m/s, by rows of up to 1e5 times the response of what they hold.
     assert largest[0] < 1e-8 and largest[1] > 1e-6, largest
-
-
-def test_a_device_keeps_its_worlds():
-    source = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
-    assert settings_of(source, "cuda").ncp_points == 0 and settings_of(source, "auto").ncp_points == 64

@@ -155,11 +155,9 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     if (o->method_given) sadmm_scene_set_method(scene, o->method);
     if (o->substeps > 0) s->substeps = (int)o->substeps;
     if (o->iterations >= 0) s->iterations = (int)o->iterations;
-    if (o->tolerance > 0) s->certificate_tolerance = o->tolerance;
+    if (o->tolerance > 0) s->tolerance = o->tolerance;
     if (o->ncp_points >= 0) s->ncp_points = (int)o->ncp_points;
     if (o->check_period > 0) s->check_period = (int)o->check_period;
-    /* rounding alone is more than the default in single precision */
-    if (o->tolerance > 0 && scene->def.precision == SADMM_F32) s->certificate_momentum_tolerance = 1e-5;
     if (o->penalty_period >= 0) s->penalty_period = (int)o->penalty_period;
     if (o->threads >= 0) s->threads = (int)o->threads;
     if (o->no_warm_start) s->warm_start = false;

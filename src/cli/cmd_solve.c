@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "cli.h"
+#include "core/base/settings_fields.h"
 #include "fclib/fclib.h"
 #include "fclib/global_problem.h"
 #include "interrupt.h"
@@ -206,6 +207,7 @@ static int run(int argc, char **argv)
     sadmm_problem *problem = NULL;
     struct output *json, *file = NULL;
     const char *path;
+    sadmm_settings_fix_work(&o.plan.settings); /* the loop looks at the certificate */
     o.plan.settings.dt = 1; /* the problem has no time step: offsets are in kg as they are */
     o.plan.settings.penalty_mass_factor = 0;
     int code = cli_parse(&cli_solve, argc, argv, set_option, &o, &path);

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/base/names.h"
 #include "interrupt.h"
 #include "run_record.h"
 
@@ -53,13 +54,14 @@ static json_t *certificate_json(const struct run_record *record)
 /* Who stopped when. */
 static json_t *stop_json(const struct run_record *record, const sadmm_settings *settings)
 {
-    if (record->steps == 0 || !(settings->certificate_tolerance > 0)) return json_null();
+    if (record->steps == 0 || !(settings->tolerance > 0)) return json_null();
     json_t *o = json_object();
-    json_object_set_new(o, "tolerance", cli_json_real(settings->certificate_tolerance));
+    json_object_set_new(o, "tolerance", cli_json_real(settings->tolerance));
     json_object_set_new(o, "steps_met", json_integer((json_int_t)record->met));
     json_object_set_new(o, "iterations_mean", cli_json_real(record->iterations_sum / (double)record->steps));
     json_object_set_new(o, "iterations_last", json_integer(record->last.iterations));
-    json_object_set_new(o, "islands_above_last", json_integer(record->last.certificate.islands_above));
+    json_object_set_new(o, "steps_unsolved", json_integer((json_int_t)record->unsolved_steps));
+    json_object_set_new(o, "unsolved_last", json_integer(record->last.unsolved));
     return o;
 }
 
@@ -147,6 +149,9 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     else json_object_set_new(o, "residual", json_null());
     json_object_set_new(o, "certificate", certificate_json(record));
     json_object_set_new(o, "stop", stop_json(record, &scene->def.settings));
+    set_or_null(o, "error", record, record->error >= 0 ? cli_json_real(record->error) : json_null());
+    set_or_null(o, "error_kind", record,
+                record->error >= 0 ? json_string(sadmm_step_error_names[record->error_kind]) : json_null());
     set_or_null(o, "limited_steps", record, json_integer((json_int_t)record->limited_steps));
     set_or_null(o, "repeated", record, json_integer(record->last.repeated));
     set_or_null(o, "penetration_max", record, cli_json_real(record->penetration_max));
@@ -192,10 +197,13 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     if (record->steps > 0 && c->ncp_max != -1)
         printf("certificate    ncp %.3g m/s (largest of the run %.3g), momentum %.3g (%.3g)\n", c->ncp_max,
                record->ncp_max, c->momentum_max, record->momentum_max);
-    if (record->steps > 0 && scene->def.settings.certificate_tolerance > 0)
-        printf("stop rule      met in %zu steps, %.1f iterations in the mean; last step: %d at most, %" PRId64
-               " islands above\n",
-               record->met, record->iterations_sum / (double)record->steps, last->iterations, c->islands_above);
+    if (record->steps > 0 && scene->def.settings.tolerance > 0)
+        printf("tolerance      %g m/s met in %zu steps of %zu, %.1f iterations in the mean; last step: %d at most, "
+               "%" PRId64 " islands unsolved\n",
+               scene->def.settings.tolerance, record->met, record->steps,
+               record->iterations_sum / (double)record->steps, last->iterations, last->unsolved);
+    if (record->steps > 0 && record->error >= 0)
+        printf("error          %.3g m/s at most (%s)\n", record->error, sadmm_step_error_names[record->error_kind]);
     if (record->limited_steps > 0)
         printf("limited        %zu steps slowed islands down to the energy contacts can leave: too few iterations\n",
                record->limited_steps);

@@ -10,7 +10,7 @@ bool run_record_start(struct run_record *record, sadmm_world *world)
 {
     int32_t count = sadmm_world_body_count(world);
     memset(record, 0, sizeof *record);
-    record->ncp_max = record->momentum_max = -1;
+    record->ncp_max = record->momentum_max = record->error = -1;
     record->bodies = sadmm_alloc((size_t)count, sizeof *record->bodies);
     if (!record->bodies) {
         cli_error(CLI_FAILED, "out of memory for %d bodies", count);
@@ -58,6 +58,11 @@ bool run_record_step(struct run_record *record, sadmm_world *world)
     record->contacts_sum += r->contacts;
     record->iterations_sum += r->iterations_mean;
     record->met += r->converged;
+    record->unsolved_steps += r->unsolved > 0;
+    if (r->error > record->error) {
+        record->error = r->error;
+        record->error_kind = r->error_kind;
+    }
     if (r->contacts > record->contacts_max) record->contacts_max = r->contacts;
     record->penetration_max = fmax(record->penetration_max, r->penetration_max);
     record->joint_drift = fmax(record->joint_drift, r->joint_drift);

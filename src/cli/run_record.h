@@ -24,7 +24,9 @@ struct run_record {
     double joint_drift;      /* likewise */
     double ncp_max, momentum_max; /* over the run; -1: not certified */
     double iterations_sum;   /* over the steps, of their means over islands */
-    size_t met;              /* steps that met the stop rule */
+    double error;            /* m/s, the largest over the run; -1: not known */
+    sadmm_step_error error_kind; /* of it */
+    size_t met, unsolved_steps;  /* steps that met the stop rule; with an island that missed the tolerance */
     size_t limited_steps;    /* steps that slowed an island down (sadmm_step_report.limited) */
     struct sadmm_scene_result result; /* the scene's own measure of success */
     sadmm_step_report last;  /* of the last step; zero when steps is 0 */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "core/base/settings_fields.h"
 #include "family.h"
 #include "scene_file/scene_file.h"
 
@@ -195,6 +196,7 @@ sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struc
     *scene = (struct sadmm_scene){
         .def = sadmm_world_def_default(), .duration = family->info.duration, .info = &family->info, .n = n, .m = m
     };
+    sadmm_settings_fix_work(&scene->def.settings); /* as in the paper */
     if (family->configure) family->configure(n, &scene->def);
     sadmm_scene_set_method(scene, scene->def.settings.method);
     return SADMM_OK;

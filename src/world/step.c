@@ -175,7 +175,9 @@ struct host_step {
     int32_t limited;       /* islands, most of any */
     int32_t ncp;           /* islands that the dense contact solve has changed in this sub-step */
     int32_t pushed;        /* bodies moved out of overlaps in this sub-step */
-    int64_t islands_above; /* likewise, but of the last sub-step; -1: no stop rule */
+    double error;          /* m/s, -1: not known; */
+    sadmm_step_error error_kind; /* what it is; */
+    int64_t unsolved;            /* islands, most of any; -1: no tolerance */
     double ms[SADMM_PHASE_COUNT];
 };
 
@@ -204,30 +206,82 @@ static void report_solved(struct host_step *step)
 {
     const sadmm_settings *settings = &step->settings;
     const sadmm_residual none = {0};
-    step->report.converged = settings->certificate_tolerance > 0 || settings->residual_tolerance > 0;
+    step->report.converged = settings->tolerance > 0 || settings->residual_tolerance > 0;
     if (step->world->plan.residuals) step->report.residual = none;
 }
 
-/* The dense contact solve (NCP) of islands with joints (core/solve/ncp.h). Before the iterations no island of a world
- * is solved where some are seen from their supports. */
-static sadmm_status solve_ncp(struct host_step *step, bool again)
+/* m/s: a world whose last step missed no more was at rest, say, and may be still. */
+static const double AT_REST = 1e-9, LIKELY_AT_REST = 1e-8;
+
+/* Without joints: is the start the solution, as it is of what rests? */
+static sadmm_status find_rest(struct host_step *step, bool *rests)
 {
     sadmm_world *world = step->world;
-    const struct sadmm_ncp_input input = {world->articulations, &step->system, world->joint_constraints,
-                                          &step->settings};
-    if (!world->ncp) world->ncp = sadmm_ncp_create();
-    if (!world->ncp) return sadmm_fail_memory(&world->error, "islands of the dense contact solve");
-    if (again) {
-        int32_t solved;
-        step->system.support_motion = NULL;
-        TRY(sadmm_ncp_solve_again(world->ncp, &input, &solved, &world->error));
-        step->ncp += solved;
+    *rests = false;
+    if (step->settings.tolerance <= 0 || !world->stepped || !(world->report.error <= LIKELY_AT_REST) ||
+        world->report.error < 0)
         return SADMM_OK;
-    }
-    if (step->system.support_motion || step->pushed > 0) return SADMM_OK;
-    TRY(sadmm_ncp_solve(world->ncp, &input, &step->stages.solved, &step->ncp, &world->error));
-    if (step->stages.solved) report_solved(step);
+    TRY(sadmm_solve_errors_find(&world->errors, &step->system, &step->settings, world->kernels->precision,
+                                &world->error));
+    const struct sadmm_solve_error sum = sadmm_solve_errors_sum(&world->errors, step->settings.tolerance);
+    *rests = sum.law <= AT_REST && sum.momentum <= AT_REST;
+    step->solve.errors_known = *rests;
     return SADMM_OK;
+}
+
+/* The system, with a list of rows though it may be empty. */
+static struct sadmm_system with_rows(const struct host_step *step)
+{
+    struct sadmm_system system = step->system;
+    system.rows = &step->world->start.rows;
+    return system;
+}
+
+static sadmm_status make_ncp(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    if (!world->ncp) world->ncp = sadmm_ncp_create();
+    if (!world->articulations) world->articulations = sadmm_articulations_create();
+    if (!world->ncp || !world->articulations)
+        return sadmm_fail_memory(&world->error, "islands of the dense contact solve");
+    return world->plan.row_constraints > 0
+               ? SADMM_OK
+               : sadmm_articulations_find_none(world->articulations, &step->system, &world->error);
+}
+
+/* The dense contact solve (NCP) before the iterations (core/solve/ncp.h): where bodies are seen from their supports, or
+ * pushed apart, islands are left for later. */
+static sadmm_status solve_ncp(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    const bool rows = world->plan.row_constraints > 0, apart = step->system.support_motion || step->pushed > 0;
+    TRY(make_ncp(step));
+    const struct sadmm_system system = with_rows(step);
+    const struct sadmm_ncp_input input = {0,   world->articulations, &system, world->joint_constraints, &step->settings,
+                                          NULL};
+    TRY(sadmm_ncp_solve(world->ncp, &input, rows && !apart, &step->stages.solved, &step->ncp, &world->error));
+    if (!rows && !apart) TRY(find_rest(step, &step->stages.solved));
+    if (step->stages.solved) report_solved(step);
+    step->solve.ncp = world->ncp;
+    return SADMM_OK;
+}
+
+/* After them. Bodies without joints that it has changed are moved anew: the iterations' result has moved all. */
+static sadmm_status solve_ncp_again(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    int32_t solved;
+    bool moved;
+    step->system.support_motion = NULL;
+    TRY(make_ncp(step));
+    const struct sadmm_system system = with_rows(step);
+    const struct sadmm_ncp_input input = {
+        step->report.iterations,  world->articulations, &system,
+        world->joint_constraints, &step->settings,      step->solve.errors_known ? &world->errors : NULL};
+    if (step->solve.errors_known && !step->solve.ncp_missed && world->plan.row_constraints == 0) return SADMM_OK;
+    TRY(sadmm_ncp_solve_again(world->ncp, &input, &solved, &moved, &world->error));
+    step->ncp += solved;
+    return moved ? sadmm_world_integrate(world, &step->system, &step->settings, world->ncp) : SADMM_OK;
 }
 
 /* Which islands are pushed apart without a velocity (core/solve/push.h). */
@@ -270,6 +324,8 @@ static sadmm_status make_plan(struct host_step *step)
     TRY(sadmm_world_enter_support_frame(world, &step->system));
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
+    step->solve.ncp = NULL;
+    step->solve.errors_known = step->solve.ncp_missed = false;
     step->ncp = step->pushed = 0;
     if (world->articulations) sadmm_articulations_begin(world->articulations);
     if (world->ncp) sadmm_ncp_begin(world->ncp);
@@ -278,15 +334,88 @@ static sadmm_status make_plan(struct host_step *step)
     return SADMM_OK;
 }
 
+/* ---- the error of a step ----------------------------------------------------------------------------------------- */
+
+static void add_error(struct host_step *step, double error, sadmm_step_error kind)
+{
+    if (error <= step->error) return;
+    step->error = error;
+    step->error_kind = kind;
+}
+
+/* Joints that are open by more than a step's correction closes: what is beyond it, m/s. */
+static double joint_error(const struct host_step *step)
+{
+    const sadmm_settings *s = &step->settings;
+    const double beyond = step->joint_drift / s->dt - s->correction_speed;
+    return s->correction_speed > 0 && s->correction_factor > 0 && beyond > 0 ? beyond : 0;
+}
+
+/* Are all islands the dense contact solve's, as far as it has come with them? */
+static bool ncp_has_all(const struct host_step *step)
+{
+    const sadmm_world *world = step->world;
+    if (!step->stages.solved || step->solve.errors_known) return false;
+    const int32_t *label = sadmm_ncp_islands(world->ncp);
+    for (int32_t i = 0; i < world->dynamic_count; ++i)
+        if (label[i] == i && sadmm_ncp_error(world->ncp, i) < 0) return false;
+    return true;
+}
+
+/* What the dense contact solve has left of islands, in the place of what the iterations had. */
+static void take_ncp_errors(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    struct sadmm_solve_errors *errors = &world->errors;
+    for (int32_t i = 0; i < errors->body_count; ++i) {
+        const double left = errors->label[i] == i ? sadmm_ncp_error(world->ncp, i) : -1;
+        if (left < 0) continue;
+        errors->law[i] = left;
+        errors->momentum[i] = 0;
+    }
+}
+
+/* No island is looked at again whose error is known: of a dense contact solve, or a check after which nothing has
+ * changed. */
+static sadmm_status find_error(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    const sadmm_settings *settings = &step->settings;
+    struct sadmm_solve_error sum = {0, 0, 0};
+    if (settings->tolerance <= 0 && !settings->certify) return SADMM_OK;
+    add_error(step, 0, SADMM_STEP_ERROR_NONE);
+    if (ncp_has_all(step)) {
+        const int32_t *label = sadmm_ncp_islands(world->ncp);
+        for (int32_t i = 0; i < world->dynamic_count; ++i) {
+            const double left = label[i] == i ? sadmm_ncp_error(world->ncp, i) : 0;
+            sum.law = left > sum.law ? left : sum.law;
+            sum.unsolved += !(left <= settings->tolerance);
+        }
+    } else {
+        const bool changed = step->report.limited > 0 || world->plan.row_constraints > 0;
+        step->system.support_motion = NULL;
+        if (!step->solve.errors_known || (changed && !step->stages.solved))
+            TRY(sadmm_solve_errors_find(&world->errors, &step->system, settings, world->kernels->precision,
+                                        &world->error));
+        else if (step->ncp > 0) take_ncp_errors(step);
+        sum = sadmm_solve_errors_sum(&world->errors, settings->tolerance);
+    }
+    add_error(step, sum.law, SADMM_STEP_ERROR_LAW);
+    add_error(step, sum.momentum, step->report.limited > 0 ? SADMM_STEP_ERROR_LIMITER : SADMM_STEP_ERROR_MOMENTUM);
+    add_error(step, joint_error(step), SADMM_STEP_ERROR_JOINTS);
+    if (settings->tolerance <= 0) return SADMM_OK;
+    step->unsolved = sum.unsolved > step->unsolved ? sum.unsolved : step->unsolved;
+    step->report.converged = sum.unsolved == 0 && (settings->residual_tolerance <= 0 || step->report.converged);
+    return SADMM_OK;
+}
+
 /* A sub-step has been made. */
 static void add_substep(struct host_step *step)
 {
     const sadmm_solve_report *solved = &step->report;
-    const int64_t above = solved->certificate.islands_above;
     step->iterations += solved->iterations;
     step->unconverged = step->unconverged || !solved->converged;
     step->limited = solved->limited > step->limited ? solved->limited : step->limited;
-    if (!sadmm_stages_in_last_substep(&step->stages) && above > step->islands_above) step->islands_above = above;
 }
 
 static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage *stage)
@@ -326,6 +455,7 @@ static void move_pushed(struct host_step *step)
 static sadmm_status keep(struct host_step *step)
 {
     sadmm_world_keep_rolling(step->world, step->settings.dt);
+    TRY(find_error(step));
     add_substep(step);
     return check_next(step->world);
 }
@@ -369,8 +499,8 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     case SADMM_STAGE_PUSH_SOLVE: return solve_pushes(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
     case SADMM_STAGE_BLOCK_SOLVE_AGAIN: return solve_articulations(step, NULL, true);
-    case SADMM_STAGE_NCP_SOLVE: return solve_ncp(step, false);
-    case SADMM_STAGE_NCP_SOLVE_AGAIN: return solve_ncp(step, true);
+    case SADMM_STAGE_NCP_SOLVE: return solve_ncp(step);
+    case SADMM_STAGE_NCP_SOLVE_AGAIN: return solve_ncp_again(step);
     case SADMM_STAGE_REACTIONS: sadmm_world_keep_rows(world, settings); return SADMM_OK;
     case SADMM_STAGE_KINEMATIC: return move_kinematic(step);
     case SADMM_STAGE_JOINT_MOTION: return move_articulated(step);
@@ -407,22 +537,25 @@ static void report_step(const struct host_step *step)
         .iterations = step->iterations,
         .iterations_mean = step->iterations,
         .converged = !step->unconverged,
+        .error = step->error,
+        .error_kind = step->error_kind,
+        .unsolved = step->unsolved,
         .limited = step->limited,
         .joints = step->world->joints_acting,
         .couplings = step->world->couplings_acting,
         .penetration_max = step->depth,
         .joint_drift = step->joint_drift,
         .residual = solved->residual,
-        .ms = {.collide = ms[SADMM_PHASE_COLLIDE], .assemble = ms[SADMM_PHASE_ASSEMBLE],
-               .solve = ms[SADMM_PHASE_SOLVE], .finish = ms[SADMM_PHASE_FINISH]},
+        .ms = {.collide = ms[SADMM_PHASE_COLLIDE],
+               .assemble = ms[SADMM_PHASE_ASSEMBLE],
+               .solve = ms[SADMM_PHASE_SOLVE],
+               .finish = ms[SADMM_PHASE_FINISH]},
     };
     done.plan.threads = step->world->team.ran;
     for (int phase = 0; phase < SADMM_PHASE_COUNT; ++phase)
         done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
     sadmm_world_report_steps(step->world, 1, &done);
     step->world->report.certificate = solved->certificate;
-    if (step->islands_above > solved->certificate.islands_above)
-        step->world->report.certificate.islands_above = step->islands_above;
     step->world->report.certify_ms = ms[SADMM_PHASE_CERTIFY];
 }
 
@@ -430,14 +563,20 @@ static void report_step(const struct host_step *step)
 static sadmm_status host_step(sadmm_world *world)
 {
     struct host_step step = {
-        .world = world, .settings = sadmm_settings_of_substep(&world->def.settings), .islands_above = -1};
+        .world = world, .settings = sadmm_settings_of_substep(&world->def.settings), .error = -1, .unsolved = -1};
     step.stages = sadmm_stages_of(&world->plan, &step.settings, true);
     TRY(sadmm_world_detach(world));
     world->certified_step = -1;
     world->team.ran = 1;
     const struct sadmm_plan last_plan = world->plan;
-    step.solve = (struct sadmm_solve){world->kernels, world->context, &step.system, &step.settings,
-                                      &world->plan, &step.report, &world->error};
+    step.solve = (struct sadmm_solve){.kernels = world->kernels,
+                                      .context = world->context,
+                                      .system = &step.system,
+                                      .settings = &step.settings,
+                                      .plan = &world->plan,
+                                      .report = &step.report,
+                                      .error = &world->error,
+                                      .errors = &world->errors};
     sadmm_world_swap_starts(world);
     sadmm_status status = run_stages(&step);
     if (status != SADMM_OK) { /* what can be read of the last step is as before */

@@ -80,6 +80,7 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_collision_destroy(world->collision);
     sadmm_contact_set_free(&world->contacts);
     sadmm_certificate_workspace_free(&world->certificate_workspace);
+    sadmm_solve_errors_free(&world->errors);
     sadmm_articulations_destroy(world->articulations);
     sadmm_ncp_destroy(world->ncp);
     sadmm_push_destroy(world->push);

@@ -207,7 +207,7 @@ static sadmm_settings take_settings(struct bytes *in)
     s.penalty_period = take_choice(in, 5);
     s.relaxation = take_rarely(in, 32) ? take_extreme(in) : take_in(in, 1, 1.99);
     if (take_rarely(in, 4)) s.residual_tolerance = take_scale(in, 1e-12, 1);
-    if (take_rarely(in, 4)) s.certificate_tolerance = take_scale(in, 1e-12, 1);
+    if (take_rarely(in, 4)) s.tolerance = take_scale(in, 1e-12, 1);
     if (take_rarely(in, 8)) s.penalty_mass_factor = take_scale(in, 1e-12, 1e12);
     if (take_rarely(in, 8)) s.penalty_offset = take_scale(in, 1e-12, 1e15);
     if (take_rarely(in, 16)) s.dt = take_scale(in, 1e-6, 1);

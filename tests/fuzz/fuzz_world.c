@@ -191,8 +191,8 @@ static sadmm_settings take_settings(struct machine *m, sadmm_settings s)
         case 9: s.penalty_update_warm = take_choice(in, 2); break;
         case 10: s.warm_start = take_choice(in, 2); break;
         case 11: s.residual_tolerance = take_choice(in, 2) ? take_extreme(in) : take_scale(in, 1e-12, 1); break;
-        case 12: s.certificate_tolerance = take_choice(in, 2) ? take_extreme(in) : take_scale(in, 1e-12, 1); break;
-        case 13: s.certificate_momentum_tolerance = take_number(in, 0, 1); break;
+        case 12: s.tolerance = take_choice(in, 2) ? take_extreme(in) : take_scale(in, 1e-12, 1); break;
+        case 13: s.ncp_points = take_choice(in, 2) ? 0 : take_choice(in, 128); break;
         case 14: s.check_period = take_choice(in, 6); break;
         case 15: s.measure_residuals = take_choice(in, 2); break;
         case 16: s.certify = take_choice(in, 2); break;

@@ -107,7 +107,7 @@ def load(
         backend=backend,
         precision=precision,
         device=device,
-        settings=settings if settings is not None else settings_of(source, backend),
+        settings=settings if settings is not None else settings_of(source),
     )
     loaded = LoadedModel(world, source, report)
     report_options(source, report)

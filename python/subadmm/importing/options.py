@@ -5,9 +5,6 @@ import numpy as np
 from .model import element
 
 
-NCP_POINTS = 64  # contact points of an island that takes the dense contact solve, at most
-
-
 def disabled(source, flag):
     """Is a flag of the file's <option><flag> off? As 'CONTACT'."""
     import mujoco
@@ -15,13 +12,12 @@ def disabled(source, flag):
     return bool(source.opt.disableflags & int(getattr(mujoco.mjtDisableBit, "mjDSBL_" + flag, 0)))
 
 
-def settings_of(source, backend):
-    """The file's. Contacts of robots: dense contact solve, but on a device, where the host would make every step."""
+def settings_of(source):
+    """The file's."""
     from .. import Settings
 
     gravity = [0.0, 0, 0] if disabled(source, "GRAVITY") else list(source.opt.gravity)
-    points = 0 if backend == "cuda" else NCP_POINTS
-    return Settings(dt=float(np.clip(source.opt.timestep, 1e-6, 1)), gravity=gravity, iterations=60, ncp_points=points)
+    return Settings(dt=float(np.clip(source.opt.timestep, 1e-6, 1)), gravity=gravity)
 
 
 def report_options(source, report):

@@ -1,10 +1,8 @@
 /* The method `fast`: the stop rule of whole steps. A convergence check finds each island's part of the certificate
- * (core/solve/certificate.c), the natural map of its contacts and its momentum error. An island that meets the
- * tolerances has stopped, in every tier after as many iterations as if it were alone: nothing is written to it any
- * more. Tier BLOCK leaves a block out whose islands have all stopped; the other tiers have nothing left to do once the
- * last island has. The scale of the momentum error is the island's own, which is no less strict than the certificate's
- * (but for islands where nothing pushes: there the tolerance of the natural map says what is nothing). In double, eight
- * lanes a body. */
+ * errors (core/solve/solve_error.h), the natural map of its contacts and the velocity that it owes. An island that
+ * meets the tolerance has stopped, in every tier after as many iterations as if it were alone: nothing is written to it
+ * any more. Tier BLOCK leaves a block out whose islands have all stopped; the other tiers have nothing left to do once
+ * the last island has. In double, eight lanes a body. */
 #include <string.h>
 
 #include "backend_cuda/device/double.h"
@@ -14,6 +12,7 @@
 #include "stop_rule.h"
 
 #include "core/math/row.h"
+#include "core/math/solve_rounding.h"
 #include "solution.h"
 
 /* Of a contact in its frame, with u = x + e and the response w. */
@@ -96,8 +95,9 @@ static __device__ double natural_map_of_rows(const body_view &bodies, const row_
     return worst;
 }
 
-/* Terms of a body: natural map of the constraints that count here (at their first dynamic body); momentum error, and
- * the largest of what it is made of. args.checks: this check's number, from 1; args.count: iterations done. */
+/* Terms of a body: natural map of the constraints that count here (at their first dynamic body); the velocity that it
+ * owes; its speed, of which rounding is a share. args.checks: this check's number, from 1; args.count: iterations
+ * done. */
 template <bool RIGID, bool BOUNCES>
 static __global__ void __launch_bounds__(BODY_THREADS)
     convergence_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -121,14 +121,15 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const wide_row<RIGID> row = row_of_body<RIGID>(v.bodies, t);
     const double g = own_number(sums, t.lane), momentum = product(row.velocity, row.a);
     term[0] = largest_of_lanes(map);
-    term[1] = largest_of_lanes(fabs(momentum - row.b - g));
-    term[2] = largest_of_lanes(keep_max(fabs(g), keep_max(fabs(momentum), fabs(row.b))));
-    term[2] = max_of(term[2], t.live ? mass_of(v.bodies, t.body) * v.model.settings->certificate_tolerance : 0);
+    const double mass = t.live ? mass_of(v.bodies, t.body) : 1, owed = momentum - row.b - g,
+                 moving = max_of(dot_lanes(row.velocity, momentum), dot_lanes(row.b, product(row.b, row.a_inverse)));
+    term[1] = sqrt(dot_lanes(owed, product(owed, row.a_inverse)) / mass);
+    term[2] = sqrt(moving / mass);
     if (!add_up_island<largest_term>(v.graph, v.islands, t, t.live, own_number(term, t.lane), largest) ||
         t.lane != 0)
         return;
-    const bool met = largest[0] <= v.model.settings->certificate_tolerance &&
-                     largest[1] <= v.model.settings->certificate_momentum_tolerance * largest[2];
+    const double enough = max_of(v.model.settings->tolerance, SOLVE_ROUNDING * SOLVER_EPSILON * largest[2]);
+    const bool met = largest[0] <= enough && largest[1] <= enough;
     int32_t *stopped = &v.islands.info[v.graph.label[t.body]].stopped;
     if (!met) atomicAdd(&v.islands.stop->unmet[args.checks % CHECKS_KEPT], 1);
     if (!met || *stopped > 0) return;

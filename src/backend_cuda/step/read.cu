@@ -34,7 +34,9 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
     const struct cuda_step_totals *totals = &last->totals;
     out->iterations = totals->constrained * share.iterations + (share.substeps - totals->constrained);
     out->iterations_mean = totals->iterations_mean;
-    out->islands_above = totals->unmet;
+    out->error = -1;
+    out->error_kind = SADMM_STEP_ERROR_NONE;
+    out->unsolved = totals->unmet;
     out->converged = totals->met == share.substeps;
     if (out->converged) out->iterations = totals->most_iterations;
     out->limited = totals->limited;

@@ -123,10 +123,7 @@ static inline bool may_take_hits(const struct sadmm_context *c)
 static inline bool takes_hits(const struct sadmm_context *c) { return c->step->hits_planned && may_take_hits(c); }
 
 /* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
-static inline bool stop_rule_checked(const struct sadmm_context *c)
-{
-    return c->fast && c->settings.certificate_tolerance > 0;
-}
+static inline bool stop_rule_checked(const struct sadmm_context *c) { return c->fast && c->settings.tolerance > 0; }
 
 /* world.cu */
 void CUDA(step_destroy)(struct sadmm_context *);

@@ -6,6 +6,7 @@
 
 const char *const sadmm_backend_names[SADMM_BACKEND_COUNT] = {SADMM_BACKENDS(NAME, )};
 const char *const sadmm_precision_names[SADMM_PRECISION_COUNT] = {SADMM_PRECISIONS(NAME, )};
+const char *const sadmm_step_error_names[SADMM_STEP_ERROR_COUNT] = {SADMM_STEP_ERRORS(NAME, )};
 const char *const sadmm_method_names[SADMM_METHOD_COUNT] = {SADMM_METHODS(NAME, )};
 const char *const sadmm_body_type_names[SADMM_BODY_TYPE_COUNT] = {SADMM_BODY_TYPES(NAME, )};
 const char *const sadmm_shape_type_names[SADMM_SHAPE_TYPE_COUNT] = {SADMM_SHAPE_TYPES(NAME, )};
@@ -18,6 +19,7 @@ const uint32_t sadmm_joint_locks[SADMM_JOINT_KIND_COUNT] = {SADMM_JOINT_KINDS(LO
 #define ONE(X, ...) +1
 _Static_assert(0 SADMM_BACKENDS(ONE, ) == SADMM_BACKEND_COUNT, "every backend is listed");
 _Static_assert(0 SADMM_PRECISIONS(ONE, ) == SADMM_PRECISION_COUNT, "every precision is listed");
+_Static_assert(0 SADMM_STEP_ERRORS(ONE, ) == SADMM_STEP_ERROR_COUNT, "every error of a step is listed");
 _Static_assert(0 SADMM_METHODS(ONE, ) == SADMM_METHOD_COUNT, "every method is listed");
 _Static_assert(0 SADMM_BODY_TYPES(ONE, ) == SADMM_BODY_TYPE_COUNT, "every type of body is listed");
 _Static_assert(0 SADMM_SHAPE_TYPES(ONE, ) == SADMM_SHAPE_TYPE_COUNT, "every type of shape is listed");

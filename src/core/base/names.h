@@ -19,6 +19,12 @@ extern "C" {
     F(X, SADMM_BACKEND_CUDA, "cuda")
 #define SADMM_PRECISIONS(F, X) F(X, SADMM_F32, "f32") F(X, SADMM_F64, "f64")
 #define SADMM_METHODS(F, X) F(X, SADMM_METHOD_PAPER, "paper") F(X, SADMM_METHOD_FAST, "fast")
+#define SADMM_STEP_ERRORS(F, X)                 \
+    F(X, SADMM_STEP_ERROR_NONE, "none")         \
+    F(X, SADMM_STEP_ERROR_LAW, "law")           \
+    F(X, SADMM_STEP_ERROR_MOMENTUM, "momentum") \
+    F(X, SADMM_STEP_ERROR_LIMITER, "limiter")   \
+    F(X, SADMM_STEP_ERROR_JOINTS, "joints")
 #define SADMM_BODY_TYPES(F, X)          \
     F(X, SADMM_BODY_DYNAMIC, "dynamic") \
     F(X, SADMM_BODY_STATIC, "static")   \
@@ -71,6 +77,7 @@ enum { SADMM_PRECISION_COUNT = SADMM_F64 + 1, SADMM_BODY_TYPE_COUNT = SADMM_BODY
 
 extern const char *const sadmm_backend_names[SADMM_BACKEND_COUNT];
 extern const char *const sadmm_precision_names[SADMM_PRECISION_COUNT];
+extern const char *const sadmm_step_error_names[SADMM_STEP_ERROR_COUNT];
 extern const char *const sadmm_method_names[SADMM_METHOD_COUNT];
 extern const char *const sadmm_body_type_names[SADMM_BODY_TYPE_COUNT];
 extern const char *const sadmm_shape_type_names[SADMM_SHAPE_TYPE_COUNT];

@@ -79,7 +79,7 @@ static sadmm_settings without_numbers(const sadmm_settings *s)
     SADMM_EACH_SETTING_NUMBER(DROP)
 #undef DROP
     rest.penalty_ratio_limit = s->penalty_ratio_limit > 1;
-    rest.certificate_tolerance = s->certificate_tolerance > 0;
+    rest.tolerance = s->tolerance > 0;
     rest.residual_tolerance = s->residual_tolerance > 0;
     rest.threads = 0;
     return rest;

@@ -285,6 +285,13 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
     return SADMM_OK;
 }
 
+sadmm_status sadmm_articulations_find_none(struct sadmm_articulations *articulations, const struct sadmm_system *system,
+                                           struct sadmm_error *error)
+{
+    const struct solving s = {.j = articulations, .system = system};
+    return find_order(&s) ? SADMM_OK : sadmm_fail_memory(error, "articulations");
+}
+
 bool sadmm_articulations_has_loops(const struct sadmm_articulations *articulations)
 {
     bool loops = false;

@@ -49,6 +49,10 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
                                        const struct sadmm_settings *settings, const uint8_t *stiffened, bool after,
                                        struct sadmm_error *error);
 
+/* There are none in this system. Errors: OUT_OF_MEMORY. */
+sadmm_status sadmm_articulations_find_none(struct sadmm_articulations *articulations, const struct sadmm_system *system,
+                                           struct sadmm_error *error);
+
 /* Has any part a loop (core/model/articulation.h)? */
 bool sadmm_articulations_has_loops(const struct sadmm_articulations *articulations);
 

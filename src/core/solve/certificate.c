@@ -6,13 +6,11 @@
 
 #include "core/math/dense6.h"
 #include "core/math/row.h"
-#include "core/model/islands.h"
 #include "core/base/memory.h"
 #include "core/model/system_math.h"
 
-/* A body in the workspace: Cholesky factor of A (36), J^T lambda (6), the largest natural map of its constraints, its
- * momentum error, and whether its island (by its first body) was counted as above the tolerances. */
-enum { FACTOR = 0, IMPULSE = 36, NATURAL_MAP = 42, MOMENTUM = 43, COUNTED = 44, BODY_SIZE = 45 };
+/* A body in the workspace: Cholesky factor of A (36), J^T lambda (6). */
+enum { FACTOR = 0, IMPULSE = 36, BODY_SIZE = 42 };
 
 /* Norms and maxima gathered on the way. Squares are of numbers times `unit`, a power of two: 1, or so small that none
  * overflows whose root is a number. */
@@ -36,15 +34,8 @@ static double max_abs6(const double x[6])
     return m;
 }
 
-static void count_constraint(struct tally *t, int64_t index, double error, double *bodies, int32_t body_a,
-                             int32_t body_b)
+static void count_constraint(struct tally *t, int64_t index, double error)
 {
-    const int32_t sides[2] = {body_a, body_b};
-    for (int side = 0; side < 2; ++side) {
-        if (sides[side] < 0) continue;
-        double *largest = bodies + BODY_SIZE * (size_t)sides[side] + NATURAL_MAP;
-        *largest = keep_max(error, *largest);
-    }
     if (t->ncp_worst < 0 || (exceeds(error, t->ncp_max) && !isnan(t->ncp_max))) {
         t->ncp_max = error;
         t->ncp_worst = index;
@@ -133,7 +124,7 @@ static void certify_pair(struct tally *tally, const struct sadmm_system *system,
         }
         double w = fmax(weight[0], fmax(weight[1], weight[2]));
         tally->contact_errors[k] = contact_map(tally, l, u, pair->friction, w);
-        count_constraint(tally, k, tally->contact_errors[k], bodies, pair->body_a, pair->body_b);
+        count_constraint(tally, k, tally->contact_errors[k]);
     }
 }
 
@@ -182,8 +173,7 @@ static void certify_rows(struct tally *tally, const struct sadmm_system *system,
                 error = keep_max(error, row_map(tally, rows, first + (size_t)r, x[r], weight[r]));
         }
     }
-    count_constraint(tally, (int64_t)(system->contacts->point_count + k), error, bodies, constraint->body_a,
-                     constraint->body_b);
+    count_constraint(tally, (int64_t)(system->contacts->point_count + k), error);
 }
 
 /* Of two sums of squares. siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). A
@@ -193,22 +183,6 @@ static double relative(const struct tally *t, double error2, double scale2)
     double error = sqrt(error2), scale = sqrt(scale2);
     if (!isfinite(scale)) return NAN;
     return scale > sqrt(DBL_EPSILON) * t->unit ? error / scale : error / t->unit;
-}
-
-static int64_t count_islands_above(double *bodies, size_t count, const int32_t *labels,
-                                   const struct sadmm_settings *settings, double scale)
-{
-    int64_t above = 0;
-    for (size_t i = 0; i < count; ++i) {
-        const double *body = bodies + BODY_SIZE * i;
-        double *counted = bodies + BODY_SIZE * (size_t)labels[i] + COUNTED;
-        if (!exceeds(body[NATURAL_MAP], settings->certificate_tolerance) &&
-            !exceeds(body[MOMENTUM], settings->certificate_momentum_tolerance * scale))
-            continue;
-        above += *counted == 0;
-        *counted = 1;
-    }
-    return above;
 }
 
 static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const struct sadmm_system *system,
@@ -244,7 +218,6 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
         dense6_mul(A, system->velocity + 6 * i, Av);
         for (int r = 0; r < 6; ++r) residual[r] = Av[r] - b[r] - impulse[r];
         double largest = max_abs6(residual);
-        bodies[BODY_SIZE * i + MOMENTUM] = largest;
         if (out.momentum_worst < 0 || (exceeds(largest, residual_max) && !isnan(residual_max))) {
             residual_max = largest;
             out.momentum_worst = (int64_t)i;
@@ -263,11 +236,6 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
     if (!tally.outside)
         out.siconos = relative(&tally, residual2, keep_max(b2, keep_max(Av2, Jl2))) +
                       relative(&tally, tally.map2, keep_max(tally.u2, tally.r2));
-    if (settings && settings->certificate_tolerance > 0) {
-        if (!SADMM_GROW(workspace->labels, 0, count)) return sadmm_fail_memory(error, "the certificate");
-        sadmm_islands(system, workspace->labels);
-        out.islands_above = count_islands_above(bodies, count, workspace->labels, settings, scale);
-    }
     *certificate = out;
     return SADMM_OK;
 }
@@ -306,7 +274,6 @@ sadmm_status sadmm_certify(const struct sadmm_system *system, const struct sadmm
 void sadmm_certificate_workspace_free(struct sadmm_certificate_workspace *workspace)
 {
     sadmm_free(workspace->values);
-    sadmm_free(workspace->labels);
     sadmm_free(workspace->contact_errors);
     *workspace = (struct sadmm_certificate_workspace){0};
 }
@@ -314,7 +281,6 @@ void sadmm_certificate_workspace_free(struct sadmm_certificate_workspace *worksp
 sadmm_certificate sadmm_certificate_none(void)
 {
     sadmm_certificate none = {
-        .ncp_max = -1, .ncp_mean = -1, .ncp_worst = -1, .momentum_max = -1, .momentum_worst = -1, .siconos = -1,
-        .islands_above = -1};
+        .ncp_max = -1, .ncp_mean = -1, .ncp_worst = -1, .momentum_max = -1, .momentum_worst = -1, .siconos = -1};
     return none;
 }

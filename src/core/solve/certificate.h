@@ -33,7 +33,6 @@ sadmm_status sadmm_certify(const struct sadmm_system *system, const struct sadmm
 /* The same without allocating once the workspace has grown. Start it from zero. */
 struct sadmm_certificate_workspace {
     double *values;
-    int32_t *labels;
     double *contact_errors; /* natural map of each contact point, m/s, of the last certificate */
 };
 sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, const struct sadmm_system *system,

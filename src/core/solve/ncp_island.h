@@ -34,6 +34,7 @@ struct sadmm_ncp {
     int32_t *label, *number, *next_body;
     int32_t *points, *first_pair; /* how many points; its pairs */
     uint8_t *kind;             /* bits of enum island_kind */
+    double *error;             /* what is left, m/s; -1: not known */
     int32_t *next_pair;
     /* one island: */
     struct ncp_body *bodies;
@@ -51,8 +52,8 @@ struct sadmm_ncp {
     uint8_t *states;           /* SADMM_MAX_ROWS a column, of the parts one after the other: those that G is for */
 };
 
-/* Of islands: they have rows; are the iterations'; are solved. */
-enum island_kind { ISLAND_ARTICULATED = 1, ISLAND_LEFT = 2, ISLAND_SOLVED = 4 };
+/* Of islands: they have rows; are the iterations'; are solved; are tried after the iterations. */
+enum island_kind { ISLAND_ARTICULATED = 1, ISLAND_LEFT = 2, ISLAND_SOLVED = 4, ISLAND_LATER = 8 };
 
 /* The island that is solved. */
 struct island {
@@ -70,6 +71,8 @@ struct island {
     bool again;                          /* after the iterations */
     bool fresh;                          /* all are parts, solved by their trees for the impulses that there are */
     bool current;                        /* the best is what bodies and parts have: it is saved before that changes */
+    bool moved;                          /* bodies without joints are, by then */
+    double budget;                       /* multiplications left to those */
     double regularisation;               /* of contacts, a share of their response */
 };
 
@@ -101,11 +104,13 @@ bool sadmm_ncp_make_lists(struct sadmm_ncp *d, const struct sadmm_ncp_input *inp
 bool sadmm_ncp_takes(const struct sadmm_ncp *d, int32_t label, const struct sadmm_settings *settings);
 bool sadmm_ncp_is_solved(const struct sadmm_ncp *d, int32_t body_a, int32_t body_b);
 /* Before the iterations: islands without contacts whose rows the block solve has solved, and bodies without either,
- * which are given A^-1 b; whether every other one may be solved, too, else those without joints are left to the
- * iterations, which would not be spared. */
+ * which are given A^-1 b; whether every other one may be solved, too, with no more contacts without joints than one
+ * island may have, else those come later: iterations would not be spared. */
 void sadmm_ncp_choose_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input);
-/* Backends move bodies without joints by what their iterations end with. */
+/* Islands without joints, when there are iterations. */
 void sadmm_ncp_leave_to_iterations(struct sadmm_ncp *d, const struct sadmm_system *system);
+/* After them: those that miss the tolerance. */
+void sadmm_ncp_choose_later(struct sadmm_ncp *d, const struct sadmm_ncp_input *input);
 /* What solved islands are is kept while the iterations go on with others, and taken back. False: no memory. */
 bool sadmm_ncp_keep(struct sadmm_ncp *d, const struct sadmm_system *system);
 void sadmm_ncp_take_kept(const struct sadmm_ncp *d, const struct sadmm_system *system);

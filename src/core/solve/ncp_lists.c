@@ -6,6 +6,10 @@
 #include "core/model/system_math.h"
 #include "ncp_island.h"
 
+/* What an island takes that some iterations have not solved: in piles of boxes that fall, so many steps of Newton's or
+ * from an interior point in the mean. */
+enum { EXPECTED_STEPS = 100 };
+
 static int32_t island_of(const struct sadmm_ncp *d, int32_t body_a, int32_t body_b)
 {
     return d->label[body_a >= 0 ? body_a : body_b];
@@ -64,7 +68,7 @@ static void describe_islands(struct sadmm_ncp *d, const struct sadmm_articulatio
 
 bool sadmm_ncp_takes(const struct sadmm_ncp *d, int32_t label, const struct sadmm_settings *settings)
 {
-    return !(d->kind[label] & (ISLAND_LEFT | ISLAND_SOLVED)) && d->points[label] > 0 &&
+    return !(d->kind[label] & (ISLAND_LEFT | ISLAND_SOLVED | ISLAND_LATER)) && d->points[label] > 0 &&
            d->points[label] <= settings->ncp_points;
 }
 
@@ -96,8 +100,9 @@ bool sadmm_ncp_make_lists(struct sadmm_ncp *d, const struct sadmm_ncp_input *inp
     const size_t n = (size_t)system->body_count, pairs = system->contacts->pair_count;
     if (!SADMM_GROW(d->label, 0, n) || !SADMM_GROW(d->number, 0, n) || !SADMM_GROW(d->next_body, 0, n) ||
         !SADMM_GROW(d->points, 0, n) || !SADMM_GROW(d->first_pair, 0, n) || !SADMM_GROW(d->kind, 0, n) ||
-        !SADMM_GROW(d->next_pair, 0, pairs))
+        !SADMM_GROW(d->error, 0, n) || !SADMM_GROW(d->next_pair, 0, pairs))
         return false;
+    for (size_t i = 0; i < n; ++i) d->error[i] = -1;
     sadmm_islands(system, d->label);
     list_islands(d, system);
     describe_islands(d, input->articulations, system, input->slots);
@@ -116,6 +121,7 @@ static void find_solved_without_contacts(struct sadmm_ncp *d, const struct sadmm
         const int32_t label = d->label[i];
         if (d->points[label] > 0 || (d->kind[label] & ISLAND_LEFT)) continue;
         d->kind[label] |= ISLAND_SOLVED;
+        d->error[label] = 0;
         if (articulations->part[i] >= 0 || d->kind[label] & ISLAND_ARTICULATED) continue;
         double A[36], b[6];
         sadmm_system_body(system, input->settings, i, A, b);
@@ -126,19 +132,45 @@ static void find_solved_without_contacts(struct sadmm_ncp *d, const struct sadmm
 
 void sadmm_ncp_choose_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input)
 {
-    bool all = true;
+    bool all = input->system->rows->constraint_count > 0;
+    int64_t points = 0;
     find_solved_without_contacts(d, input);
-    for (int32_t i = 0; i < input->system->body_count; ++i)
+    for (int32_t i = 0; i < input->system->body_count; ++i) {
         all = all && (d->kind[d->label[i]] & ISLAND_SOLVED || sadmm_ncp_takes(d, d->label[i], input->settings));
+        if (d->label[i] == i && !(d->kind[i] & (ISLAND_ARTICULATED | ISLAND_SOLVED))) points += d->points[i];
+    }
+    all = all && points <= input->settings->ncp_points;
     for (int32_t i = 0; !all && i < input->system->body_count; ++i)
-        if (!(d->kind[i] & (ISLAND_ARTICULATED | ISLAND_SOLVED))) d->kind[i] |= ISLAND_LEFT;
+        if (!(d->kind[i] & (ISLAND_ARTICULATED | ISLAND_SOLVED))) d->kind[i] |= ISLAND_LATER;
 }
 
 void sadmm_ncp_leave_to_iterations(struct sadmm_ncp *d, const struct sadmm_system *system)
 {
-    for (int32_t i = 0; i < system->body_count; ++i)
-        if (!(d->kind[i] & ISLAND_ARTICULATED)) d->kind[i] = ISLAND_LEFT;
+    for (int32_t i = 0; i < system->body_count; ++i) {
+        if (d->kind[i] & ISLAND_ARTICULATED) continue;
+        d->kind[i] = d->kind[i] & ISLAND_LEFT || d->points[i] == 0 ? ISLAND_LEFT : ISLAND_LATER;
+        d->error[i] = -1;
+    }
 }
+
+void sadmm_ncp_choose_later(struct sadmm_ncp *d, const struct sadmm_ncp_input *input)
+{
+    const double tolerance = input->settings->tolerance;
+    for (int32_t i = 0; i < input->system->body_count; ++i) {
+        if (d->kind[i] & (ISLAND_ARTICULATED | ISLAND_LEFT) || d->label[i] != i) continue;
+        const bool due = input->errors && tolerance > 0 && sadmm_solve_errors_above(input->errors, i, tolerance);
+        d->kind[i] = due ? 0 : ISLAND_LEFT;
+    }
+}
+
+bool sadmm_ncp_has(const struct sadmm_ncp *d, int32_t label, const struct sadmm_settings *settings, double *work)
+{
+    *work = EXPECTED_STEPS * ncp_factor_work(3.0 * d->points[label]);
+    return d->known && (d->kind[label] & ISLAND_SOLVED ||
+                        (!(d->kind[label] & ISLAND_LEFT) && d->points[label] <= settings->ncp_points));
+}
+
+double sadmm_ncp_error(const struct sadmm_ncp *d, int32_t label) { return d->error[label]; }
 
 bool sadmm_ncp_keep(struct sadmm_ncp *d, const struct sadmm_system *system)
 {

@@ -13,6 +13,9 @@ static const struct damping {
     double share, least, most;
 } damping[] = {{100, 1e-8, 1e-5}, {1, 1e-10, 1e-3}};
 enum { DAMPINGS = sizeof damping / sizeof *damping };
+/* m/s: nearer than this the pieces are right, and a step without damping finds, of all impulses that solve, those that
+ * the matrix has: the least, by its regularisation, whatever the start. */
+static const double NEAR = 1e-10;
 /* m/s: what is left below this is rounding, which an interior point does not take away. */
 static const double NEARLY = 1e-11;
 
@@ -161,7 +164,7 @@ static double take_steps(struct newton *s, int steps, double size, double best, 
     double map = find_pieces(s);
     for (int step = 0; step < steps && best > enough && map < HUGE_VAL && d->budget > 0; ++step) {
         const struct damping *by = &damping[step / STEPS_IN_TURN % DAMPINGS];
-        s->proximal = fmin(by->most, fmax(by->least, by->share * map / size));
+        s->proximal = map > NEAR ? fmin(by->most, fmax(by->least, by->share * map / size)) : 0;
         if (!make_step(s)) return best;
         map = find_pieces(s);
         if (map < best) keep_best(s);

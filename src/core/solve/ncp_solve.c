@@ -15,14 +15,15 @@ static const double ENOUGH = 1e-9, AIM = 1e-10, NEWTON_AIM = 1e-13;
  * that are solutions the least are found. Else a car stands on two wheels across, and which two changes from step to
  * step. */
 static const double REGULARISATION = 3e-12;
-/* Multiplications for a search, so that one that does not come to an end takes some 10 ms. */
-static const double BUDGET = 4e7;
+/* Multiplications for a search, so that one that does not come to an end takes some 4 ms. Islands without joints share
+ * one, no more than the iterations took or 1 ms: others keep what those have. */
+static const double BUDGET = 4e7, SHARED = 1e7;
 /* Contacts that cannot be met give by this share of their response: a body's own weight by 0.5 mm/s in a step of 5 ms.
  * Of 600 mechanisms that begin in overlap (python/tests/test_mechanisms.py 600) 16 end above 20 m/s, with 1e-3 29, with
  * 1e-4 82. */
 static const double GIVES = 1e-2;
-/* A solution of so many times the energy that is expected is held against that of contacts that give: where bodies are
- * all but wedged, the one throws them about, and the other has less than half its energy. */
+/* A solution of more than so many times the energy that is asked for is none: where bodies are all but wedged, or a
+ * loop is near its dead point, it throws them about. */
 static const double MOST_ENERGY = 10;
 /* How many times larger than those they replace impulses may be that are no solution. */
 static const double MOST_GROWTH = 4;
@@ -38,9 +39,9 @@ struct sadmm_ncp *sadmm_ncp_create(void)
 void sadmm_ncp_destroy(struct sadmm_ncp *d)
 {
     if (!d) return;
-    void *blocks[] = {d->label,  d->number,   d->next_body, d->points, d->first_pair, d->kind, d->next_pair,
-                      d->bodies, d->contacts, d->laws,      d->parts,  d->numbers,    d->rows, d->states,
-                      d->kept, d->first_node, d->passed, (void *)d->passed_at, d->passed_counts};
+    void *blocks[] = {d->label,    d->number, d->next_body, d->points, d->first_pair, d->kind,   d->error,
+                      d->next_pair, d->bodies, d->contacts,  d->laws,   d->parts,      d->numbers, d->rows,
+                      d->states,   d->kept,   d->first_node, d->passed, (void *)d->passed_at, d->passed_counts};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(d);
 }
@@ -363,7 +364,7 @@ static void begin_giving(struct island *s, uint8_t *states, size_t rows)
     s->best = HUGE_VAL;
 }
 
-static void search(struct island *s, double *G, uint8_t *states, uint8_t *next, size_t rows)
+static void search_with(struct island *s, double *G, uint8_t *states, uint8_t *next, size_t rows)
 {
     bool changed = true;
     if (!s->fresh && !solve_inner_rows(s, states, next, rows, &changed)) return;
@@ -379,6 +380,15 @@ static void search(struct island *s, double *G, uint8_t *states, uint8_t *next, 
         if (!changed && s->best > last / 2) return; /* what is left is rounding */
         idle = !changed && s->best > 0.9 * last ? idle + 1 : 0;
     }
+}
+
+static void search(struct island *s, double *G, uint8_t *states, uint8_t *next, size_t rows)
+{
+    double own = BUDGET, *const budget = s->parts > 0 ? &own : &s->budget;
+    s->dense.budget = *budget;
+    search_with(s, G, states, next, rows);
+    *budget = s->dense.budget;
+    forget_loads(s);
 }
 
 static void store_best(const struct island *s)
@@ -463,6 +473,40 @@ static double correcting_energy2(const struct island *s)
     }
     return speed * speed * mass;
 }
+
+/* What the laws ask of a row by itself: twice the energy of the velocity that it makes from rest. */
+static double row_energy2(const struct island *s, const struct sadmm_row_constraint *constraint, int32_t r)
+{
+    const struct sadmm_rows *rows = s->system->rows;
+    const int32_t ends[2] = {constraint->body_a, constraint->body_b};
+    double response = 0;
+    for (int side = 0; side < 2; ++side) {
+        const double *row = (side ? rows->jacobian_b : rows->jacobian_a) + 6 * (size_t)r;
+        if (ends[side] < 0) continue;
+        response += ldl6_inverse_product(sadmm_ncp_factor(s, s->d->number[ends[side]]), row);
+    }
+    const double under = rows->compliance[r] + rows->gain[r] * response,
+                 alone = under > 0 ? fmin(fmax(-rows->bias[r] / under, rows->lo[r]), rows->hi[r]) : 0;
+    return response * alone * alone;
+}
+
+/* Of all that asks for a velocity, besides corrections: joints' rows, what moves by itself, restitution. */
+static double asked_energy2(const struct island *s)
+{
+    double sum = 0;
+    for (int32_t i = 0; i < s->contacts; ++i) {
+        const struct ncp_contact *c = &s->d->contacts[i];
+        const double e = fmin(c->e, 0) + c->given[0]; /* an open contact asks for nothing */
+        sum += (e * e + c->given[1] * c->given[1] + c->given[2] * c->given[2]) / s->d->laws[i].response;
+    }
+    for (int32_t k = 0; k < s->parts; ++k) {
+        const struct articulation_view *v = &part_of(s, k)->view;
+        EACH_ARTICULATION_ROW(s->slots, v, r, from)
+            sum += row_energy2(s, &s->slots[v->s.constraint[r / SADMM_MAX_ROWS]], from);
+    }
+    return sum;
+}
+
 static double free_energy2(const struct island *s)
 {
     double sum = 0, v[6];
@@ -473,11 +517,14 @@ static double free_energy2(const struct island *s)
     return sum;
 }
 
-/* Does a solution throw bodies about? */
-static bool is_violent(const struct island *s, double energy)
+/* No law makes energy: velocities are those of forces alone, and what is asked for, of which some may be asked for by
+ * several. */
+static bool has_too_much_energy(const struct island *s)
 {
-    const double correcting = correcting_energy2(s);
-    return energy > MOST_ENERGY * correcting && energy > MOST_ENERGY * (correcting + free_energy2(s));
+    const double energy = best_energy2(s), correcting = correcting_energy2(s);
+    if (energy <= MOST_ENERGY * correcting) return false;
+    const double free = free_energy2(s);
+    return energy > free && sqrt(energy) > sqrt(free) + sqrt(MOST_ENERGY * (correcting + asked_energy2(s)));
 }
 
 /* The island's state is the best that was found. solved: no iteration can do better. */
@@ -485,6 +532,8 @@ static bool take(struct island *s, int32_t label, bool solved)
 {
     store_best(s);
     if (solved) s->d->kind[label] |= ISLAND_SOLVED;
+    if (s->again && !(s->d->kind[label] & ISLAND_ARTICULATED)) s->moved = true;
+    s->d->error[label] = s->best_hard;
     return true;
 }
 
@@ -512,6 +561,7 @@ static bool solve_island(struct island *s, int32_t label)
     sadmm_ncp_number_nodes(s);
     find_contact_velocities(s);
     const double before = fmax(ncp_natural_map(&s->dense), momentum_residual(s));
+    d->error[label] = before;
     if (!(before > ENOUGH)) {
         d->kind[label] |= ISLAND_SOLVED;
         return false;
@@ -521,36 +571,38 @@ static bool solve_island(struct island *s, int32_t label)
     for (int32_t k = 0; k < s->parts; ++k) rows += (size_t)(SADMM_MAX_ROWS * part_of(s, k)->view.s.columns);
     s->best = before;
     s->gives = false;
-    s->dense.budget = BUDGET;
     begin_search(s, d->states);
     search(s, G, d->states, d->states + rows, rows);
-    forget_loads(s);
-    const bool solved = !(s->best > ENOUGH);
-    const double energy = solved ? best_energy2(s) : HUGE_VAL;
-    const bool taken = (solved || is_nearer(s, before, size_before)) && take(s, label, solved);
-    if (taken && !(solved && is_violent(s, energy))) return true;
-    s->dense.budget = BUDGET;
+    const bool solved = !(s->best > ENOUGH), wild = s->best < before && has_too_much_energy(s);
+    if (!wild && (solved || is_nearer(s, before, size_before))) {
+        take(s, label, solved);
+        if (solved) return true;
+    }
+    const double nearest = d->error[label];
     begin_giving(s, d->states, rows);
     search(s, G, d->states, d->states + rows, rows);
-    forget_loads(s);
-    if (s->best > ENOUGH || (solved ? best_energy2(s) > energy / 2 : s->again && s->best_hard > before)) return taken;
-    return take(s, label, true);
+    const bool gives =
+        !(s->best > ENOUGH) && !has_too_much_energy(s) && (wild || (s->again && s->best_hard <= nearest));
+    return gives ? take(s, label, true) : nearest < before;
 }
 
 /* ---- all islands ------------------------------------------------------------------------------------------------- */
 
-static int32_t solve_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, bool again)
+static int32_t solve_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, bool again, bool *moved)
 {
     struct island s = {.d = d, .articulations = input->articulations, .system = input->system, .slots = input->slots,
                        .settings = input->settings, .again = again};
+    const double iterations = NCP_POINT_WORK * (double)input->system->contacts->point_count * input->iterations;
+    s.budget = fmax(SHARED, iterations);
     int32_t solved = 0;
     for (int32_t i = 0; i < input->system->body_count; ++i)
         if (d->label[i] == i && sadmm_ncp_takes(d, i, input->settings)) solved += solve_island(&s, i);
+    *moved = s.moved;
     return solved;
 }
 
-sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, bool *all, int32_t *solved,
-                             struct sadmm_error *error)
+sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, bool tries, bool *all,
+                             int32_t *solved, struct sadmm_error *error)
 {
     const struct sadmm_system *system = input->system;
     *solved = 0;
@@ -558,8 +610,15 @@ sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input
     ncp->known = false;
     if (!sadmm_ncp_make_lists(ncp, input, system))
         return sadmm_fail_memory(error, "islands of the dense contact solve");
+    if (!tries) {
+        *all = false;
+        sadmm_ncp_leave_to_iterations(ncp, system);
+        ncp->known = true;
+        return SADMM_OK;
+    }
     sadmm_ncp_choose_islands(ncp, input);
-    *solved = solve_islands(ncp, input, false);
+    bool moved;
+    *solved = solve_islands(ncp, input, false, &moved);
     for (int32_t i = 0; i < system->body_count; ++i) *all = *all && sadmm_ncp_is_solved(ncp, i, i);
     ncp->known = true;
     if (*all) return SADMM_OK;
@@ -569,14 +628,15 @@ sadmm_status sadmm_ncp_solve(struct sadmm_ncp *ncp, const struct sadmm_ncp_input
 }
 
 sadmm_status sadmm_ncp_solve_again(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, int32_t *solved,
-                                   struct sadmm_error *error)
+                                   bool *moved, struct sadmm_error *error)
 {
     *solved = 0;
-    if (ncp->known) sadmm_ncp_take_kept(ncp, input->system);
-    else if (!sadmm_ncp_make_lists(ncp, input, input->system))
+    *moved = false;
+    if (ncp->known && input->system->rows->constraint_count > 0) sadmm_ncp_take_kept(ncp, input->system);
+    if (!ncp->known && !sadmm_ncp_make_lists(ncp, input, input->system))
         return sadmm_fail_memory(error, "islands of the dense contact solve");
-    sadmm_ncp_leave_to_iterations(ncp, input->system);
-    *solved = solve_islands(ncp, input, true);
+    sadmm_ncp_choose_later(ncp, input);
+    *solved = solve_islands(ncp, input, true, moved);
     return SADMM_OK;
 }
 

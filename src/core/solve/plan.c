@@ -116,9 +116,9 @@ void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *s
     plan->weight_updates = fast && !plan->warm;
     plan->momentum = plan->rigid && plan->points > 0;
     plan->energy_limit = fast && plan->momentum;
-    plan->certificate = settings->certify || settings->certificate_tolerance > 0;
+    plan->certificate = settings->certify;
     plan->residuals = constrained && (plan->penalty_updates || settings->measure_residuals ||
-                                      settings->residual_tolerance > 0);
+                                      settings->residual_tolerance > 0 || settings->tolerance > 0);
     plan->wrenches = settings->recover_wrenches;
 }
 

@@ -59,6 +59,7 @@ void sadmm_problem_destroy(sadmm_problem *problem)
     sadmm_problem_drop_parts(problem);
     sadmm_free(problem->saved);
     sadmm_certificate_workspace_free(&problem->certificate);
+    sadmm_solve_errors_free(&problem->errors);
     sadmm_free(problem);
 }
 
@@ -175,7 +176,7 @@ sadmm_status sadmm_problem_solve_sized(sadmm_problem *problem, sadmm_backend bac
     problem->plan = sadmm_plan_make(&problem->system, &problem->settings);
     save_solution(problem);
     sadmm_status status = sadmm_schedule_solve(kernels, *context, &problem->system, &problem->settings, &problem->plan,
-                                               &done, error);
+                                               &problem->errors, &done, error);
     if (status == SADMM_OK && report)
         status = sadmm_certify_with(&problem->certificate, &problem->system, &problem->settings,
                                     &done.certificate, error);

@@ -8,12 +8,14 @@
 #include "core/base/parallel.h"
 #include "core/model/system.h"
 #include "kernels.h"
+#include "solve_error.h"
 #include "subadmm/problem.h"
 
 struct sadmm_problem {
     struct sadmm_team team;
     struct sadmm_error error;
     struct sadmm_certificate_workspace certificate;
+    struct sadmm_solve_errors errors;
     int32_t body_count;
     double *A, *b;               /* (bodies x 36), (bodies x 6) */
     double *velocity;            /* (bodies x 6) */

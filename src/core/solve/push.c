@@ -220,10 +220,14 @@ static sadmm_status choose_kernels(struct sadmm_push *p, const struct sadmm_kern
     return kernels->create(device, &p->context, error);
 }
 
+enum { PUSH_ITERATIONS = 20 };
+
 struct sadmm_settings sadmm_push_settings(const struct sadmm_settings *step)
 {
     struct sadmm_settings own = *step;
     own.measure_residuals = own.certify = own.recover_wrenches = false;
+    if (own.tolerance > 0 && own.iterations > PUSH_ITERATIONS) own.iterations = PUSH_ITERATIONS;
+    own.tolerance = 0;      /* what is left of an overlap is the next step's */
     own.penalty_period = 0; /* it goes on from a solution: where nothing moves, balancing residuals is no guide */
     return own;
 }
@@ -249,7 +253,7 @@ sadmm_status sadmm_push_solve(struct sadmm_push *p, const struct sadmm_kernels *
     };
     struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
     plan.contact_rows = contact_rows;
-    TRY(sadmm_schedule_solve(kernels, p->context, &p->system, &settings, &plan, &report, error));
+    TRY(sadmm_schedule_solve(kernels, p->context, &p->system, &settings, &plan, NULL, &report, error));
     for (int32_t k = 0; k < p->system.body_count; ++k)
         for (size_t j = 0; j < 6; ++j)
             p->way[6 * (size_t)k + j] =

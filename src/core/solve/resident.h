@@ -81,7 +81,9 @@ struct sadmm_resident_report {
     int iterations;            /* of the island with the most */
     double iterations_mean;    /* over islands */
     bool converged;            /* every island met the stop rule */
-    int64_t islands_above;     /* that did not; -1: there was none */
+    double error;              /* m/s; -1: not known */
+    sadmm_step_error error_kind;
+    int64_t unsolved;          /* islands that miss the tolerance; -1: there is none */
     int32_t limited;           /* islands with too much energy */
     int32_t joints, couplings; /* that took part, in the last sub-step */
     double penetration_max;    /* m */

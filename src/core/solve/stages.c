@@ -40,8 +40,8 @@ static int begin_batch(struct sadmm_stages *s)
 {
     const struct sadmm_plan *plan = s->plan;
     const struct sadmm_settings *settings = s->settings;
-    const bool has_stop_rule = sadmm_plan_is_constrained(plan) &&
-                               (settings->residual_tolerance > 0 || settings->certificate_tolerance > 0);
+    const bool has_stop_rule =
+        sadmm_plan_is_constrained(plan) && (settings->residual_tolerance > 0 || settings->tolerance > 0);
     const int budget = sadmm_stages_budget(plan, settings), done = s->batch.done;
     const int update = plan->weight_updates ? next_weight_update(done) : INT_MAX;
     int count = budget - done;
@@ -56,9 +56,16 @@ static int begin_batch(struct sadmm_stages *s)
     s->batch.balance = plan->penalty_updates && !s->batch.last && after % settings->penalty_period == 0;
     /* Asked for, they are those of the last iteration, and any check may end the iterations. */
     const bool may_end = s->batch.last || s->batch.check;
-    s->batch.measure = plan->residuals && (s->batch.balance || (may_end && settings->measure_residuals) ||
-                                           (s->batch.check && settings->residual_tolerance > 0));
+    s->batch.measure =
+        plan->residuals && (s->batch.balance || (may_end && settings->measure_residuals) || s->batch.check);
     return count;
+}
+
+/* May an island have a dense contact solve? Those without joints do for the tolerance. */
+static bool takes_islands(const struct sadmm_stages *s)
+{
+    return s->world && s->settings->ncp_points > 0 &&
+           (s->plan->row_constraints > 0 || (s->plan->points > 0 && s->settings->tolerance > 0));
 }
 
 static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
@@ -78,11 +85,9 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
     case SADMM_STAGE_PUSH_SOLVE:
     case SADMM_STAGE_PUSH_MOTION: return s->world && plan->points > 0;
     case SADMM_STAGE_BLOCK_SOLVE: return s->world && plan->row_constraints > 0 && plan->warm_start;
-    case SADMM_STAGE_NCP_SOLVE:
-        return s->world && plan->row_constraints > 0 && plan->warm_start && s->settings->ncp_points > 0;
+    case SADMM_STAGE_NCP_SOLVE: return takes_islands(s) && plan->warm_start;
     case SADMM_STAGE_BLOCK_SOLVE_AGAIN: return s->world && plan->row_constraints > 0 && !s->solved;
-    case SADMM_STAGE_NCP_SOLVE_AGAIN:
-        return s->world && plan->row_constraints > 0 && s->settings->ncp_points > 0 && !s->solved;
+    case SADMM_STAGE_NCP_SOLVE_AGAIN: return takes_islands(s) && !s->solved;
     case SADMM_STAGE_REACTIONS:
     case SADMM_STAGE_JOINT_MOTION: return s->world && plan->row_constraints > 0;
     case SADMM_STAGE_TURN: return !sadmm_stages_in_last_substep(s);

@@ -21,40 +21,40 @@ extern "C" {
 #endif
 
 enum sadmm_stage_kind {
-    SADMM_STAGE_GATHER,             /* -    bodies and start values of the step */
-    SADMM_STAGE_HITS,               /* -    bodies in flight hit each other at their moments (world/step/hits.c) */
-    SADMM_STAGE_FIND,               /* -    contacts */
-    SADMM_STAGE_JOINT_ROWS,         /* -    rows of joints, gears and couplings */
-    SADMM_STAGE_PLAN,               /* -    what this sub-step needs, found from its contacts and rows */
-    SADMM_STAGE_PUSH_CHOICE,        /* -    islands that are pushed apart without a velocity (push.h) */
-    SADMM_STAGE_BLOCK_SOLVE,        /* -    bodies with joints, directly (articulation.h), and what stiffens them */
-    SADMM_STAGE_NCP_SOLVE,          /* -    contacts of small islands with joints, exactly (ncp.h) */
-    SADMM_STAGE_INITIALISE,         /* -    FAST: initial impulses (impulse_initialisation.h) */
-    SADMM_STAGE_BODIES,             /* A    A_i, b_i */
-    SADMM_STAGE_CONTACTS,           /* B    contacts in the solver's form */
-    SADMM_STAGE_ROWS,               /* C, D constraints given by rows */
-    SADMM_STAGE_PENALTY,            /* E-H  C_i, beta_i (FAST: weights) and the factors of A_i + beta_i C_i */
-    SADMM_STAGE_ITERATE,            /* I-O  Steps 1-4, `count` times */
-    SADMM_STAGE_RESIDUALS,          /* N    eqs. (16), (17) of the last iteration */
-    SADMM_STAGE_CHECK,              /* -    convergence: where the stop rule is met, no iteration follows */
-    SADMM_STAGE_WEIGHTS,            /* -    FAST: weights from the multipliers found so far; factors */
-    SADMM_STAGE_BALANCE,            /* P    eq. (15), and where it changes the penalty factors */
-    SADMM_STAGE_ENERGY_LIMIT,       /* - momentum that no contact may change (math/momentum.h); FAST: energy
+    SADMM_STAGE_GATHER,            /* -    bodies and start values of the step */
+    SADMM_STAGE_HITS,              /* -    bodies in flight hit each other at their moments (world/step/hits.c) */
+    SADMM_STAGE_FIND,              /* -    contacts */
+    SADMM_STAGE_JOINT_ROWS,        /* -    rows of joints, gears and couplings */
+    SADMM_STAGE_PLAN,              /* -    what this sub-step needs, found from its contacts and rows */
+    SADMM_STAGE_PUSH_CHOICE,       /* -    islands that are pushed apart without a velocity (push.h) */
+    SADMM_STAGE_BLOCK_SOLVE,       /* -    bodies with joints, directly (articulation.h), and what stiffens them */
+    SADMM_STAGE_NCP_SOLVE,         /* -    contacts of small islands, exactly (ncp.h) */
+    SADMM_STAGE_INITIALISE,        /* -    FAST: initial impulses (impulse_initialisation.h) */
+    SADMM_STAGE_BODIES,            /* A    A_i, b_i */
+    SADMM_STAGE_CONTACTS,          /* B    contacts in the solver's form */
+    SADMM_STAGE_ROWS,              /* C, D constraints given by rows */
+    SADMM_STAGE_PENALTY,           /* E-H  C_i, beta_i (FAST: weights) and the factors of A_i + beta_i C_i */
+    SADMM_STAGE_ITERATE,           /* I-O  Steps 1-4, `count` times */
+    SADMM_STAGE_RESIDUALS,         /* N    eqs. (16), (17) of the last iteration */
+    SADMM_STAGE_CHECK,             /* -    convergence: where the stop rule is met, no iteration follows */
+    SADMM_STAGE_WEIGHTS,           /* -    FAST: weights from the multipliers found so far; factors */
+    SADMM_STAGE_BALANCE,           /* P    eq. (15), and where it changes the penalty factors */
+    SADMM_STAGE_ENERGY_LIMIT,      /* - momentum that no contact may change (math/momentum.h); FAST: energy
                                        (math/energy_limit.h) */
-    SADMM_STAGE_SOLUTION,           /* -    velocities and multipliers to where the caller reads them */
-    SADMM_STAGE_PUSH_SOLVE,         /* -    the second problem: velocities that push apart */
-    SADMM_STAGE_INTEGRATE,          /* Q states after dt, each body's position correction included (math/trapezoid.h) */
-    SADMM_STAGE_BLOCK_SOLVE_AGAIN,  /* -    bodies with joints, beside the contact impulses found */
-    SADMM_STAGE_NCP_SOLVE_AGAIN,    /* -    ... of those that were not solved before */
-    SADMM_STAGE_REACTIONS,          /* -    what joints keep and report */
-    SADMM_STAGE_KINEMATIC,          /* -    kinematic bodies and the targets of couplings go on */
-    SADMM_STAGE_JOINT_MOTION,       /* -    states of bodies with joints after dt: correction, closing, momentum */
-    SADMM_STAGE_PUSH_MOTION,        /* -    pushed bodies move by the second problem's velocities */
-    SADMM_STAGE_KEEP,               /* -    what goes along into the next (sub-)step; is it finite? */
-    SADMM_STAGE_WRENCHES,           /* R    eq. (12) */
-    SADMM_STAGE_TURN,               /* -    the next sub-step starts from where this one has ended */
-    SADMM_STAGE_CERTIFY,            /* -    the true error, from the raw data */
-    SADMM_STAGE_COMMIT,             /* -    the step is made; nothing before changes the world */
+    SADMM_STAGE_SOLUTION,          /* -    velocities and multipliers to where the caller reads them */
+    SADMM_STAGE_PUSH_SOLVE,        /* -    the second problem: velocities that push apart */
+    SADMM_STAGE_INTEGRATE,         /* Q states after dt, each body's position correction included (math/trapezoid.h) */
+    SADMM_STAGE_BLOCK_SOLVE_AGAIN, /* -    bodies with joints, beside the contact impulses found */
+    SADMM_STAGE_NCP_SOLVE_AGAIN,   /* -    ... of those that were not solved before */
+    SADMM_STAGE_REACTIONS,         /* -    what joints keep and report */
+    SADMM_STAGE_KINEMATIC,         /* -    kinematic bodies and the targets of couplings go on */
+    SADMM_STAGE_JOINT_MOTION,      /* -    states of bodies with joints after dt: correction, closing, momentum */
+    SADMM_STAGE_PUSH_MOTION,       /* -    pushed bodies move by the second problem's velocities */
+    SADMM_STAGE_KEEP,              /* -    what goes along into the next (sub-)step; is it finite? */
+    SADMM_STAGE_WRENCHES,          /* R    eq. (12) */
+    SADMM_STAGE_TURN,              /* -    the next sub-step starts from where this one has ended */
+    SADMM_STAGE_CERTIFY,           /* -    the true error, from the raw data */
+    SADMM_STAGE_COMMIT,            /* -    the step is made; nothing before changes the world */
     SADMM_STAGE_COUNT
 };
 

@@ -97,8 +97,11 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
     if (world->report.converged || world->report.iterations_mean != world->report.iterations)
         line(&t, "stopped      by the stop rule%s, after %.1f iterations in the mean of islands\n",
              world->report.converged ? "" : " in part", world->report.iterations_mean);
-    if (world->report.certificate.islands_above > 0)
-        line(&t, "islands left %lld above the tolerance\n", (long long)world->report.certificate.islands_above);
+    if (world->report.unsolved > 0)
+        line(&t, "unsolved     %lld islands miss the tolerance of %g m/s\n", (long long)world->report.unsolved,
+             settings.tolerance);
+    if (world->report.error >= 0)
+        line(&t, "error        %.3g m/s (%s)\n", world->report.error, sadmm_step_error_names[world->report.error_kind]);
     if (world->report.repeated)
         line(
             &t,

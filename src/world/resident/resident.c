@@ -30,15 +30,13 @@ enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Of the stop rules a backend checks the certificate's in the method FAST alone; and the impulses of a first step
+    /* Of the stop rules a backend checks the tolerance in the method FAST alone; and the impulses of a first step
      * are initialised on the host. */
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
     if (fast && !world->stepped) return false;
-    if (s->ncp_points > 0 && world->joint_ids.count + world->coupling_ids.count > 0) return false;
-    return world->kernels->resident && s->residual_tolerance <= 0 &&
-           (s->certificate_tolerance <= 0 || (fast && few_checks));
+    return world->kernels->resident && s->residual_tolerance <= 0 && (s->tolerance <= 0 || (fast && few_checks));
 }
 
 /* ---- updates ----------------------------------------------------------------------------------------------------- */

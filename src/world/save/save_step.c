@@ -170,7 +170,7 @@ static void archive_rows(struct sadmm_archive *archive, sadmm_world *world)
 
 /* ---- plan, start, report ----------------------------------------------------------------------------------------- */
 
-_Static_assert(sizeof(struct sadmm_plan) == 40 && sizeof(sadmm_step_report) == 216,
+_Static_assert(sizeof(struct sadmm_plan) == 40 && sizeof(sadmm_step_report) == 232,
                "a plan, or a report, has other members than the list of a saved world");
 
 static void archive_plan(struct sadmm_archive *archive, struct sadmm_plan *plan)
@@ -204,6 +204,9 @@ static void archive_report(struct sadmm_archive *archive, sadmm_step_report *r)
     SADMM_ARCHIVE(archive, r->pairs);
     SADMM_ARCHIVE(archive, r->iterations);
     SADMM_ARCHIVE(archive, r->iterations_mean);
+    SADMM_ARCHIVE(archive, r->error);
+    SADMM_ARCHIVE(archive, r->error_kind);
+    SADMM_ARCHIVE(archive, r->unsolved);
     sadmm_archive_flag(archive, &r->converged);
     SADMM_ARCHIVE(archive, r->limited);
     SADMM_ARCHIVE(archive, r->repeated);
@@ -214,7 +217,8 @@ static void archive_report(struct sadmm_archive *archive, sadmm_step_report *r)
     if (archive->reading)
         sadmm_archive_expect(archive,
                              (unsigned)r->backend < SADMM_BACKEND_COUNT && (unsigned)r->precision <= SADMM_F64 &&
-                                 counts_on(r->step) && counts_on(r->repeated) && isfinite(r->time) && r->contacts >= 0,
+                                 (unsigned)r->error_kind < SADMM_STEP_ERROR_COUNT && counts_on(r->step) &&
+                                 counts_on(r->repeated) && isfinite(r->time) && r->contacts >= 0,
                              "the report of a step");
 }
 

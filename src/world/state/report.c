@@ -16,6 +16,9 @@ void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sa
     report->pairs = done->plan.pairs;
     report->iterations = done->iterations;
     report->iterations_mean = done->iterations_mean;
+    report->error = done->error;
+    report->error_kind = done->error_kind;
+    report->unsolved = done->unsolved;
     report->converged = done->converged;
     report->limited = done->limited;
     report->penetration_max = done->penetration_max;
@@ -28,5 +31,4 @@ void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sa
     report->ms.total = done->ms.total;
     report->certify_ms = 0;
     report->certificate = sadmm_certificate_none();
-    report->certificate.islands_above = done->islands_above;
 }

@@ -170,6 +170,7 @@ struct sadmm_world {
     int64_t certified_step; /* the step that the workspace's contacts are of, as report.step counts; -1: of none */
     struct sadmm_articulations *articulations; /* made with the first joint */
     struct sadmm_ncp *ncp;       /* made with the first dense contact solve */
+    struct sadmm_solve_errors errors; /* of islands, of the step at hand */
     struct sadmm_push *push;     /* made with the first overlap */
     sadmm_step_report report;
 };

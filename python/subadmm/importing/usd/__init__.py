@@ -18,7 +18,7 @@ def load_stage(path, settings, threshold, **options):
     reader = Reader(stage, report, threshold)
     gravity = gravity_of(reader)
     if settings is None:
-        settings = Settings(gravity=gravity, iterations=60)
+        settings = Settings(gravity=gravity)
     loaded = LoadedStage(World(settings=settings, **options), stage, report, reader.turn)
     filters = Filters(reader)
     add_bodies(loaded, reader, filters)
