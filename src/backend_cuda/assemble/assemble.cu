@@ -3,7 +3,7 @@
 #include "backend_cuda/device/wide.h"
 
 #include "assemble.h"
-#include "body_check.h"
+#include "body.h"
 #include "side_sums.h"
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
