@@ -194,7 +194,7 @@ void sadmm_articulation_part_factorize(struct articulation_part *part)
     else factorize(&part->view);
 }
 
-void sadmm_articulation_part_solve_rows(const struct articulation_part *part, bool again)
+void sadmm_articulation_part_solve_rows(struct articulation_part *part, bool again)
 {
     if (part->by_tree) (void)part->kernels->solve(&part->tree, &part->view, again);
     else solve_rows(&part->view, again);
@@ -266,12 +266,17 @@ static void begin_tree_rows(const struct articulation_part *part, const uint8_t 
 {
     const struct articulation_view *v = &part->view;
     for (int32_t at = 0; at < part->tree.rows; ++at) {
-        const struct articulation_tree_row *row = &part->tree.row[at];
+        struct articulation_tree_row *row = &part->tree.row[at];
         const struct articulation_row *from = &v->rows[row->r];
         const double change = articulation_clamp(from->lambda, from->lo, from->hi) - from->lambda;
+        const uint8_t before = earlier ? earlier[row->r] : ROW_ABSENT;
+        row->lo = from->lo, row->hi = from->hi;
         v->change[row->r] = change;
-        articulation_place_row(v, row->r, earlier ? earlier[row->r] : ROW_ABSENT,
-                               row->start + row->compliance * change);
+        if (row->gain != 0 && before == ROW_INSIDE && row->hi > row->lo) {
+            v->state[row->r] = ROW_INSIDE;
+            continue;
+        }
+        articulation_place_row(v, row->r, before, row->start + row->compliance * change);
     }
 }
 
@@ -280,6 +285,7 @@ static void begin_tree_rows(const struct articulation_part *part, const uint8_t 
 static bool change_tree_rows(const struct articulation_part *part, bool one)
 {
     bool changed = false;
+    if (!part->tree.unsettled) return false;
     for (int32_t at = 0; at < part->tree.rows && !(changed && one); ++at) {
         const struct articulation_tree_row *row = &part->tree.row[at];
         changed = articulation_settle_row(&part->view, row->r, row->residual) || changed;
@@ -292,6 +298,7 @@ static bool change_tree_rows(const struct articulation_part *part, bool one)
 static bool yield_rows(const struct articulation_part *part)
 {
     bool changed = false;
+    if (!part->tree.unsettled) return false;
     for (int32_t at = 0; at < part->tree.rows; ++at) {
         const struct articulation_tree_row *row = &part->tree.row[at];
         if (row->role == ARTICULATION_LEFT && part->view.state[row->r] == ROW_INSIDE)

@@ -71,7 +71,7 @@ void sadmm_articulation_part_find_speed(struct articulation_part *part);
 /* For G (ncp.h): the sparse factor with rows in their states; multipliers of rows inside their bounds, for what the
  * others are. again: from what they are. */
 void sadmm_articulation_part_factorize(struct articulation_part *part);
-void sadmm_articulation_part_solve_rows(const struct articulation_part *part, bool again);
+void sadmm_articulation_part_solve_rows(struct articulation_part *part, bool again);
 
 /* A part solved by its tree that was loaded before, for other impulses of contacts (bodies x 6). */
 void sadmm_articulation_part_put_contacts(const struct articulation_part *part, const double *loads);

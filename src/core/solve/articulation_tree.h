@@ -31,7 +31,8 @@ enum articulation_role {
 struct articulation_tree_row {
     double own[8];           /* on its node's body */
     double along[6];         /* S^T own^T; of locks 0 */
-    double gain, compliance; /* its law */
+    double gain, compliance; /* its law; */
+    double lo, hi, lambda;   /* its bounds, when the states of rows were found; its multiplier as it was */
     double start, residual;  /* of it, m/s or rad/s: before anything changes; by the changes so far */
     double right, found;     /* the rate past the parent that is asked for; the multiplier's change by this solve */
     int32_t r;               /* of the part */
@@ -73,6 +74,7 @@ struct articulation_tree {
     int32_t *soft;                  /* rows that act along free directions by a law with compliance; a node's from its
                                        `row` on */
     bool known;                     /* the factor is that of `factored` */
+    bool unsettled;                 /* after a solve: a row may be in another state than its multiplier and residual say */
 };
 
 /* Its nodes, if it is one. `queue`, `parent`: bodies of the part. All arrays have room. */
@@ -92,7 +94,7 @@ typedef void sadmm_articulation_tree_factorize(struct articulation_tree *tree, c
 /* Changes of the velocities, and of the multipliers of rows inside their bounds, for loads v->residual and what the
  * other rows are. again: from what they are, by what is left (iterative refinement). Returns the largest residual of a
  * row inside its bounds, m/s or rad/s. */
-typedef double sadmm_articulation_tree_solve(const struct articulation_tree *tree, const struct articulation_view *v,
+typedef double sadmm_articulation_tree_solve(struct articulation_tree *tree, const struct articulation_view *v,
                                              bool again);
 
 /* The node whose joint has row r. */

@@ -110,6 +110,7 @@ static bool add_rows(struct articulation_tree *tree, struct articulation_node *n
             row->role = ARTICULATION_NONE;
             row->right = row->found = 0;
             row->gain = from->gain, row->compliance = from->compliance;
+            row->lo = from->lo, row->hi = from->hi, row->lambda = from->lambda;
             row->start = from->gain * six_dot(own, past) + from->bias + from->compliance * from->lambda;
             tree->row_of[r] = at;
             if (sadmm_law_is_coupled(from->compliance, from->lo, from->hi) && !add_lock(tree, node, at)) return false;

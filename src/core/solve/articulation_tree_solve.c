@@ -168,27 +168,36 @@ static void pass_up(const struct articulation_tree *tree, struct articulation_no
 }
 
 /* What its rows have changed by, and are off by then. Returns the largest of those inside their bounds. */
-static double end_rows(const struct articulation_tree *tree, const struct articulation_node *node,
+static double end_rows(struct articulation_tree *tree, const struct articulation_node *node,
                        const struct articulation_view *v, double most)
 {
+    bool settled = true;
     six past = six_at(node->total);
     if (node->parent >= 0) past = six_sub(past, parent_of(node, tree->node[node->parent].total));
     for (int32_t at = node->row; at < node->row_end; ++at) {
         struct articulation_tree_row *row = &tree->row[at];
-        const bool inside = v->state[row->r] == ROW_INSIDE;
+        const uint8_t state = v->state[row->r];
+        const bool inside = state == ROW_INSIDE;
         double change = v->change[row->r];
         if (inside) v->change[row->r] = change += row->found;
         row->residual = row->start + row->gain * six_dot(six_at(row->own), past) + row->compliance * change;
-        const double size = inside ? fabs(row->residual) : 0;
-        if (!(size <= most)) most = size;
+        if (inside) {
+            const double lambda = row->lambda + change, size = fabs(row->residual);
+            if (!(size <= most)) most = size;
+            settled &= (lambda >= row->lo) & (lambda <= row->hi) & (row->role != ARTICULATION_LEFT);
+        } else if (state != ROW_FIXED) {
+            settled &= state == ROW_AT_LO ? row->residual >= 0 : row->residual <= 0;
+        }
     }
+    tree->unsettled = tree->unsettled || !settled;
     return most;
 }
 
-double SADMM_KERNEL(articulation_tree_solve)(const struct articulation_tree *tree,
+double SADMM_KERNEL(articulation_tree_solve)(struct articulation_tree *tree,
                                              const struct articulation_view *v, bool again)
 {
     double most = 0;
+    tree->unsettled = false;
     for (int32_t n = 0; n < tree->nodes; ++n) begin_node(&tree->node[n], v, again);
     for (int32_t n = 0; n < tree->nodes; ++n) pass_down(tree, &tree->node[n], v, again);
     for (int32_t n = tree->nodes; n-- > 0;) {

@@ -34,9 +34,9 @@ struct ncp_dense {
 };
 
 /* Doubles: a matrix, which both searches use, and vectors of each (ncp_newton.c, ncp_interior.c). */
-enum { NCP_NEWTON_VECTORS = 20, NCP_INTERIOR_VECTORS = 26 };
+enum { NCP_NEWTON_VECTORS = 23, NCP_INTERIOR_VECTORS = 26 };
 enum { NCP_VECTORS = NCP_NEWTON_VECTORS + NCP_INTERIOR_VECTORS };
-static inline size_t ncp_work_size(size_t size) { return size * (size + NCP_VECTORS); }
+static inline size_t ncp_work_size(size_t size) { return size * (size + 3 + NCP_VECTORS) + 9; }
 
 /* ---- laws -------------------------------------------------------------------------------------------------------- */
 
@@ -105,53 +105,9 @@ static inline void ncp_respond(const struct ncp_dense *d, int32_t number, double
     for (int32_t r = 0; r < d->size; ++r) u[r] += d->G[(size_t)r * (size_t)d->size + (size_t)number] * x;
 }
 
-/* ---- linear equations -------------------------------------------------------------------------------------------- */
+/* ---- linear equations (ncp_linear.h) ----------------------------------------------------------------------------- */
 
-static inline void ncp_exchange(double *a, double *b, size_t count)
-{
-    for (size_t c = 0; c < count; ++c) {
-        const double t = a[c];
-        a[c] = b[c], b[c] = t;
-    }
-}
-
-/* M = P L U in place, with the largest of each column as its pivot. False: singular. */
-static inline bool ncp_factor(double *M, int32_t *pivot, int32_t count)
-{
-    const size_t n = (size_t)count;
-    for (size_t k = 0; k < n; ++k) {
-        double *top = M + k * n;
-        size_t best = k;
-        for (size_t i = k + 1; i < n; ++i)
-            if (fabs(M[i * n + k]) > fabs(M[best * n + k])) best = i;
-        pivot[k] = (int32_t)best;
-        if (!(fabs(M[best * n + k]) > 0)) return false;
-        if (best != k) ncp_exchange(top, M + best * n, n);
-        const double inverse = 1 / top[k];
-        for (size_t i = k + 1; i < n; ++i) {
-            double *row = M + i * n;
-            const double share = row[k] *= inverse;
-            if (share == 0) continue;
-            for (size_t c = k + 1; c < n; ++c) row[c] -= share * top[c];
-        }
-    }
-    return true;
-}
-
-/* M x = right, in place. */
-static inline void ncp_substitute(const double *M, const int32_t *pivot, int32_t count, double *x)
-{
-    const size_t n = (size_t)count;
-    for (size_t k = 0; k < n; ++k) ncp_exchange(x + k, x + pivot[k], (size_t)pivot[k] != k);
-    for (size_t k = 1; k < n; ++k)
-        for (size_t c = 0; c < k; ++c) x[k] -= M[k * n + c] * x[c];
-    for (size_t k = n; k-- > 0;) {
-        for (size_t c = k + 1; c < n; ++c) x[k] -= M[k * n + c] * x[c];
-        x[k] /= M[k * n + k];
-    }
-}
-
-/* What both take together, in multiplications. */
+/* What a factor and a solution take together, in multiplications. */
 static inline double ncp_factor_work(double count) { return count * count * (count / 3 + 4); }
 
 #ifdef __cplusplus

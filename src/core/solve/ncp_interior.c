@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "ncp_kernels.h"
+#include "ncp_linear.h"
 
 enum { MOST_STEPS = 40, MOST_SHORT = 4 };
 /* How much of the way to the boundary is gone. Steps shorter than SHORT turn to the middle of the cones instead. */
@@ -156,7 +157,7 @@ static void open_work(struct interior *s)
     _Static_assert(7 * sizeof(double) + sizeof(struct cone) <= NCP_INTERIOR_VECTORS * sizeof(double), "its vectors");
     const size_t n = (size_t)s->d->size;
     double *at = s->d->work;
-    s->M = at, at += n * (n + NCP_NEWTON_VECTORS);
+    s->M = at, at += n * (n + 3 + NCP_NEWTON_VECTORS);
     double **vectors[] = {&s->free, &s->scale, &s->x, &s->y, &s->off, &s->dx};
     for (size_t k = 0; k < sizeof vectors / sizeof *vectors; ++k) *vectors[k] = at, at += n;
     s->number = (int32_t *)at, at += n;
@@ -194,14 +195,16 @@ static void measure(struct interior *s)
 /* (G + s's derivative + W^-2) dx = right: a dual's step is eliminated. */
 static bool make_matrix(struct interior *s)
 {
-    const size_t n = (size_t)s->count, all = (size_t)s->d->size;
+    const size_t n = (size_t)s->count, stride = ncp_stride(s->count), all = (size_t)s->d->size;
     for (size_t r = 0; r < n; ++r) {
         const double *G = s->d->G + (size_t)s->number[r] * all;
-        for (size_t c = 0; c < n; ++c) s->M[r * n + c] = s->scale[r] * s->scale[c] * G[s->number[c]];
+        double *M = s->M + r * stride;
+        for (size_t c = 0; c < n; ++c) M[c] = s->scale[r] * s->scale[c] * G[s->number[c]];
+        for (size_t c = n; c < stride; ++c) M[c] = 0;
     }
     for (int32_t i = 0; i < s->cones; ++i) {
         struct cone *c = &s->cone[i];
-        double *M = s->M + (size_t)c->at * n;
+        double *M = s->M + (size_t)c->at * stride;
         const double *x = s->x + c->at, *y = s->y + c->at;
         if (c->count == 1) {
             if (c->lo > -HUGE_VAL) M[c->at] += c->dual[0] / (x[0] - c->lo);
@@ -210,11 +213,11 @@ static bool make_matrix(struct interior *s)
         }
         if (!scale_cone(c, x)) return false;
         const double speed = hypot(y[1], y[2]);
-        for (size_t k = 0; speed > 0 && k < n; ++k) M[k] += (y[1] * M[n + k] + y[2] * M[2 * n + k]) / speed;
+        for (size_t k = 0; speed > 0 && k < n; ++k) M[k] += (y[1] * M[stride + k] + y[2] * M[2 * stride + k]) / speed;
         for (size_t r = 0; r < 3; ++r)
             for (size_t k = 0; k < 3; ++k) {
                 const double sign = (r > 0) == (k > 0) ? 1 : -1, J = r != k ? 0 : r == 0 ? 1 : -1;
-                M[r * n + (size_t)c->at + k] += (2 * sign * c->middle[r] * c->middle[k] - J) / (c->size * c->size);
+                M[r * stride + (size_t)c->at + k] += (2 * sign * c->middle[r] * c->middle[k] - J) / (c->size * c->size);
             }
     }
     s->d->budget -= ncp_factor_work(s->count) + 4 * (double)(all * all);

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "ncp_kernels.h"
+#include "ncp_linear.h"
 
 /* Steps from where the iterations are, which is what most problems need, and from an interior point. */
 enum { STEPS_FROM_START = 20, STEPS_FROM_INTERIOR = 200, STEPS_IN_TURN = 50 };
@@ -33,6 +34,7 @@ struct newton {
     double *right;          /* (count) right sides, then the steps */
     double *start_lambda, *start_u, *best_lambda, *best_u;
     int32_t *number, count; /* those that are solved for */
+    double *law_rows;       /* (3 x stride) of G, of a law */
     int32_t *pivot;
     struct piece *piece;    /* (laws) where lambda and u are */
     double proximal;
@@ -44,7 +46,7 @@ static struct newton newton_of(struct ncp_dense *d)
     const size_t n = (size_t)d->size;
     struct newton s = {.d = d};
     s.M = d->work;
-    s.step = s.M + n * n;
+    s.step = s.M + n * (n + 3);
     s.moved = s.step + n;
     s.right = s.moved + n;
     s.start_lambda = s.right + n;
@@ -54,6 +56,7 @@ static struct newton newton_of(struct ncp_dense *d)
     s.number = (int32_t *)(s.best_u + n);
     s.pivot = s.number + n;
     s.piece = (struct piece *)(s.best_u + 2 * n);
+    s.law_rows = (double *)(s.piece + n);
     return s;
 }
 
@@ -97,24 +100,37 @@ static void sort_numbers(struct newton *s)
 static void enter_law(struct newton *s, const struct ncp_law *law, const struct piece *piece, int32_t *row)
 {
     const struct ncp_dense *d = s->d;
-    for (int32_t k = 0; k < law->count && *row < s->count; ++k) {
-        if (s->number[*row] != law->first + k) continue;
-        double *M = s->M + (size_t)*row * (size_t)s->count, *right = &s->right[*row];
-        *right = s->step[law->first + k];
-        memset(M, 0, (size_t)s->count * sizeof *M);
+    const size_t count = (size_t)s->count, stride = ncp_stride(s->count);
+    const int32_t begin = *row;
+    double *G = s->law_rows;
+    int32_t end = begin;
+    while (end < s->count && s->number[end] < law->first + law->count) ++end;
+    if (end == begin) return;
+    for (int32_t h = 0; h < law->count; ++h) {
+        const double *from = d->G + (size_t)(law->first + h) * (size_t)d->size;
+        double *own = G + (size_t)h * stride;
+        for (size_t c = 0; c < count; ++c) own[c] = from[s->number[c]];
+        for (size_t c = count; c < stride; ++c) own[c] = 0;
+    }
+    for (int32_t at = begin; at < end; ++at) {
+        const int32_t k = s->number[at] - law->first;
+        double *M = s->M + (size_t)at * stride, right = s->step[law->first + k];
+        for (size_t c = 0; c < stride; ++c) M[c] = 0;
         for (int32_t h = 0; h < law->count; ++h) {
             if (piece->D[k][h] == 0) continue;
-            const double share = piece->D[k][h] / law->response, *G = d->G + (size_t)(law->first + h) * (size_t)d->size;
-            *right -= share * s->moved[law->first + h];
-            for (int32_t c = 0; c < s->count; ++c) M[c] += share * G[s->number[c]];
+            const double share = piece->D[k][h] / law->response, *own = G + (size_t)h * stride;
+            const three shares = three_fill(share);
+            right -= share * s->moved[law->first + h];
+            for (size_t c = 0; c < stride; c += 4) *(three *)(M + c) += shares * *(const three *)(own + c);
         }
-        for (int32_t c = 0; c < s->count; ++c) {
-            const int32_t h = s->number[c] - law->first;
-            if (h >= 0 && h < law->count) M[c] += (h == k) - piece->D[k][h];
+        for (int32_t other = begin; other < end; ++other) {
+            const int32_t h = s->number[other] - law->first;
+            M[other] += (h == k) - piece->D[k][h];
         }
-        M[*row] += s->proximal;
-        ++*row;
+        M[at] += s->proximal;
+        s->right[at] = right;
     }
+    *row = end;
 }
 
 static bool make_step(struct newton *s)
@@ -130,7 +146,7 @@ static bool make_step(struct newton *s)
     for (int32_t r = 0; r < s->count; ++r) s->step[s->number[r]] = s->right[r];
     for (int32_t n = 0; n < d->size; ++n) {
         d->lambda[n] += s->step[n];
-        if (s->step[n] != 0) ncp_respond(d, n, s->step[n], d->u);
+        d->u[n] += ncp_row_product(d->G + (size_t)n * (size_t)d->size, s->step, (size_t)d->size);
     }
     return true;
 }

@@ -12,7 +12,8 @@
 
 /* Six locks, or what acts along six free coordinates. */
 struct all_laws {
-    struct joint_law law[JOINT_COORDINATES * JOINT_COORDINATE_LAWS];
+    struct joint_laws of[JOINT_COORDINATES];
+    const struct joint_law *law[JOINT_COORDINATES * JOINT_COORDINATE_LAWS]; /* in the order of rows */
     int count;
 };
 
@@ -42,16 +43,18 @@ static void find_laws(struct sadmm_world_joint *joint, const struct acting_joint
     const struct joint_turn_bounds bounds = joint_turn_bounds_of(acting);
     all->count = 0;
     for (int locked = 1; locked >= 0; --locked)
-        for (int k = 0; k < JOINT_COORDINATES; ++k) {
-            struct joint_laws laws;
-            if ((int)(joint->def.locks >> k & 1) != locked || !joint_has_coordinate(&joint->def, k)) continue;
+        for (uint32_t left = JOINT_ALL_LOCKED & (locked ? joint->def.locks : ~joint->def.locks); left;
+             left &= left - 1) {
+            const int k = __builtin_ctz(left);
+            struct joint_laws *laws = &all->of[k];
+            if (!joint_has_coordinate(&joint->def, k)) continue;
             const struct joint_moving m = moving_of(joint, acting, rates, &bounds, k, settings);
             if (joint_winds(joint->def.locks, k)) joint->next.angle[k] = m.value;
             const struct joint_table table = {joint->table[k],
                                               joint->table[k] ? joint->table[k] + joint->table_count[k] : NULL,
                                               joint->table_count[k]};
-            joint_coordinate_laws(&joint->def, k, &m, joint->table[k] ? &table : NULL, &laws);
-            for (int i = 0; i < laws.count; ++i) all->law[all->count++] = laws.law[i];
+            joint_coordinate_laws(&joint->def, k, &m, joint->table[k] ? &table : NULL, laws);
+            for (int i = 0; i < laws->count; ++i) all->law[all->count++] = &laws->law[i];
         }
 }
 
@@ -77,7 +80,7 @@ static bool add_constraints(sadmm_world *world, const struct sadmm_world_joint *
     double offset[3];
     v3_store(v3_sub(acting->middle.arm_a, acting->middle.arm_b), offset);
     for (int i = 0; i < laws->count; ++i) {
-        const struct joint_law *law = &laws->law[i];
+        const struct joint_law *law = laws->law[i];
         if (i % SADMM_MAX_ROWS == 0) {
             const int left = laws->count - i, count = left < SADMM_MAX_ROWS ? left : SADMM_MAX_ROWS;
             if (sadmm_rows_add(rows, count, acting->side[0].system_body, acting->side[1].system_body) < 0)
@@ -88,7 +91,8 @@ static bool add_constraints(sadmm_world *world, const struct sadmm_world_joint *
         for (int s = 0; s < 2; ++s) {
             double *row = (s ? rows->jacobian_b : rows->jacobian_a) + 6 * r;
             if (acting->side[s].system_body < 0) continue;
-            for (int j = 0; j < 6; ++j) row[j] = rates->row[s][law->coordinate][j] * law->sign;
+            memcpy(row, rates->row[s][law->coordinate], 6 * sizeof *row);
+            for (int j = 0; law->sign < 0 && j < 6; ++j) row[j] = -row[j];
         }
         sadmm_row_set(rows, (int32_t)r, law->gain, law->bias, law->compliance, law->lo, law->hi);
         rows->lambda[r] = world->start.multiplier[r] =

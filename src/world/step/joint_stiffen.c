@@ -26,11 +26,15 @@ static void each_force(sadmm_world *world, double dt, on_force *f)
         const struct sadmm_joint_source *source = &world->joint_sources[r];
         const struct sadmm_world_joint *joint = world->step_joints[source->joint];
         for (end = r + 1; end < world->joint_rows && world->joint_sources[end].joint == source->joint;) ++end;
+        /* On a it is that on b but for its sign. */
+        const struct joint_side *side = world->acting_joints[source->joint].side;
+        const int of = side[1].system_body >= 0;
+        const vec3 force = force_of((of ? rows->jacobian_b : rows->jacobian_a) + 6 * r, rows->lambda + r, source,
+                                    end - r, dt);
         for (int s = 0; s < 2; ++s) {
-            const int32_t body = world->acting_joints[source->joint].side[s].system_body;
+            const int32_t body = side[s].system_body;
             if (body < 0 || (s == 0 && joint->coupling)) continue;
-            f(world, body, joint->frame[s].position,
-              force_of((s ? rows->jacobian_b : rows->jacobian_a) + 6 * r, rows->lambda + r, source, end - r, dt));
+            f(world, body, joint->frame[s].position, s == of ? force : v3_neg(force));
         }
     }
 }
