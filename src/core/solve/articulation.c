@@ -50,7 +50,7 @@ static bool make_tree_room(struct sadmm_articulations *j, size_t members, size_t
 {
     const size_t rows = SADMM_MAX_ROWS * columns;
     return SADMM_GROW(j->nodes, 0, members) && SADMM_GROW(j->tree_rows, 0, rows) &&
-           SADMM_GROW(j->tree_numbers, 0, 3 * members + columns + 2 * rows);
+           SADMM_GROW(j->tree_numbers, 0, 3 * members + columns + 3 * rows);
 }
 
 /* Where the tree's arrays are of a part that comes after so many bodies and columns of all. */
@@ -63,6 +63,7 @@ static struct articulation_tree tree_at(const struct sadmm_articulations *j, siz
                                       .joint = j->tree_numbers + all + columns,
                                       .soft = rows + SADMM_MAX_ROWS * columns,
                                       .row_of = rows + SADMM_MAX_ROWS * (all_columns + columns),
+                                      .acting = rows + SADMM_MAX_ROWS * (2 * all_columns + columns),
                                       .row = j->tree_rows + SADMM_MAX_ROWS * columns};
 }
 
@@ -84,7 +85,7 @@ static bool make_parts(struct sadmm_articulations *j, size_t bodies)
     for (size_t i = 0; i < bodies; ++i) j->part[i] = -1;
     const size_t all = members, all_columns = columns;
     /* and parents: members each */
-    int32_t *const queue = j->tree_numbers + all + (1 + 2 * SADMM_MAX_ROWS) * all_columns;
+    int32_t *const queue = j->tree_numbers + all + (1 + 3 * SADMM_MAX_ROWS) * all_columns;
     work = members = columns = 0;
     j->loops = false;
     for (int32_t k = 0; k < j->order.parts; ++k) {

@@ -262,9 +262,10 @@ static bool solve_sparse(const struct articulation_part *part, const uint8_t *ea
 
 /* ---- by its tree ------------------------------------------------------------------------------------------------- */
 
-static void begin_tree_rows(const struct articulation_part *part, const uint8_t *earlier)
+static void begin_tree_rows(struct articulation_part *part, const uint8_t *earlier)
 {
     const struct articulation_view *v = &part->view;
+    bool pressed = false;
     for (int32_t at = 0; at < part->tree.rows; ++at) {
         struct articulation_tree_row *row = &part->tree.row[at];
         const struct articulation_row *from = &v->rows[row->r];
@@ -277,25 +278,29 @@ static void begin_tree_rows(const struct articulation_part *part, const uint8_t 
             continue;
         }
         articulation_place_row(v, row->r, before, row->start + row->compliance * change);
+        pressed = pressed || (v->state[row->r] != ROW_INSIDE && v->change[row->r] != 0);
     }
+    part->tree.pressed = pressed;
 }
 
 /* change_rows. one: the first of them alone, which comes to an end where all at once go round in circles (Murty,
  * 1974). */
-static bool change_tree_rows(const struct articulation_part *part, bool one)
+static bool change_tree_rows(struct articulation_part *part, bool one)
 {
     bool changed = false;
     if (!part->tree.unsettled) return false;
     for (int32_t at = 0; at < part->tree.rows && !(changed && one); ++at) {
         const struct articulation_tree_row *row = &part->tree.row[at];
-        changed = articulation_settle_row(&part->view, row->r, row->residual) || changed;
+        if (row->role != ARTICULATION_LOCK)
+            changed = articulation_settle_row(&part->view, row->r, row->residual) || changed;
     }
+    part->tree.pressed = part->tree.pressed || changed;
     return changed;
 }
 
 /* A row that says what another one says has no multiplier. If it asks for another rate, it goes to the bound that pulls
  * there: friction that a motor moves against. Did any? */
-static bool yield_rows(const struct articulation_part *part)
+static bool yield_rows(struct articulation_part *part)
 {
     bool changed = false;
     if (!part->tree.unsettled) return false;
@@ -304,6 +309,7 @@ static bool yield_rows(const struct articulation_part *part)
         if (row->role == ARTICULATION_LEFT && part->view.state[row->r] == ROW_INSIDE)
             changed = articulation_yield_row(&part->view, row->r, row->residual) || changed;
     }
+    part->tree.pressed = part->tree.pressed || changed;
     return changed;
 }
 

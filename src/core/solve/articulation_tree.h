@@ -54,7 +54,8 @@ struct articulation_node {
     int32_t row, row_end;  /* of `row` */
     bool bound;            /* there are any */
     int32_t free;          /* directions */
-    int32_t locks[2], lock[6]; /* rows that lock translations, then rotations */
+    int32_t locks[2], lock[6]; /* rows that lock translations, then rotations; */
+    int32_t acting;            /* how many do not */
     int32_t soft, hard_rows;
     double offset[4];      /* from the parent's centre of mass */
     double A[6][8], S[6][8], U[6][8], H[6][6]; /* S, U: a direction after the other */
@@ -71,10 +72,12 @@ struct articulation_tree {
     struct articulation_tree_row *row; /* by nodes */
     int32_t rows;
     int32_t *row_of;                /* (rows of the part) -> `row` */
-    int32_t *soft;                  /* rows that act along free directions by a law with compliance; a node's from its
-                                       `row` on */
+    int32_t *acting;                /* rows that are no locks; a node's from its `row` on; */
+    int32_t *soft;                  /* those inside their bounds by a law with compliance, likewise */
     bool known;                     /* the factor is that of `factored` */
-    bool unsettled;                 /* after a solve: a row may be in another state than its multiplier and residual say */
+    bool pressed;                   /* a row outside its bounds has a load that it had not when it was loaded */
+    bool refined;                   /* the rates that rows ask for are those of a refinement */
+    bool unsettled;                 /* by the last solve a row may belong into another state than it is in */
 };
 
 /* Its nodes, if it is one. `queue`, `parent`: bodies of the part. All arrays have room. */

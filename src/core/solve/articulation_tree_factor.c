@@ -15,10 +15,10 @@ static int find_roles(const struct articulation_tree *tree, struct articulation_
 {
     int hard = 0;
     node->soft = node->hard_rows = 0;
-    for (int32_t at = node->row; at < node->row_end; ++at) {
+    for (int32_t k = node->row; k < node->row + node->acting; ++k) {
+        const int32_t at = tree->acting[k];
         struct articulation_tree_row *row = &tree->row[at];
         row->factored = v->state[row->r];
-        if (row->role == ARTICULATION_LOCK) continue;
         if (row->factored != ROW_INSIDE) row->role = ARTICULATION_NONE;
         else if (row->compliance > 0) {
             row->role = ARTICULATION_SOFT;
@@ -83,6 +83,7 @@ static void hold(const struct articulation_tree *tree, struct articulation_node 
     }
     if (!(response > DEPENDENT * alone)) {
         row->role = ARTICULATION_LEFT; /* others say it */
+        row->found = 0;
         return;
     }
     hard->row = at;
@@ -96,11 +97,13 @@ static void hold_hard_rows(const struct articulation_tree *tree, struct articula
 {
     double alone[ARTICULATION_HARD_ROWS];
     int count = 0, k = 0;
-    for (int32_t at = node->row; at < node->row_end && count < ARTICULATION_HARD_ROWS; ++at)
-        if (tree->row[at].role == ARTICULATION_HARD) alone[count++] = response_along(node, tree->row[at].along);
-    for (int32_t at = node->row; at < node->row_end; ++at) {
-        if (tree->row[at].role != ARTICULATION_HARD) continue;
-        hold(tree, node, at, k < count ? alone[k] : HUGE_VAL);
+    const int32_t *acting = tree->acting + node->row;
+    for (int32_t i = 0; i < node->acting && count < ARTICULATION_HARD_ROWS; ++i)
+        if (tree->row[acting[i]].role == ARTICULATION_HARD)
+            alone[count++] = response_along(node, tree->row[acting[i]].along);
+    for (int32_t i = 0; i < node->acting; ++i) {
+        if (tree->row[acting[i]].role != ARTICULATION_HARD) continue;
+        hold(tree, node, acting[i], k < count ? alone[k] : HUGE_VAL);
         ++k;
     }
 }
@@ -152,8 +155,11 @@ static void factorize_node(const struct articulation_tree *tree, struct articula
 static bool same_states(const struct articulation_tree *tree, const struct articulation_view *v)
 {
     int changed = 0;
-    for (int32_t at = 0; at < tree->rows; ++at)
-        changed |= (tree->row[at].factored == ROW_INSIDE) ^ (v->state[tree->row[at].r] == ROW_INSIDE);
+    for (int32_t n = 0; n < tree->nodes; ++n)
+        for (int32_t k = tree->node[n].row; k < tree->node[n].row + tree->node[n].acting; ++k) {
+            const struct articulation_tree_row *row = &tree->row[tree->acting[k]];
+            changed |= (row->factored == ROW_INSIDE) ^ (v->state[row->r] == ROW_INSIDE);
+        }
     return !changed;
 }
 

@@ -87,7 +87,7 @@ static bool add_rows(struct articulation_tree *tree, struct articulation_node *n
                      const struct sadmm_row_constraint *slots)
 {
     node->bound = false;
-    node->locks[0] = node->locks[1] = 0;
+    node->locks[0] = node->locks[1] = node->acting = 0;
     node->row = tree->rows;
     six past = six_zero();
     for (int32_t j = node->first; j < node->first + node->count; ++j) {
@@ -108,12 +108,15 @@ static bool add_rows(struct articulation_tree *tree, struct articulation_node *n
             six_put(own, row->own);
             row->r = r;
             row->role = ARTICULATION_NONE;
-            row->right = row->found = 0;
             row->gain = from->gain, row->compliance = from->compliance;
             row->lo = from->lo, row->hi = from->hi, row->lambda = from->lambda;
             row->start = from->gain * six_dot(own, past) + from->bias + from->compliance * from->lambda;
+            row->right = -row->start / row->gain;
+            row->found = 0;
             tree->row_of[r] = at;
-            if (sadmm_law_is_coupled(from->compliance, from->lo, from->hi) && !add_lock(tree, node, at)) return false;
+            if (!sadmm_law_is_coupled(from->compliance, from->lo, from->hi))
+                tree->acting[node->row + node->acting++] = at;
+            else if (!add_lock(tree, node, at)) return false;
         }
     }
     node->row_end = tree->rows;
@@ -122,11 +125,14 @@ static bool add_rows(struct articulation_tree *tree, struct articulation_node *n
 
 static void find_along(const struct articulation_tree *tree, const struct articulation_node *node)
 {
-    for (int32_t at = node->row; at < node->row_end; ++at) {
-        struct articulation_tree_row *row = &tree->row[at];
-        const bool locks = row->role == ARTICULATION_LOCK;
-        for (int i = 0; i < node->free; ++i)
-            row->along[i] = locks ? 0 : six_dot(six_at(row->own), six_at(node->S[i]));
+    for (int kind = 0; kind < 2; ++kind)
+        for (int i = 0; i < node->locks[kind]; ++i) {
+            struct articulation_tree_row *row = &tree->row[node->lock[3 * kind + i]];
+            memset(row->along, 0, sizeof row->along);
+        }
+    for (int32_t k = node->row; k < node->row + node->acting; ++k) {
+        struct articulation_tree_row *row = &tree->row[tree->acting[k]];
+        for (int i = 0; i < node->free; ++i) row->along[i] = six_dot(six_at(row->own), six_at(node->S[i]));
     }
 }
 
@@ -162,7 +168,7 @@ bool SADMM_KERNEL(articulation_tree_load)(struct articulation_tree *tree,
                                           const struct sadmm_row_constraint *slots, double *impulse,
                                           double *without)
 {
-    tree->known = false;
+    tree->known = tree->refined = false;
     tree->rows = 0;
     for (int32_t n = 0; n < tree->nodes; ++n) {
         struct articulation_node *node = &tree->node[n];

@@ -22,29 +22,42 @@ static void begin_node(struct articulation_node *node, const struct articulation
     six_put(load, node->load);
 }
 
+static void add_to_parent(const struct articulation_tree *tree, const struct articulation_node *node, six load)
+{
+    if (node->parent < 0) return;
+    double *parent = tree->node[node->parent].load;
+    six_put(six_add(six_at(parent), six_hand_on(*(const three *)node->offset, load)), parent);
+}
+
+static six past_parent(const struct articulation_tree *tree, const struct articulation_node *node)
+{
+    const six own = six_at(node->total);
+    return node->parent >= 0 ? six_sub(own, parent_of(node, tree->node[node->parent].total)) : own;
+}
+
 /* What rows inside their bounds ask for, and the loads of what rows have changed by. */
 static void begin_rows(const struct articulation_tree *tree, struct articulation_node *node,
                        const struct articulation_view *v, bool again)
 {
+    const six past = again ? past_parent(tree, node) : six_zero();
     six load = six_zero();
     bool any = false;
     for (int32_t at = node->row; at < node->row_end; ++at) {
         struct articulation_tree_row *row = &tree->row[at];
-        double *change = &v->change[row->r];
-        if (v->state[row->r] == ROW_INSIDE) {
-            row->found = 0;
-            row->right = -(again ? row->residual : row->start) / row->gain;
-            if (!again) *change = 0;
+        const double change = v->change[row->r];
+        const bool inside = v->state[row->r] == ROW_INSIDE;
+        if (inside) {
+            double residual = row->start;
+            if (again) residual += row->gain * six_dot(six_at(row->own), past) + row->compliance * change;
+            row->right = -residual / row->gain;
         }
-        if (*change == 0) continue;
-        load = six_madd(load, *change, six_at(row->own));
+        if (change == 0 || (inside && !again)) continue;
+        load = six_madd(load, change, six_at(row->own));
         any = true;
     }
     if (!any) return;
     six_put(six_add(six_at(node->load), load), node->load);
-    if (node->parent < 0) return;
-    double *parent = tree->node[node->parent].load;
-    six_put(six_sub(six_at(parent), six_hand_on(*(const three *)node->offset, load)), parent);
+    add_to_parent(tree, node, six_sub(six_zero(), load));
 }
 
 /* s, which meets the locks. */
@@ -99,7 +112,7 @@ static void pass_down(const struct articulation_tree *tree, struct articulation_
                       const struct articulation_view *v, bool again)
 {
     double t[6];
-    begin_rows(tree, node, v, again);
+    if (again || tree->pressed || tree->refined) begin_rows(tree, node, v, again);
     const six met = meet_locks(tree, node);
     six_put(met, node->met);
     six p = six_at(node->load);
@@ -113,12 +126,17 @@ static void pass_down(const struct articulation_tree *tree, struct articulation_
     find_free(tree, node, met, t, node->q);
     if (node->parent < 0 || !node->bound) return;
     for (int i = 0; i < node->free; ++i) p = six_madd(p, -node->q[i], six_at(node->U[i]));
-    double *parent = tree->node[node->parent].load;
-    six_put(six_add(six_at(parent), six_hand_on(*(const three *)node->offset, p)), parent);
+    add_to_parent(tree, node, p);
+}
+
+static void change_lock(const struct articulation_view *v, int32_t r, bool again, double found)
+{
+    if (v->state[r] == ROW_INSIDE) v->change[r] = again ? v->change[r] + found : found;
 }
 
 /* Multipliers of what holds it: F is what its joint does to it. */
-static void find_multipliers(const struct articulation_tree *tree, const struct articulation_node *node, six F)
+static void find_multipliers(const struct articulation_tree *tree, const struct articulation_node *node,
+                             const struct articulation_view *v, bool again, six F)
 {
     const six met = six_at(node->met);
     for (int32_t at = node->row; at < node->row + node->soft; ++at) {
@@ -138,16 +156,18 @@ static void find_multipliers(const struct articulation_tree *tree, const struct 
     for (int i = 0; i < node->locks[0]; ++i) {
         struct articulation_tree_row *row = &tree->row[node->lock[i]];
         const six own = six_at(row->own);
-        row->found = three_dot(own.linear, F.linear);
-        F.angular -= three_fill(row->found) * own.angular;
+        const double found = three_dot(own.linear, F.linear);
+        change_lock(v, row->r, again, found);
+        F.angular -= three_fill(found) * own.angular;
     }
     for (int i = 0; i < node->locks[1]; ++i) {
         struct articulation_tree_row *row = &tree->row[node->lock[3 + i]];
-        row->found = three_dot(six_at(row->own).angular, F.angular);
+        change_lock(v, row->r, again, three_dot(six_at(row->own).angular, F.angular));
     }
 }
 
-static void pass_up(const struct articulation_tree *tree, struct articulation_node *node)
+static void pass_up(const struct articulation_tree *tree, struct articulation_node *node,
+                    const struct articulation_view *v, bool again)
 {
     const bool carried = node->parent >= 0 && node->bound;
     six velocity = six_at(node->met);
@@ -163,23 +183,52 @@ static void pass_up(const struct articulation_tree *tree, struct articulation_no
     six_put(velocity, node->velocity);
     six_put(six_add(six_at(node->total), velocity), node->total);
     if (!node->bound) return;
-    find_multipliers(tree, node,
+    find_multipliers(tree, node, v, again,
                      six_add_product(six_sub(six_zero(), six_at(node->load)), 1, node->A, node->velocity));
+}
+
+/* Of what moves past its parent, what locks leave: no less than any of their residuals. */
+static double lock_residual(const struct articulation_tree *tree, const struct articulation_node *node, six past,
+                            bool again)
+{
+    three most = {0, 0, 0, 0};
+    if (again) { /* met, q are of the last solve alone */
+        double largest = 0;
+        for (int kind = 0; kind < 2; ++kind)
+            for (int i = 0; i < node->locks[kind]; ++i) {
+                const struct articulation_tree_row *row = &tree->row[node->lock[3 * kind + i]];
+                const double size = fabs(row->start + row->gain * six_dot(six_at(row->own), past));
+                if (!(size <= largest)) largest = size;
+            }
+        return largest;
+    }
+    past = six_sub(past, six_at(node->met));
+    for (int i = 0; i < node->free; ++i) past = six_madd(past, -node->q[i], six_at(node->S[i]));
+    for (int i = 0; i < node->locks[0]; ++i) { /* the longest arm */
+        const three arm = six_at(tree->row[node->lock[i]].own).angular;
+        most += arm * arm;
+    }
+    return sqrt(three_dot(past.linear, past.linear)) +
+           (1 + sqrt(three_sum(most))) * sqrt(three_dot(past.angular, past.angular));
 }
 
 /* What its rows have changed by, and are off by then. Returns the largest of those inside their bounds. */
 static double end_rows(struct articulation_tree *tree, const struct articulation_node *node,
-                       const struct articulation_view *v, double most)
+                       const struct articulation_view *v, bool again, double most)
 {
     bool settled = true;
-    six past = six_at(node->total);
-    if (node->parent >= 0) past = six_sub(past, parent_of(node, tree->node[node->parent].total));
-    for (int32_t at = node->row; at < node->row_end; ++at) {
-        struct articulation_tree_row *row = &tree->row[at];
+    if (node->row == node->row_end) return most;
+    const six past = past_parent(tree, node);
+    if (node->locks[0] + node->locks[1] > 0) {
+        const double size = lock_residual(tree, node, past, again);
+        if (!(size <= most)) most = size;
+    }
+    for (int32_t k = node->row; k < node->row + node->acting; ++k) {
+        struct articulation_tree_row *row = &tree->row[tree->acting[k]];
         const uint8_t state = v->state[row->r];
         const bool inside = state == ROW_INSIDE;
         double change = v->change[row->r];
-        if (inside) v->change[row->r] = change += row->found;
+        if (inside) v->change[row->r] = change = again ? change + row->found : row->found;
         row->residual = row->start + row->gain * six_dot(six_at(row->own), past) + row->compliance * change;
         if (inside) {
             const double lambda = row->lambda + change, size = fabs(row->residual);
@@ -200,10 +249,11 @@ double SADMM_KERNEL(articulation_tree_solve)(struct articulation_tree *tree,
     tree->unsettled = false;
     for (int32_t n = 0; n < tree->nodes; ++n) begin_node(&tree->node[n], v, again);
     for (int32_t n = 0; n < tree->nodes; ++n) pass_down(tree, &tree->node[n], v, again);
+    tree->refined = again;
     for (int32_t n = tree->nodes; n-- > 0;) {
         struct articulation_node *node = &tree->node[n];
-        pass_up(tree, node);
-        most = end_rows(tree, node, v, most);
+        pass_up(tree, node, v, again);
+        most = end_rows(tree, node, v, again, most);
         six_store(six_at(node->total), v->dv + 6 * (size_t)node->body);
     }
     return most;

@@ -31,7 +31,8 @@ static inline void ncp_exchange_rows(double *a, double *b, size_t count)
     }
 }
 
-/* M = P L U in place, with the largest of each column as its pivot; rows are ncp_stride(count) apart. False: singular. */
+/* M = P L U in place, with the largest of each column as its pivot; rows are ncp_stride(count) apart. False:
+ * singular. */
 static inline bool ncp_factor(double *M, int32_t *pivot, int32_t count)
 {
     const size_t n = (size_t)count, stride = ncp_stride(count);
