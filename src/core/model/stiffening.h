@@ -85,9 +85,13 @@ SADMM_INLINE bool stiffening_of(const double inertia[3], mat3 R, double dt, cons
         {s * K[0] / inertia[0], xy, xz}, {xy, s * K[1] / inertia[1], yz}, {xz, yz, s * K[2] / inertia[2]}};
     const bool turned = xy != 0 || xz != 0 || yz != 0;
     mat3 axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    const double norm2 = share[0][0] * share[0][0] + share[1][1] * share[1][1] + share[2][2] * share[2][2] +
+                         2 * (xy * xy + xz * xz + yz * yz);
     bool any = false;
     int k;
     for (k = 0; k < 6; ++k) more[k] = 0;
+    /* no eigenvalue is above the norm; a little less, for their rounding */
+    if (norm2 < (1 - 1e-9) * STIFFENING_LEAST * STIFFENING_LEAST) return false;
     if (turned) axes = stiffening_axes(share);
     for (k = 0; k < 3; ++k) {
         const double own = stiffening_share(share[k][k]);

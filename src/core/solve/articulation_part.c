@@ -313,12 +313,11 @@ static bool yield_rows(struct articulation_part *part)
     return changed;
 }
 
-static bool solve_tree(struct articulation_part *part, const uint8_t *earlier)
+static bool solve_tree(struct articulation_part *part)
 {
     const struct articulation_view *v = &part->view;
     const struct sadmm_articulation_kernels *by = part->kernels;
     double residual = 0, last = HUGE_VAL;
-    begin_tree_rows(part, earlier);
     for (int pass = 0; pass < ARTICULATION_TREE_PASSES; ++pass) {
         by->factorize(&part->tree, v);
         residual = by->solve(&part->tree, v, false);
@@ -337,8 +336,12 @@ static bool solve_tree(struct articulation_part *part, const uint8_t *earlier)
 
 bool sadmm_articulation_part_solve(struct articulation_part *part, const uint8_t *earlier, bool exact)
 {
-    return part->by_tree ? solve_tree(part, earlier) : solve_sparse(part, earlier, exact);
+    if (!part->by_tree) return solve_sparse(part, earlier, exact);
+    begin_tree_rows(part, earlier);
+    return solve_tree(part);
 }
+
+bool sadmm_articulation_part_solve_on(struct articulation_part *part) { return solve_tree(part); }
 
 void sadmm_articulation_part_store(const struct articulation_view *v, const struct sadmm_system *system,
                                    const struct sadmm_row_constraint *slots)

@@ -81,6 +81,10 @@ void sadmm_articulation_part_put_contacts(const struct articulation_part *part, 
  * finite. */
 bool sadmm_articulation_part_solve(struct articulation_part *part, const uint8_t *earlier, bool exact);
 
+/* The same by its tree, with all rows where the last solve of what is loaded has left them, but for other impulses of
+ * contacts. */
+bool sadmm_articulation_part_solve_on(struct articulation_part *part);
+
 /* How a row's rate responds to its multiplier, were its bodies free: of that which responds less, twice. */
 double sadmm_articulation_part_scale(const struct articulation_part *part, int32_t r);
 

@@ -88,8 +88,8 @@ static inline struct articulation_part *part_of(const struct island *s, int32_t 
  * Nodes have numbers of their own in the island: those of its parts' trees one after the other, then bodies without
  * joints, which are roots. */
 struct ncp_passed {
-    int32_t node, free;
-    double along[6], response[6];
+    int32_t node;
+    double along[8], response[8]; /* behind the free directions: 0 */
 };
 
 /* ncp_response.c: numbers of nodes, once the island's bodies are there; G, with rows in the states that they have. */

@@ -31,8 +31,16 @@ static inline void ncp_exchange_rows(double *a, double *b, size_t count)
     }
 }
 
-/* M = P L U in place, with the largest of each column as its pivot; rows are ncp_stride(count) apart. False:
- * singular. */
+/* A vector's numbers from `first` on; others 0. */
+static inline three ncp_from(three a, size_t first)
+{
+    typedef int64_t places __attribute__((vector_size(32)));
+    const places place = {0, 1, 2, 3}, least = {(int64_t)first, (int64_t)first, (int64_t)first, (int64_t)first};
+    return (three)((places)a & (place >= least));
+}
+
+/* M = P L U in place, with the largest of each column as its pivot, whose inverse is on the diagonal; rows are
+ * ncp_stride(count) apart. False: singular. What is written as a number is not read as part of a vector soon after. */
 static inline bool ncp_factor(double *M, int32_t *pivot, int32_t count)
 {
     const size_t n = (size_t)count, stride = ncp_stride(count);
@@ -40,22 +48,26 @@ static inline bool ncp_factor(double *M, int32_t *pivot, int32_t count)
         double *top = M + k * stride;
         size_t best = k;
         double largest = fabs(top[k]);
-        for (size_t i = k + 1; i < n; ++i)
-            if (fabs(M[i * stride + k]) > largest) best = i, largest = fabs(M[i * stride + k]);
+        for (size_t i = k + 1; i < n; ++i) {
+            const double size = fabs(M[i * stride + k]);
+            best = size > largest ? i : best;
+            largest = size > largest ? size : largest;
+        }
         pivot[k] = (int32_t)best;
         if (!(largest > 0)) return false;
         if (best != k) ncp_exchange_rows(top, M + best * stride, stride);
         const double inverse = 1 / top[k];
         const size_t first = (k + 1) / 4 * 4;
-        three head = {0, 0, 0, 0}; /* the first vector, without what is on the diagonal or before it */
-        for (size_t c = k + 1; c < first + 4 && c < stride; ++c) head[c - first] = top[c];
+        const three head = first < stride ? ncp_from(*(const three *)(top + first), k + 1 - first) : three_fill(0);
         for (size_t i = k + 1; i < n; ++i) {
             double *row = M + i * stride;
-            const double share = row[k] *= inverse;
-            const three shares = {share, share, share, share};
-            if (first < stride) *(three *)(row + first) -= shares * head;
+            const double share = row[k] * inverse;
+            const three shares = three_fill(share);
+            *(three *)(row + first) -= shares * head; /* row i has more columns */
             for (size_t c = first + 4; c < stride; c += 4) *(three *)(row + c) -= shares * *(const three *)(top + c);
+            row[k] = share;
         }
+        top[k] = inverse;
     }
     return true;
 }
@@ -68,9 +80,12 @@ static inline void ncp_substitute(const double *M, const int32_t *pivot, int32_t
         const double at = x[k];
         x[k] = x[pivot[k]], x[pivot[k]] = at;
     }
-    for (size_t k = 1; k < n; ++k) x[k] -= ncp_row_product(M + k * stride, x, k);
-    for (size_t k = n; k-- > 0;)
-        x[k] = (x[k] - ncp_row_product(M + k * stride + k + 1, x + k + 1, n - k - 1)) / M[k * stride + k];
+    for (size_t k = 0; k + 1 < n; ++k)
+        for (size_t i = k + 1; i < n; ++i) x[i] -= M[i * stride + k] * x[k];
+    for (size_t k = n; k-- > 0;) {
+        x[k] *= M[k * stride + k];
+        for (size_t i = 0; i < k; ++i) x[i] -= M[i * stride + k] * x[k];
+    }
 }
 
 #endif

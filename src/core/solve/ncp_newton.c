@@ -34,7 +34,6 @@ struct newton {
     double *right;          /* (count) right sides, then the steps */
     double *start_lambda, *start_u, *best_lambda, *best_u;
     int32_t *number, count; /* those that are solved for */
-    double *law_rows;       /* (3 x stride) of G, of a law */
     int32_t *pivot;
     struct piece *piece;    /* (laws) where lambda and u are */
     double proximal;
@@ -56,7 +55,6 @@ static struct newton newton_of(struct ncp_dense *d)
     s.number = (int32_t *)(s.best_u + n);
     s.pivot = s.number + n;
     s.piece = (struct piece *)(s.best_u + 2 * n);
-    s.law_rows = (double *)(s.piece + n);
     return s;
 }
 
@@ -96,33 +94,37 @@ static void sort_numbers(struct newton *s)
     }
 }
 
+/* Four columns of a row of G: those of numbers `number`, of which there are so many left. */
+static three columns_of(const double *row, const int32_t *number, int32_t left)
+{
+    if (left >= 4) return (three){row[number[0]], row[number[1]], row[number[2]], row[number[3]]};
+    return (three){row[number[0]], left > 1 ? row[number[1]] : 0, left > 2 ? row[number[2]] : 0, 0};
+}
+
 /* Rows of a law: (1 - D) step + D G step / w = Pi - lambda. `row`: the next one. */
 static void enter_law(struct newton *s, const struct ncp_law *law, const struct piece *piece, int32_t *row)
 {
     const struct ncp_dense *d = s->d;
-    const size_t count = (size_t)s->count, stride = ncp_stride(s->count);
-    const int32_t begin = *row;
-    double *G = s->law_rows;
+    const size_t stride = ncp_stride(s->count);
+    const int32_t begin = *row, size = law->count;
+    const double *G = d->G + (size_t)law->first * (size_t)d->size, softness = 1 / law->response;
     int32_t end = begin;
-    while (end < s->count && s->number[end] < law->first + law->count) ++end;
+    while (end < s->count && s->number[end] < law->first + size) ++end;
     if (end == begin) return;
-    for (int32_t h = 0; h < law->count; ++h) {
-        const double *from = d->G + (size_t)(law->first + h) * (size_t)d->size;
-        double *own = G + (size_t)h * stride;
-        for (size_t c = 0; c < count; ++c) own[c] = from[s->number[c]];
-        for (size_t c = count; c < stride; ++c) own[c] = 0;
+    for (int32_t c = 0; c < s->count; c += 4) {
+        three own[3] = {{0}, {0}, {0}};
+        for (int32_t h = 0; h < size; ++h) own[h] = columns_of(G + h * d->size, s->number + c, s->count - c);
+        for (int32_t at = begin; at < end; ++at) {
+            const double *D = piece->D[s->number[at] - law->first];
+            *(three *)(s->M + (size_t)at * stride + c) = three_fill(D[0] * softness) * own[0] +
+                                                         three_fill(D[1] * softness) * own[1] +
+                                                         three_fill(D[2] * softness) * own[2];
+        }
     }
     for (int32_t at = begin; at < end; ++at) {
         const int32_t k = s->number[at] - law->first;
         double *M = s->M + (size_t)at * stride, right = s->step[law->first + k];
-        for (size_t c = 0; c < stride; ++c) M[c] = 0;
-        for (int32_t h = 0; h < law->count; ++h) {
-            if (piece->D[k][h] == 0) continue;
-            const double share = piece->D[k][h] / law->response, *own = G + (size_t)h * stride;
-            const three shares = three_fill(share);
-            right -= share * s->moved[law->first + h];
-            for (size_t c = 0; c < stride; c += 4) *(three *)(M + c) += shares * *(const three *)(own + c);
-        }
+        for (int32_t h = 0; h < size; ++h) right -= piece->D[k][h] * softness * s->moved[law->first + h];
         for (int32_t other = begin; other < end; ++other) {
             const int32_t h = s->number[other] - law->first;
             M[other] += (h == k) - piece->D[k][h];

@@ -200,6 +200,7 @@ static bool solve_for_impulses(struct island *s, uint8_t *states)
         struct articulation_part *part = part_of(s, k);
         const struct articulation_view *v = &part->view;
         const size_t rows = (size_t)(SADMM_MAX_ROWS * v->s.columns);
+        const bool goes_on = part->loaded && s->active == 0 && memcmp(states, v->state, rows) == 0;
         if (part->loaded) {
             sadmm_articulation_part_put_contacts(part, part->impulse);
         } else {
@@ -207,7 +208,8 @@ static bool solve_for_impulses(struct island *s, uint8_t *states)
             part->loaded = part->by_tree;
         }
         fix_active(s, k);
-        solved = sadmm_articulation_part_solve(part, states, true) && solved;
+        solved = (goes_on ? sadmm_articulation_part_solve_on(part)
+                          : sadmm_articulation_part_solve(part, states, true)) && solved;
         memcpy(states, v->state, rows);
         states += rows;
         for (int32_t e = 0; e < v->s.bodies; ++e) {

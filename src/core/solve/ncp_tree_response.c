@@ -29,22 +29,26 @@ static void begin_way(const struct island *s, int32_t number, const double *row,
 static void pass_free(const struct island *s, struct way *way, struct ncp_passed *to)
 {
     const int32_t number = way->node - s->d->first_node[s->parts];
-    to->node = way->node, to->free = 6;
+    to->node = way->node;
     six_store(six_at(way->load), to->along);
+    to->along[6] = to->along[7] = to->response[6] = to->response[7] = 0;
     ldl6_solve(s->d->bodies[number].factor, to->along, to->response); /* there: a contact is on it */
     way->node = -1;
 }
 
 /* A load on its way to the root: on the node's body, with what its child has handed on; then what it hands on to its
  * parent. along: what acts along S besides, NULL: nothing does. z, response: S^T p, and H S^T p. */
-static void pass_tree_node(const struct articulation_node *node, double load[SIX], const double *along, double z[6],
-                           double response[6])
+static void pass_tree_node(const struct articulation_node *node, double load[SIX], const double *along, double z[8],
+                           double response[8])
 {
     six p = six_at(load);
+    six_put(six_zero(), z);
+    six_put(six_zero(), response);
     for (int i = 0; i < node->free; ++i) z[i] = six_dot(six_at(node->S[i]), p) + (along ? along[i] : 0);
     for (int i = 0; i < node->free; ++i) {
-        response[i] = 0;
-        for (int j = 0; j < node->free; ++j) response[i] += node->H[i][j] * z[j];
+        double sum = 0;
+        for (int j = 0; j < node->free; ++j) sum += node->H[i][j] * z[j];
+        response[i] = sum;
     }
     if (node->parent < 0 || !node->bound) return;
     for (int i = 0; i < node->free; ++i) p = six_madd(p, -response[i], six_at(node->U[i]));
@@ -60,7 +64,7 @@ static void pass_node(const struct island *s, struct way *way, const double *alo
     const struct articulation_tree *tree = &part_of(s, way->part)->tree;
     const struct articulation_node *node = &tree->node[way->node - s->d->first_node[way->part]];
     pass_tree_node(node, way->load, along, to->along, to->response);
-    to->node = way->node, to->free = node->free;
+    to->node = way->node;
     way->node = node->parent >= 0 && node->bound ? s->d->first_node[way->part] + node->parent : -1;
 }
 
@@ -120,12 +124,15 @@ void SADMM_KERNEL(ncp_tree_responses)(struct island *s, double *G)
         for (int32_t i = 0; i < counts[c]; ++i) at[own[i].node] = &own[i];
         for (int32_t r = 0; r <= c; ++r) {
             const struct ncp_passed *other = s->d->passed + (size_t)r * (size_t)room;
-            double sum = 0;
+            three sum = {0, 0, 0, 0};
             for (int32_t i = 0; i < counts[r]; ++i) {
                 const struct ncp_passed *common = at[other[i].node];
-                for (int j = 0; common && j < common->free; ++j) sum += other[i].along[j] * common->response[j];
+                if (!common) continue;
+                const six z = six_at(other[i].along), response = six_at(common->response);
+                sum += z.linear * response.linear + z.angular * response.angular;
             }
-            G[(size_t)r * (size_t)n + (size_t)c] = G[(size_t)c * (size_t)n + (size_t)r] = sum;
+            const double entry = three_sum(sum);
+            G[(size_t)r * (size_t)n + (size_t)c] = G[(size_t)c * (size_t)n + (size_t)r] = entry;
         }
         for (int32_t i = 0; i < counts[c]; ++i) at[own[i].node] = NULL;
     }
