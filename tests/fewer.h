@@ -1,9 +1,17 @@
-/* How many of many: a quarter under sanitizers. */
+/* What takes long is shorter under sanitizers (SADMM_TEST_SHORT). */
 #ifndef SADMM_TESTS_FEWER_H
 #define SADMM_TESTS_FEWER_H
 
+#include <stdbool.h>
 #include <stdlib.h>
 
+/* How many of many: a quarter. */
 static inline int fewer(int count) { return getenv("SADMM_TEST_SHORT") ? (count + 3) / 4 : count; }
+
+/* Of the ways to run something (methods, precisions) every other one, the first or the second in turn. */
+static inline bool is_its_turn(int subject, int way)
+{
+    return !getenv("SADMM_TEST_SHORT") || (subject + way) % 2 == 0;
+}
 
 #endif
