@@ -104,7 +104,7 @@ static inline void hold_cube(double ratio, double dt, int jaws, sadmm_precision 
         if (step == closing) MUST(grip.world, sadmm_world_set_body_gravity_scale(grip.world, grip.cube, 1));
         if (t > 0) lift_palm(&grip, z);
         step_world(grip.world, 1);
-        unsolved += world_report(grip.world).unsolved > 0;
+        unsolved += step >= closing && world_report(grip.world).unsolved > 0; /* impacts come before */
         sadmm_body_state cube = body_state(grip.world, grip.cube);
         cube.position[2] -= jaws == 2 ? body_state(grip.world, grip.jaw[0]).position[2] : t > 0 ? z : 0.5;
         cube.position[0] = 0; /* across the jaws two drives of limited force hold nothing */

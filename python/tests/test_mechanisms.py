@@ -6,6 +6,8 @@ wherever they overlap, so that many have none.
 """
 
 import sys
+import warnings
+
 import numpy as np
 import pytest
 
@@ -100,6 +102,37 @@ def test_overlaps_are_borne():
     assert sum(unsolved > 0 for unsolved, *_ in runs) > 10, "else this says nothing"
     assert sum(iterated for _, iterated, *_ in runs) <= len(runs) * STEPS // 1000
     assert sum(speed > 20 for *_, speed in runs) <= len(runs) // 10
+
+
+def test_a_loop_that_cannot_get_to_its_limit_stays_calm():
+    """A planar four-bar of links of 1 m, base 2.4 m, whose first joint starts outside of a range that the loop does not
+    let it get to: it stops at its dead point. Speeds are of the order of the corrective one, 1 rad/s: what a limit asks
+    for is given by at most ten times the energy that the whole mechanism has at that rate, in a few steps."""
+    angle = 0.6
+    knee = np.array([np.cos(angle), np.sin(angle)])
+    to_base = np.array([2.4, 0.0]) - knee
+    half = np.linalg.norm(to_base) / 2
+    elbow = knee + to_base / 2 + np.sqrt(1 - half * half) * np.array([-to_base[1], to_base[0]]) / (2 * half)
+    world = subadmm.World(settings=subadmm.Settings(dt=0.002, gravity=(0, 0, 0)), backend="cpu")
+    places, links, last = [np.zeros(2), knee, elbow, np.array([2.4, 0.0])], [], None
+    for begin, end in zip(places, places[1:]):
+        middle, along = (begin + end) / 2, np.arctan2(*(end - begin)[::-1])
+        turned = (np.cos(along / 2), 0, 0, np.sin(along / 2))
+        link = world.add_solid(subadmm.box(0.5, 0.03, 0.03, mask=0), mass=3, position=(*middle, 0), orientation=turned)
+        limits = {5: subadmm.Coordinate(limited=True, lower=0.7, upper=2)} if last is None else {}
+        world.add_joint("revolute", last, link, position=(*begin, 0), coordinates=limits)
+        links.append(link)
+        last = link
+    world.add_joint("revolute", None, last, position=(2.4, 0, 0))
+    fastest, unsolved = 0, 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for _ in range(1500):
+            world.step()
+            fastest = max(fastest, max(np.abs(link.angular_velocity[2]) for link in links))
+            unsolved += world.report.unsolved
+    assert fastest < 30, fastest
+    assert unsolved > 0  # and it says that the limit is not met
 
 
 def main(count):

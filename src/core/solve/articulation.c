@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "articulation_part.h"
+#include "asked_energy.h"
 #include "articulation_variants.h"
 #include "core/base/memory.h"
 #include "core/model/joint_close.h"
@@ -238,6 +239,69 @@ static bool has_any(const struct articulation_part *part, const uint8_t *bodies)
     return any;
 }
 
+/* Twice the energy of a body at v, once the part is solved: its factor is A then, or A's. */
+static double energy2_of(const struct articulation_part *part, int32_t e, const double v[6])
+{
+    const double *A = part->view.factor + 36 * (size_t)e;
+    double sum = 0;
+    for (int k = 0; k < 6; ++k) {
+        double along = v[k];
+        for (int i = k + 1; i < 6 && !part->by_tree; ++i) along += A[6 * i + k] * v[i];
+        sum += part->by_tree ? v[k] * six_product(A + 6 * k, v) : along * along / A[7 * k];
+    }
+    return sum;
+}
+
+/* Twice the energy that its bodies have from forces alone; what its rows ask for, if all of them followed. */
+static void find_energies(const struct solving *s, const struct articulation_part *part, double *free, double *asked)
+{
+    const struct articulation_view *v = &part->view;
+    struct asked_energy whole = asked_energy_begin();
+    for (int32_t e = 0; e < v->s.bodies; ++e) {
+        double A[36], b[6];
+        sadmm_system_body(s->system, s->settings, v->s.body[e], A, b);
+        asked_energy_add_body(&whole, A, s->system->rigid[v->s.body[e]].position);
+        ldl6_factor(A, A);
+        *free += ldl6_inverse_product(A, b);
+    }
+    EACH_ARTICULATION_ROW(s->slots, v, r, from) {
+        const struct articulation_row *row = &v->rows[r];
+        *asked += asked_energy_of_row(&whole, row->jacobian[0], row->jacobian[1],
+                                      row->gain > 0 ? row->bias / row->gain : 0);
+        (void)from;
+    }
+}
+
+/* As a dense contact solve's result (ncp_solve.c): rows make no more than ten times the energy that they ask for. */
+static bool has_too_much_energy(const struct solving *s, const struct articulation_part *part)
+{
+    static const double most = 10;
+    const struct articulation_view *v = &part->view;
+    const double speed = s->settings->correction_speed;
+    double energy = 0, correcting = 0, free = 0, asked = 0;
+    if (!s->system->rigid) return false;
+    for (int32_t e = 0; e < v->s.bodies; ++e) {
+        double velocity[6];
+        for (int k = 0; k < 6; ++k) velocity[k] = v->velocity[6 * e + k] + v->dv[6 * e + k];
+        energy += energy2_of(part, e, velocity);
+        const double A = v->factor[36 * (size_t)e];
+        correcting += speed * speed * (part->by_tree ? A : 1 / A);
+    }
+    if (energy <= most * correcting) return false;
+    find_energies(s, part, &free, &asked);
+    return energy > free && sqrt(energy) > sqrt(free) + sqrt(most * (correcting + asked));
+}
+
+/* Nothing meets its rows, or only what throws its bodies about: those with bounds give. Impulses are bounded then. */
+static bool solve_giving(const struct solving *s, struct articulation_part *part, bool exact)
+{
+    part->gives = true;
+    sadmm_articulation_part_load(part, s->system, s->settings, s->slots);
+    part->gave = sadmm_articulation_part_solve(part, NULL, exact);
+    part->gives = false;
+    return part->gave;
+}
+
 sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations, const struct sadmm_system *system,
                                        const struct sadmm_row_constraint *slots, size_t slot_count,
                                        const struct sadmm_settings *settings, const uint8_t *stiffened, bool after,
@@ -274,8 +338,11 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
         }
         const bool leaves = part->touched && settings->method == SADMM_METHOD_PAPER;
         if (leaves) leave_to_contacts(&part->view);
-        const bool solved = sadmm_articulation_part_solve(part, part->kept ? part->kept_state : NULL,
-                                                          settings->ncp_points > 0);
+        const bool exact = settings->ncp_points > 0;
+        bool solved = sadmm_articulation_part_solve(part, part->kept ? part->kept_state : NULL, exact);
+        part->gave = false;
+        if (exact && !part->touched && (!solved || has_too_much_energy(&s, part)))
+            solved = solve_giving(&s, part, exact);
         /* Rows that are not solved are left as they are: velocities that go with multipliers beyond their bounds have
          * energy from nowhere. */
         if (solved) sadmm_articulation_part_store(&part->view, system, slots);

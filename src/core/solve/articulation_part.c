@@ -57,6 +57,32 @@ void sadmm_articulation_part_load(struct articulation_part *part, const struct s
     sadmm_articulation_part_load_at(part, system, settings, slots);
 }
 
+/* How a row's rate responds to its multiplier, by the bodies' A. */
+static double scale_by_inertia(const struct articulation_view *v, int32_t r)
+{
+    double own[2] = {0, 0};
+    for (int side = 0; side < 2; ++side) {
+        const int32_t e = v->s.side[2 * (r / SADMM_MAX_ROWS) + side];
+        double L[36], response[6];
+        if (e < 0) continue;
+        ldl6_factor(v->factor + 36 * (size_t)e, L);
+        ldl6_solve(L, v->rows[r].jacobian[side], response);
+        own[side] = six_product(v->rows[r].jacobian[side], response);
+    }
+    return articulation_scale_of(own[0], own[1]);
+}
+
+/* Limits that a loop near its dead point cannot get to, say, get there as far as they can. */
+static void let_rows_give(const struct articulation_view *v)
+{
+    static const double share = 1e-2;
+    for (int32_t r = 0; r < SADMM_MAX_ROWS * v->s.columns; ++r) {
+        struct articulation_row *row = &v->rows[r];
+        if (v->state[r] == ROW_ABSENT || (row->lo == -HUGE_VAL && row->hi == HUGE_VAL)) continue;
+        row->compliance += share * row->gain * scale_by_inertia(v, r);
+    }
+}
+
 void sadmm_articulation_part_load_at(struct articulation_part *part, const struct sadmm_system *system,
                                      const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots)
 {
@@ -64,6 +90,7 @@ void sadmm_articulation_part_load_at(struct articulation_part *part, const struc
     load_rows(v, system->rows, slots);
     for (int32_t e = 0; e < v->s.bodies; ++e)
         sadmm_system_body(system, settings, v->s.body[e], v->factor + 36 * (size_t)e, part->without + 6 * (size_t)e);
+    if (part->gives) let_rows_give(v);
     part->loaded = false;
     part->by_tree = settings->ncp_points > 0 && part->tree.nodes > 0 &&
                     part->kernels->load(&part->tree, v, slots, part->impulse, part->without);
@@ -113,18 +140,7 @@ static void begin_rows(const struct articulation_part *part, const uint8_t *earl
 
 double sadmm_articulation_part_scale(const struct articulation_part *part, int32_t r)
 {
-    const struct articulation_view *v = &part->view;
-    double own[2] = {0, 0};
-    if (!part->by_tree) return articulation_scale(v, r);
-    for (int side = 0; side < 2; ++side) {
-        const int32_t e = v->s.side[2 * (r / SADMM_MAX_ROWS) + side];
-        double L[36], response[6];
-        if (e < 0) continue;
-        ldl6_factor(v->factor + 36 * (size_t)e, L);
-        ldl6_solve(L, v->rows[r].jacobian[side], response);
-        own[side] = six_product(v->rows[r].jacobian[side], response);
-    }
-    return articulation_scale_of(own[0], own[1]);
+    return part->by_tree ? scale_by_inertia(&part->view, r) : articulation_scale(&part->view, r);
 }
 
 /* Rows that left their bounds, or are at them against their law: did any change its state? */

@@ -24,6 +24,8 @@ struct articulation_part {
     bool loop;               /* its joints are more than hang it together */
     double speed;            /* that its impulses change it by; 0: it is not solved */
     bool left;               /* it is not this call's */
+    bool gives;              /* rows with bounds do, by a share of their response, while it is loaded; */
+    bool gave;               /* ... did in the last solve */
     bool touched;            /* by a contact; */
     int32_t points;          /* by so many points */
     bool for_ncp;            /* its contacts are left to the dense contact solve: no C */

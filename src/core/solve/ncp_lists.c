@@ -120,8 +120,9 @@ static void find_solved_without_contacts(struct sadmm_ncp *d, const struct sadmm
     for (int32_t i = 0; i < system->body_count; ++i) {
         const int32_t label = d->label[i];
         if (d->points[label] > 0 || (d->kind[label] & ISLAND_LEFT)) continue;
+        if (!(d->kind[label] & ISLAND_SOLVED)) d->error[label] = 0;
         d->kind[label] |= ISLAND_SOLVED;
-        d->error[label] = 0;
+        if (articulations->part[i] >= 0 && articulations->parts[articulations->part[i]].gave) d->error[label] = -1;
         if (articulations->part[i] >= 0 || d->kind[label] & ISLAND_ARTICULATED) continue;
         double A[36], b[6];
         sadmm_system_body(system, input->settings, i, A, b);

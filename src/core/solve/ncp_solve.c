@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "asked_energy.h"
 #include "core/base/memory.h"
 #include "core/model/system_math.h"
 #include "ncp_island.h"
@@ -25,6 +26,9 @@ static const double GIVES = 1e-2;
 /* A solution of more than so many times the energy that is asked for is none: where bodies are all but wedged, or a
  * loop is near its dead point, it throws them about. */
 static const double MOST_ENERGY = 10;
+/* Contacts that cannot be met miss by more than this share of the speed of corrections: what is nearer is left to the
+ * iterations first. */
+static const double CANNOT = 0.1;
 /* How many times larger than those they replace impulses may be that are no solution. */
 static const double MOST_GROWTH = 4;
 /* How often it goes from contacts to rows and back, in all and without coming nearer though no row changed; and passes
@@ -476,35 +480,32 @@ static double correcting_energy2(const struct island *s)
     return speed * speed * mass;
 }
 
-/* What the laws ask of a row by itself: twice the energy of the velocity that it makes from rest. */
-static double row_energy2(const struct island *s, const struct sadmm_row_constraint *constraint, int32_t r)
-{
-    const struct sadmm_rows *rows = s->system->rows;
-    const int32_t ends[2] = {constraint->body_a, constraint->body_b};
-    double response = 0;
-    for (int side = 0; side < 2; ++side) {
-        const double *row = (side ? rows->jacobian_b : rows->jacobian_a) + 6 * (size_t)r;
-        if (ends[side] < 0) continue;
-        response += ldl6_inverse_product(sadmm_ncp_factor(s, s->d->number[ends[side]]), row);
-    }
-    const double under = rows->compliance[r] + rows->gain[r] * response,
-                 alone = under > 0 ? fmin(fmax(-rows->bias[r] / under, rows->lo[r]), rows->hi[r]) : 0;
-    return response * alone * alone;
-}
-
 /* Of all that asks for a velocity, besides corrections: joints' rows, what moves by itself, restitution. */
 static double asked_energy2(const struct island *s)
 {
+    const struct sadmm_rows *rows = s->system->rows;
+    struct asked_energy whole = asked_energy_begin();
     double sum = 0;
+    for (int32_t n = 0; n < s->bodies; ++n) {
+        const int32_t i = s->d->bodies[n].body;
+        double A[36], b[6];
+        sadmm_system_body(s->system, s->settings, i, A, b);
+        asked_energy_add_body(&whole, A, s->system->rigid[i].position);
+    }
     for (int32_t i = 0; i < s->contacts; ++i) {
         const struct ncp_contact *c = &s->d->contacts[i];
-        const double e = fmin(c->e, 0) + c->given[0]; /* an open contact asks for nothing */
-        sum += (e * e + c->given[1] * c->given[1] + c->given[2] * c->given[2]) / s->d->laws[i].response;
+        const double normal = fmin(c->e, 0) + c->given[0]; /* an open contact asks for nothing */
+        sum +=
+            asked_energy_linear(&whole, sqrt(normal * normal + c->given[1] * c->given[1] + c->given[2] * c->given[2]));
     }
     for (int32_t k = 0; k < s->parts; ++k) {
         const struct articulation_view *v = &part_of(s, k)->view;
         EACH_ARTICULATION_ROW(s->slots, v, r, from)
-            sum += row_energy2(s, &s->slots[v->s.constraint[r / SADMM_MAX_ROWS]], from);
+        {
+            sum += asked_energy_of_row(&whole, rows->jacobian_a + 6 * (size_t)from, rows->jacobian_b + 6 * (size_t)from,
+                                       rows->gain[from] > 0 ? rows->bias[from] / rows->gain[from] : 0);
+            (void)r;
+        }
     }
     return sum;
 }
@@ -576,15 +577,15 @@ static bool solve_island(struct island *s, int32_t label)
     begin_search(s, d->states);
     search(s, G, d->states, d->states + rows, rows);
     const bool solved = !(s->best > ENOUGH), wild = s->best < before && has_too_much_energy(s);
-    if (!wild && (solved || is_nearer(s, before, size_before))) {
-        take(s, label, solved);
-        if (solved) return true;
-    }
-    const double nearest = d->error[label];
+    if (solved || (!wild && is_nearer(s, before, size_before))) take(s, label, solved);
+    if (solved && !wild) return true;
+    const double nearest = d->error[label], energy = solved ? best_energy2(s) : HUGE_VAL;
     begin_giving(s, d->states, rows);
     search(s, G, d->states, d->states + rows, rows);
-    const bool gives =
-        !(s->best > ENOUGH) && !has_too_much_energy(s) && (wild || (s->again && s->best_hard <= nearest));
+    const double missed = s->best_hard / s->settings->correction_speed;
+    const bool gives = !(s->best > ENOUGH) && (solved     ? best_energy2(s) <= energy / 2
+                                               : s->again ? s->best_hard <= nearest
+                                                          : missed > CANNOT);
     return gives ? take(s, label, true) : nearest < before;
 }
 
