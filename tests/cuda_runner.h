@@ -9,11 +9,11 @@
 
 #include "core/solve/schedule.h"
 #include "cuda_suite.h"
+#include "fixed_work.h"
 #include "runner.h"
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
-#include "fixed_work.h"
 #define force_tier cuda_emulation_force_tier
 #define force_cluster cuda_emulation_force_cluster
 #define tier_of cuda_emulation_tier_of

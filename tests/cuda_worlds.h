@@ -8,12 +8,12 @@
 
 #include "core/base/definition_fields.h"
 #include "cuda_suite.h"
+#include "fixed_work.h"
 #include "scene_tools.h"
 #include "world/state/world_state.h"
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
-#include "fixed_work.h"
 #define force_tier cuda_emulation_force_tier
 #define tier_of cuda_emulation_tier_of
 #define tune_capacities cuda_emulation_tune_capacities

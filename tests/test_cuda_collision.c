@@ -432,7 +432,7 @@ START_TEST(subshapes_are_matched_by_number)
         for (int32_t j = 0; j < p->count; ++j)
             for (int k = 0; k < 3; ++k) b.host_set.points[p->first + j].impulse[k] = (double)(1 + i) * p->normal[k];
     }
-    memmove(&b.host_set.pairs[1], &b.host_set.pairs[2], (b.host_set.pair_count - 2) * sizeof *b.host_set.pairs);
+    for (size_t i = 2; i < b.host_set.pair_count; ++i) b.host_set.pairs[i - 1] = b.host_set.pairs[i];
     --b.host_set.pair_count;
     both_start_from(&b, &b.host_set);
     both_find(&b, &input, "without the second");

@@ -43,7 +43,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         sadmm_system_body(&v.raw.system, &settings, i, A, b);
     }
     if (stiffened) take_articulation_body(stiffened_body(v, i), A, b);
-    if (JOINTS && v.joints.is_articulated[i]) v.joints.bodies[i] = articulation_body_of(A, b);
+    if (JOINTS && (v.joints.is_articulated[i] || v.ncp.points)) v.joints.bodies[i] = articulation_body_of(A, b);
     put_body<ENERGIES>(v, i, A, b);
 }
 

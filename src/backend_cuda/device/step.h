@@ -59,7 +59,8 @@ enum step_stamp { STAMP_START, STAMP_FOUND, STAMP_ASSEMBLED, STAMP_SOLVED, STAMP
 struct cuda_step_totals {
     int32_t limited, unmet;  /* most of any; unmet: -1: no stop rule */
     int32_t met;             /* sub-steps that met theirs */
-    int32_t constrained;     /* sub-steps with contacts */
+    int32_t constrained;     /* sub-steps with contacts, or rows; */
+    int32_t spared;          /* of which every island was solved before any iteration */
     int32_t pushed;          /* sub-steps in which some island is pushed apart (step/push.h); -1: one did not fit */
     int32_t most_iterations; /* sums: of islands that stopped, the most; */
     double iterations_mean;  /* and of all */

@@ -353,6 +353,34 @@ struct push_view {
     struct sadmm_contact_point *contacts;
 };
 
+/* Trees of a part (step/ncp_plan.cu): its nodes, 0: it is none; where they begin in ncp_view.nodes. Its gears' constraints
+ * are in ncp_view.joints. */
+struct cuda_ncp_part {
+    int32_t nodes, first, levels, first_gear, gears;
+};
+/* A body with its joint to its parent; nodes are numbered in their part, children before their parents, -1: none. */
+struct cuda_ncp_node {
+    int32_t body, parent, child, sibling, level; /* level: joints to the root */
+    int32_t first_joint, joints;                 /* of ncp_view.joints */
+};
+
+/* The dense contact solve (step/ncp_island.h). In worlds with joints alone. */
+struct ncp_view {
+    int32_t points;                     /* settings.ncp_points; 0: there is none */
+    const struct cuda_ncp_part *parts;  /* articulations */
+    const struct cuda_ncp_node *nodes;
+    const int32_t *joints;              /* of nodes: 2 constraint + the side of the node's body */
+    const int32_t *part_of;             /* bodies; -1: of none */
+    int32_t *number;                    /* bodies: their node, while their island is solved */
+    int32_t *solved;                    /* bodies: at labels of islands */
+    int32_t *count, *islands;           /* labels of those that are to be solved */
+    int32_t *unsolved;                  /* not 0: some island is left to the iterations */
+    double *impulse;                    /* points x 3: of solved islands; their velocities and multipliers are in
+                                           joint_view */
+    char *memory;                       /* of blocks, */
+    size_t bytes;                       /* each */
+};
+
 struct cuda_view {
     struct model_view model;
     struct body_view bodies;
@@ -366,7 +394,8 @@ struct cuda_view {
     struct cuda_step_view step;      /* whole steps alone; */
     struct joint_view joints;        /* likewise; */
     struct kinematic_view kinematic; /* likewise; */
-    struct push_view push;           /* likewise */
+    struct push_view push;           /* likewise; */
+    struct ncp_view ncp;             /* likewise */
 };
 
 /* In pinned memory: the updates of step `sequence`; and them, one after the other. */

@@ -277,6 +277,13 @@ static __global__ void __launch_bounds__(ARTICULATION_THREADS)
         pdl_wait();
         return;
     }
+    if (v.ncp.points) { /* it may be solved already */
+        pdl_wait();
+        if (v.ncp.solved[v.graph.label[v.joints.parts[blockIdx.x].label - 1]]) {
+            if (after && blockIdx.x == 0 && threadIdx.x == 0) stamp_solved(v.step);
+            return;
+        }
+    }
     const articulation_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
     if (v.joints.apart) pdl_wait();
     load_rows(v, p);

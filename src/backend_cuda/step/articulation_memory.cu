@@ -120,7 +120,7 @@ static sadmm_status load_order(struct sadmm_context *c, const struct sadmm_artic
     fill(s, order, &m);
     const sadmm_status status = CUDA(put)(c, buffer<char>(c, BUFFER_ARTICULATIONS), host, size.given, error);
     sadmm_free(host);
-    return status;
+    return status == SADMM_OK ? CUDA(load_ncp)(c, c->step->joint_constraints - c->step->gears, order, error) : status;
 }
 
 sadmm_status CUDA(reserve_articulations)(struct sadmm_context *c, struct sadmm_error *error)

@@ -175,15 +175,19 @@ static __device__ __forceinline__ pair_before fetch_pair(const raw_view &raw, co
 }
 
 /* Impulses of a pair into its points, every v.contacts.lanes-th of them from `lane` on; *depth: the deepest. */
-static __device__ __forceinline__ bool store_impulses(const contact_view &contacts, const cuda_step_view &step,
-                                                      int32_t p, int32_t lane, const pair_before &pair, double *depth)
+static __device__ __forceinline__ bool store_impulses(const cuda_view &v, int32_t p, int32_t lane,
+                                                      const pair_before &pair, double *depth)
 {
+    const contact_view &contacts = v.contacts;
+    const cuda_step_view &step = v.step;
+    const bool solved = v.ncp.points && is_solved(v, pair.ends.body[pair.ends.body[0] < 0]);
     bool finite = true;
     for (int32_t k = lane; k < pair.count; k += contacts.lanes) {
         struct sadmm_contact_point *point = wide_at(step.points, (size_t)(pair.first + k));
         const point_before before = k == lane ? pair.point : fetch_before(point);
         double *start = step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
-        v3_store(point_impulse(contacts, p, k), impulse);
+        v3_store(solved ? v3_load(v.ncp.impulse + 3 * (size_t)(pair.first + k)) : point_impulse(contacts, p, k),
+                 impulse);
         finite = finite && finite_numbers(impulse, 3);
         /* one record after the other: stores to both in turn would not be joined to wider ones */
         for (int j = 0; j < 3; ++j) start[j] = before.impulse[j];
@@ -216,7 +220,7 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
     const unsigned long long deepest = control->depth; /* of those that have come here */
     /* bodies are named first: all of them are below any contact's */
     const int32_t body = pair.ends.body[1] >= 0 ? pair.ends.body[1] : pair.ends.body[0];
-    if (live && !store_impulses(v.contacts, v.step, p, lane, pair, &depth))
+    if (live && !store_impulses(v, p, lane, pair, &depth))
         atomicMin(&control->offending_body, v.model.bodies + body);
     if (live && v.step.limits) {
         int ways = add_ways<true>(v, pair.ends, pair.first, pair.count, lane);

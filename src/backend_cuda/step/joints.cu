@@ -102,15 +102,18 @@ static __device__ __forceinline__ void store_middle(const joint_view &joints, in
 
 /* Constraints of a joint with so many rows. */
 static __device__ __forceinline__ void store_constraints(const cuda_view &v, const struct sadmm_resident_joint *joint,
-                                                         int32_t first, int lane, int rows)
+                                                         const struct acting_joint &acting, int32_t first, int lane,
+                                                         int rows)
 {
+    double offset[3] = {0, 0, 0};
+    if (rows > 0) v3_store(v3_sub(acting.middle.arm_a, acting.middle.arm_b), offset);
     for (int c = lane; c < joint->constraints; c += LANES) {
         const int left = rows - SADMM_MAX_ROWS * c,
                   count = left < 0 ? 0 : left < SADMM_MAX_ROWS ? left : (int)SADMM_MAX_ROWS;
         const int32_t a = joint->body[0] >= 0 ? joint->body[0] : -1, b = joint->body[1] >= 0 ? joint->body[1] : -1;
         const struct sadmm_row_constraint out = {
-            count > 0 ? a : -1, count > 0 ? b : -1, (first + c) * (int32_t)SADMM_MAX_ROWS, count, false, 0, false,
-            {0, 0, 0}};
+            count > 0 ? a : -1, count > 0 ? b : -1, (first + c) * (int32_t)SADMM_MAX_ROWS, count, false, 0, true,
+            {offset[0], offset[1], offset[2]}};
         const_cast<struct sadmm_row_constraint *>(v.raw.constraints)[first + c] = out;
     }
 }
@@ -168,7 +171,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     }
     warm = or_lanes(warm);
     if (!live) return;
-    store_constraints(v, joint, first, lane, rows);
+    store_constraints(v, joint, acting, first, lane, rows);
     /* Parts are of all joints, islands of those that act: they are not the same where one does not. */
     if (rows == 0 && joint->constraints > 0 && lane == 0) v.step.control->joints.together = 1;
     begin_memory(v.joints, j, lane, coordinate && joint_winds(def->locks, lane), coordinate ? moving.value : 0,

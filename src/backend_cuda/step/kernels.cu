@@ -259,7 +259,8 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
 static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_t i, bool again, bool articulated)
 {
     const int32_t bits = articulated ? v.joints.touch[articulation_label(v, i)] : 0;
-    if (articulated && !v.joints.is_articulated[i]) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
+    if (articulated && !v.joints.is_articulated[i] && !(v.ncp.points && is_solved(v, i)))
+        load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
     if (bits & ISLAND_ARTICULATED) move_articulated(v, i);
     else if (again) move_again(v, i);
 }
@@ -335,23 +336,26 @@ static __device__ int32_t abort_of(int32_t aborted, bool planned, int32_t offend
 /* The sub-step is added to those before it. args.count: its iterations. */
 static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cuda_args &args)
 {
-    const struct cuda_step_totals none = {0, -1, 0, 0, 0, 0, 0, {}};
+    const struct cuda_step_totals zero = {0, -1, 0, 0, 0, 0, 0, 0, {}};
     const struct cuda_step_control *control = v.step.control;
-    struct cuda_step_totals totals = v.step.substep > 0 ? control->totals : none;
+    struct cuda_step_totals totals = v.step.substep > 0 ? control->totals : zero;
     totals.pushed = count_pushed(v.push, totals.pushed);
-    const bool constrained = control->counts.points > 0 || control->joints.constraints > 0;
+    const bool constrained = control->counts.points > 0 || control->joints.constraints > 0,
+               spared = v.ncp.points && *v.ncp.unsolved == 0;
     const int32_t limited = v.step.limits ? *v.islands.limited : 0, islands = v.model.statistics->islands;
-    double iterations = constrained ? args.count : 1;
+    double iterations = spared ? 0 : constrained ? args.count : 1;
     if (args.checks > 0) {
         const struct cuda_stop stop = *v.islands.stop;
-        const int32_t unmet = stop.unmet[args.checks % CHECKS_KEPT];
+        const int32_t unmet = spared ? 0 : stop.unmet[args.checks % CHECKS_KEPT];
         totals.unmet = unmet > totals.unmet ? unmet : totals.unmet;
         totals.met += unmet == 0;
-        totals.most_iterations += stop.last;
-        if (islands > 0) iterations = ((double)(int64_t)stop.sum + (double)unmet * args.count) / islands;
+        totals.most_iterations += spared ? 0 : stop.last;
+        if (islands > 0 && !spared)
+            iterations = ((double)(int64_t)stop.sum + (double)unmet * args.count) / islands;
     }
     totals.limited = limited > totals.limited ? limited : totals.limited;
     totals.constrained += constrained;
+    totals.spared += constrained && spared;
     totals.iterations_mean += iterations;
     /* each phase goes on from where it was */
     for (int k = 1; k < STAMPS; ++k) totals.stamps[k] += control->stamps[k] - control->stamps[0];

@@ -21,6 +21,12 @@ static __device__ __forceinline__ bool finite_numbers(const double *x, int count
     return sum == 0;
 }
 
+/* Is its island solved directly (ncp_island.h)? Where there are such islands. */
+static __device__ __forceinline__ bool is_solved(const cuda_view &v, int32_t body)
+{
+    return v.ncp.solved[v.graph.label[body]] != 0;
+}
+
 /* A body as the step began. */
 struct body_before {
     struct sadmm_rigid body;

@@ -32,7 +32,8 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
     out->plan.points = last->counts.points;
     const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     const struct cuda_step_totals *totals = &last->totals;
-    out->iterations = totals->constrained * share.iterations + (share.substeps - totals->constrained);
+    out->iterations =
+        (totals->constrained - totals->spared) * share.iterations + (share.substeps - totals->constrained);
     out->iterations_mean = totals->iterations_mean;
     out->error = -1;
     out->error_kind = SADMM_STEP_ERROR_NONE;

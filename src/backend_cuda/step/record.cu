@@ -170,6 +170,25 @@ static sadmm_status record_push_choice(struct sadmm_context *c, struct sadmm_err
     return CUDA(launch_push_choice)(c, error);
 }
 
+/* Islands that are solved before the iterations, and articulations of the others. */
+static sadmm_status record_solved(struct sadmm_context *c, struct sadmm_error *error)
+{
+    if (solves_ncp(c)) TRY(CUDA(launch_ncp)(c, false, error));
+    return record_articulations(c, error);
+}
+
+/* Contacts in the solver's form, and where iterations begin in islands that are solved. */
+static sadmm_status record_starts(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    TRY(CUDA(assemble_contacts)(c, error));
+    if (!solves_ncp(c)) return SADMM_OK;
+    s->some_unsolved = 0;
+    if (!c->plan.residuals && c->partition.tier != SADMM_CUDA_TIER_GRID) /* whose launches are cooperative */
+        CUDA_CALL(c, make_condition(c->stream, &s->some_unsolved), "a condition of the step");
+    return CUDA(launch_ncp_put)(c, false, s->some_unsolved, error);
+}
+
 /* record_plan where there are kinematic bodies: one after the other. */
 static sadmm_status record_kinematic_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
@@ -179,10 +198,10 @@ static sadmm_status record_kinematic_plan(struct sadmm_context *c, struct sadmm_
     if (c->view.push.planned) TRY(record_push_choice(c, error));
     if (c->view.joints.count > 0) {
         TRY(CUDA(assemble_rows)(c, error));
-        TRY(record_articulations(c, error));
+        TRY(record_solved(c, error));
         TRY(wait_for_joints(c, error));
     }
-    return CUDA(assemble_contacts)(c, error);
+    return record_starts(c, error);
 }
 
 /* Contacts in the solver's form, beside what the main stream does; after articulations, where these say what they
@@ -203,23 +222,27 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
 {
     if (c->view.kinematic.count > 0) return record_kinematic_plan(c, error);
     const bool together = c->view.joints.count > 0 && !c->view.joints.apart,
-               beside = together && articulations_are_small(c),
+               solved = together && solves_ncp(c),
+               beside = together && articulations_are_small(c) && !solved,
                late = together && c->fast && c->settings.warm_start, /* inertia of articulations is not known before */
-               side = !c->view.push.planned && (!late || beside);
+               side = !c->view.push.planned && (!late || beside) && !solved;
     if (together) TRY(wait_for_joints(c, error)); /* the graph is of their rows, too */
     if (beside) TRY(record_articulations(c, error));
     if (side) TRY(record_contacts(c, late, error));
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     if (c->view.push.planned) TRY(record_push_choice(c, error)); /* it says what contacts are */
-    if (together && !beside) TRY(record_articulations(c, error));
+    if (together && !beside) TRY(record_solved(c, error));
     if (together) TRY(wait_for_joints(c, error));
-    return side ? SADMM_OK : CUDA(assemble_contacts)(c, error);
+    return side ? SADMM_OK : record_starts(c, error);
 }
 
 /* Which motions of floating islands may be restored, beside the iterations; where those find out themselves what is
  * anchored, after them. */
-static bool motions_beside(const struct sadmm_context *c) { return c->plan.momentum && !c->prologue; }
+static bool motions_beside(const struct sadmm_context *c)
+{
+    return c->plan.momentum && !c->prologue && !solves_ncp(c);
+}
 
 static sadmm_status record_motions(struct sadmm_context *c, struct sadmm_error *error)
 {
@@ -251,6 +274,29 @@ static sadmm_status record_articulation_finish(struct sadmm_context *c, struct s
     TRY(CUDA(launch_articulations)(c, true, error));
     TRY(wait_for_joints(c, error));
     return CUDA(launch_joint_solution)(c, error);
+}
+
+/* Iterations, where some island is not solved before them: a part of the step; then those that were not, once more. */
+static sadmm_status begin_iterations(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    if (!solves_ncp(c) || !s->some_unsolved || c->stream == s->part) return SADMM_OK;
+    CUDA_CALL(c, begin_part(c->stream, s->some_unsolved, s->part), "a part of the step");
+    s->main = c->stream;
+    c->stream = s->part;
+    return SADMM_OK;
+}
+
+static sadmm_status end_iterations(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    if (!solves_ncp(c) || c->view.joints.count == 0) return SADMM_OK;
+    TRY(CUDA(launch_ncp)(c, true, error));
+    if (c->stream == s->part) {
+        c->stream = s->main;
+        CUDA_CALL(c, end_part(s->part), "a part of the step");
+    }
+    return CUDA(launch_ncp_put)(c, true, 0, error);
 }
 
 /* The end of the step, wrenches included; beside it the residuals of the last iteration where they are wanted. */
@@ -378,10 +424,13 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
         TRY(CUDA(enqueue_penalties)(c, error));
         return motions_beside(c) ? record_motions(c, error) : SADMM_OK;
     case SADMM_STAGE_ITERATE:
+        TRY(begin_iterations(c, error));
+        return record_solving(c, stage, residuals, limit, error);
     case SADMM_STAGE_RESIDUALS:
     case SADMM_STAGE_CHECK:
     case SADMM_STAGE_WEIGHTS:
     case SADMM_STAGE_BALANCE: return record_solving(c, stage, residuals, limit, error);
+    case SADMM_STAGE_SOLUTION: return end_iterations(c, error); /* record_finish reads it where it is */
     case SADMM_STAGE_ENERGY_LIMIT:
         return limit == LIMIT_WHOLE ? SADMM_OK : record_energy_limit(c, limit == LIMIT_CANDIDATES, error);
     case SADMM_STAGE_INTEGRATE:
@@ -399,10 +448,12 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     /* record_plan */
     case SADMM_STAGE_PUSH_CHOICE:
     case SADMM_STAGE_BLOCK_SOLVE:
+    case SADMM_STAGE_NCP_SOLVE:
     case SADMM_STAGE_CONTACTS:
     case SADMM_STAGE_ROWS:
-    /* record_finish, which reads the solution where it is */
-    case SADMM_STAGE_SOLUTION:
+    /* end_iterations */
+    case SADMM_STAGE_NCP_SOLVE_AGAIN:
+    /* record_finish */
     case SADMM_STAGE_BLOCK_SOLVE_AGAIN:
     case SADMM_STAGE_REACTIONS:
     case SADMM_STAGE_KINEMATIC:
@@ -413,11 +464,9 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_PUSH_MOTION:
     /* launch_turn and launch_commit */
     case SADMM_STAGE_KEEP: return SADMM_OK;
-    /* by the host: loads before a world is loaded, certificates of what it reads; no world with dense solves resides */
+    /* by the host: loads before a world is loaded, certificates of what it reads */
     case SADMM_STAGE_INITIALISE:
     case SADMM_STAGE_CERTIFY:
-    case SADMM_STAGE_NCP_SOLVE:
-    case SADMM_STAGE_NCP_SOLVE_AGAIN:
     case SADMM_STAGE_COUNT: return SADMM_OK;
     }
     return SADMM_OK;
@@ -445,7 +494,12 @@ sadmm_status CUDA(record_step)(struct sadmm_context *c, bool with_updates, int i
     CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
     s->into = into;
     c->recording = true;
+    const cudaStream_t main = c->stream;
     sadmm_status status = enqueue_step(c, with_updates, error);
+    if (c->stream != main) { /* it has failed within a part */
+        (void)end_part(c->stream);
+        c->stream = main;
+    }
     c->recording = false;
     s->into = next;
     cudaError_t code = cudaStreamEndCapture(c->stream, &graph);

@@ -147,7 +147,7 @@ bool CUDA(may_be_apart)(const struct sadmm_context *c)
 {
     const struct cuda_step *s = c->step;
     return s->joints > 0 && s->all_articulated && s->kinematic == 0 && c->settings.warm_start && !c->plan.residuals &&
-           !stop_rule_checked(c);
+           !stop_rule_checked(c) && !solves_ncp(c);
 }
 
 sadmm_status CUDA(speculate)(struct sadmm_context *c, struct sadmm_error *error)
@@ -175,6 +175,7 @@ sadmm_status CUDA(speculate)(struct sadmm_context *c, struct sadmm_error *error)
     TRY(tighten(c, &seen, error));
     TRY(CUDA(reserve_solver)(c, error));
     TRY(CUDA(reserve_articulations)(c, error));
+    TRY(CUDA(reserve_ncp)(c, error));
     TRY(CUDA(reserve_push)(c, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
     s->planned = true;

@@ -50,6 +50,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     CUDA(view_kinematic)(c, into);
     CUDA(view_joints)(c, into, substep);
     CUDA(view_articulations)(c);
+    CUDA(view_ncp)(c);
     CUDA(view_push)(c);
 }
 
@@ -89,6 +90,7 @@ void CUDA(step_destroy)(struct sadmm_context *c)
     for (const struct step_graphs &graphs : s->graphs)
         for (cudaGraphExec_t graph : graphs.into)
             if (graph) (void)cudaGraphExecDestroy(graph);
+    if (s->part) (void)cudaStreamDestroy(s->part);
     CUDA(destroy)(s->push);
     COLLISION(destroy)(s->collision);
     sadmm_free(s);
@@ -101,6 +103,7 @@ static sadmm_status step_create(struct sadmm_context *c, struct sadmm_error *err
     if (!s) return sadmm_fail_memory(error, "the cuda backend's world");
     c->step = s;
     TRY(COLLISION(create)(c->device, &s->collision, error));
+    CUDA_CALL(c, cudaStreamCreateWithFlags(&s->part, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     for (struct queued_step &q : s->queue)
         CUDA_CALL(c, cudaEventCreateWithFlags(&q.done, cudaEventDisableTiming), "cudaEventCreate");
     return SADMM_OK;

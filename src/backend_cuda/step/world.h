@@ -6,6 +6,7 @@
  *   queue.cu        run steps and see what became of them; repeat those whose plan did not hold
  *   read.cu         bring the world and the report back
  *   push.cu         islands that are pushed apart by a second problem
+ *   ncp_*        small islands, solved to rounding
  *   kinematic.cu, joints.cu, gears.cu, articulation.cu   kinematic bodies, joints, gears, and articulations
  */
 #ifndef SADMM_CUDA_STEP_WORLD_H
@@ -66,6 +67,13 @@ struct cuda_step {
     int32_t untouched,
         backoff; /* steps that could have been so since one could not; that it takes for it to be tried */
 
+    bool ncp_trees;             /* some of them are trees (ncp_plan.cu); */
+    int32_t ncp_blocks;         /* blocks that solve islands, */
+    size_t ncp_bytes;           /* and memory of each */
+    cudaStream_t part;          /* parts of a step with a condition are recorded on it; */
+    cudaStream_t main;          /* while such a part is recorded: what it is a part of */
+    unsigned long long some_unsolved; /* the condition of iterations in the sub-step that is recorded */
+
     bool pushes;                /* planned: islands are pushed apart, in a second problem (push.cu), */
     bool push_streams;          /* which has not fitted its partition once: tier STREAM */
     int32_t quiet;              /* but none has been for so many steps */
@@ -124,6 +132,17 @@ static inline bool takes_hits(const struct sadmm_context *c) { return c->step->h
 
 /* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
 static inline bool stop_rule_checked(const struct sadmm_context *c) { return c->fast && c->settings.tolerance > 0; }
+
+/* Of so many bodies at most small islands are solved densely: a block each, which has most of a multiprocessor. */
+enum { NCP_MOST_BODIES = 264 };
+
+/* Are small islands of worlds with joints solved before the iterations (ncp_island.h)? Where every constraint is of a
+ * part. */
+static inline bool solves_ncp(const struct sadmm_context *c)
+{
+    return c->fast && c->settings.warm_start && c->settings.ncp_points > 0 && c->step->bodies <= NCP_MOST_BODIES &&
+           c->step->articulations > 0 && c->step->all_articulated && c->step->ncp_trees;
+}
 
 /* world.cu */
 void CUDA(step_destroy)(struct sadmm_context *);
@@ -225,5 +244,18 @@ sadmm_status CUDA(launch_joint_close)(struct sadmm_context *, struct sadmm_error
 cudaError_t CUDA(joint_close_allow)(int shared_limit);
 size_t CUDA(articulation_shared_size)(void); /* of a block, beside the part's own */
 static inline bool articulations_are_small(const struct sadmm_context *c) { return c->step->articulation_bytes > 0; }
+
+struct sadmm_articulation_order;
+/* ncp_plan.cu: trees of articulations; memory; where it is. */
+sadmm_status CUDA(load_ncp)(struct sadmm_context *, int32_t first_gear, const struct sadmm_articulation_order *order,
+                            struct sadmm_error *error);
+sadmm_status CUDA(reserve_ncp)(struct sadmm_context *, struct sadmm_error *error);
+void CUDA(view_ncp)(struct sadmm_context *);
+/* ncp_solve.cu: islands, before the iterations and what is left after them; put where these begin and where the end of
+ * the step reads it. condition: of the iterations, 0: none. */
+sadmm_status CUDA(launch_ncp)(struct sadmm_context *, bool after, struct sadmm_error *error);
+sadmm_status CUDA(launch_ncp_put)(struct sadmm_context *, bool after, unsigned long long condition,
+                                  struct sadmm_error *error);
+cudaError_t CUDA(ncp_allow)(int shared_limit); /* once a device */
 
 #endif

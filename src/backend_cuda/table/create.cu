@@ -64,6 +64,7 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
     c->pdl = c->clusters && PDL_ARCH <= CLUSTER_ARCH; /* the same devices, the same code */
     CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, CUDA(articulation_allow)(c->shared_limit), "loading the kernels");
+    CUDA_CALL(c, CUDA(ncp_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, CUDA(joint_close_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");

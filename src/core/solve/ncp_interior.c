@@ -1,6 +1,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/math/cone.h"
 #include "ncp_kernels.h"
 #include "ncp_linear.h"
 
@@ -17,7 +18,7 @@ struct cone {
     double lo, hi;             /* row */
     double dual[3], step[3];   /* contact: what is orthogonal to x; row: at lo, at hi */
     double second[3];          /* what the predictor's step leaves in the second order */
-    double middle[3], size;    /* of the scaling W: W^2 = size^2 (2 m m^T - J), J = diag(1, -1, -1) */
+    struct cone_scaling by;    /* W */
     double scaled[3];          /* W^-1 x = W dual */
 };
 
@@ -32,69 +33,6 @@ struct interior {
     int32_t cones, degree;
     double gap;                /* complementarity of x and the duals, by the degree */
 };
-
-/* ---- the cone |t| <= n ---------------------------------------------------------------------------------------- */
-
-static double product(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-/* n^2 - |t|^2, without cancellation. */
-static double determinant(const double a[3])
-{
-    const double t = hypot(a[1], a[2]);
-    return (a[0] - t) * (a[0] + t);
-}
-
-/* Jordan's product. */
-static void multiply(const double a[3], const double b[3], double to[3])
-{
-    to[0] = product(a, b);
-    to[1] = a[0] * b[1] + b[0] * a[1];
-    to[2] = a[0] * b[2] + b[0] * a[2];
-}
-
-/* a times what is b? */
-static void divide(const double a[3], const double b[3], double to[3])
-{
-    to[0] = (a[0] * b[0] - a[1] * b[1] - a[2] * b[2]) / determinant(a);
-    to[1] = (b[1] - a[1] * to[0]) / a[0];
-    to[2] = (b[2] - a[2] * to[0]) / a[0];
-}
-
-/* The least t > 0 at which x + t dx is on the boundary. */
-static double way_to_boundary(const double x[3], const double dx[3])
-{
-    const double a = determinant(dx), b = x[0] * dx[0] - x[1] * dx[1] - x[2] * dx[2], c = determinant(x),
-                 under = b * b - a * c;
-    double way = dx[0] < 0 ? -x[0] / dx[0] : HUGE_VAL;
-    if (under < 0) return way;
-    const double q = -(b + copysign(sqrt(under), b));
-    if (a != 0 && q / a > 0) way = fmin(way, q / a);
-    if (q != 0 && c / q > 0) way = fmin(way, c / q);
-    return way;
-}
-
-/* W a, or W^-1 a: W = size [w_0, t^T; t, 1 + t t^T / (1 + w_0)], w = (w_0, t) the middle; t of the other sign. */
-static void apply_scaling(const struct cone *c, bool inverse, const double a[3], double to[3])
-{
-    const double sign = inverse ? -1 : 1, *w = c->middle, t = sign * (w[1] * a[1] + w[2] * a[2]),
-                 along = a[0] + t / (1 + w[0]), size = inverse ? 1 / c->size : c->size;
-    to[0] = size * (w[0] * a[0] + t);
-    to[1] = size * (a[1] + sign * w[1] * along);
-    to[2] = size * (a[2] + sign * w[2] * along);
-}
-
-/* Nesterov and Todd's: W^-1 x = W dual. False: one of the two is not inside. */
-static bool scale_cone(struct cone *c, const double x[3])
-{
-    const double a = determinant(x), b = determinant(c->dual);
-    if (!(a > 0 && b > 0 && a < HUGE_VAL && b < HUGE_VAL)) return false;
-    const double in_x = 1 / sqrt(a), in_dual = 1 / sqrt(b),
-                 twice = 2 * sqrt((1 + product(x, c->dual) * in_x * in_dual) / 2);
-    for (int k = 0; k < 3; ++k) c->middle[k] = (x[k] * in_x + (k == 0 ? 1 : -1) * c->dual[k] * in_dual) / twice;
-    c->size = sqrt(sqrt(a / b));
-    apply_scaling(c, true, x, c->scaled);
-    return true;
-}
 
 /* ---- the problem ------------------------------------------------------------------------------------------------- */
 
@@ -180,7 +118,7 @@ static void measure(struct interior *s)
         if (c->count == 3) {
             off[0] += hypot(s->y[c->at + 1], s->y[c->at + 2]);
             for (int k = 0; k < 3; ++k) off[k] -= c->dual[k];
-            s->gap += product(x, c->dual);
+            s->gap += cone_product(x, c->dual);
             continue;
         }
         off[0] -= c->dual[0] - c->dual[1];
@@ -211,32 +149,18 @@ static bool make_matrix(struct interior *s)
             if (c->hi < HUGE_VAL) M[c->at] += c->dual[1] / (c->hi - x[0]);
             continue;
         }
-        if (!scale_cone(c, x)) return false;
+        if (!cone_find_scaling(x, c->dual, &c->by, c->scaled)) return false;
         const double speed = hypot(y[1], y[2]);
         for (size_t k = 0; speed > 0 && k < n; ++k) M[k] += (y[1] * M[stride + k] + y[2] * M[2 * stride + k]) / speed;
         for (size_t r = 0; r < 3; ++r)
             for (size_t k = 0; k < 3; ++k) {
                 const double sign = (r > 0) == (k > 0) ? 1 : -1, J = r != k ? 0 : r == 0 ? 1 : -1;
-                M[r * stride + (size_t)c->at + k] += (2 * sign * c->middle[r] * c->middle[k] - J) / (c->size * c->size);
+                M[r * stride + (size_t)c->at + k] +=
+                    (2 * sign * c->by.middle[r] * c->by.middle[k] - J) / (c->by.size * c->by.size);
             }
     }
     s->d->budget -= ncp_factor_work(s->count) + 4 * (double)(all * all);
     return ncp_factor(s->M, s->pivot, s->count);
-}
-
-/* What W^-1 dx + W dstep of a cone is to be: to make the product of the two `aim`. */
-static void wanted(const struct cone *c, double aim, bool second, double to[3])
-{
-    double residual[3];
-    multiply(c->scaled, c->scaled, residual);
-    for (int k = 0; k < 3; ++k) residual[k] = (k == 0 ? aim : 0) - residual[k] - (second ? c->second[k] : 0);
-    divide(c->scaled, residual, to);
-}
-
-/* Of a row's bound, so far away: its dual's step for a step `nearer` to it. */
-static double bound_step(double aim, double second, double away, double dual, double nearer)
-{
-    return (aim - second) / away - dual + dual / away * nearer;
 }
 
 /* dx and the duals' steps towards products `aim`. Returns how much of them leads to the boundary; 0: they are
@@ -250,8 +174,8 @@ static double find_step(struct interior *s, double aim, bool second)
         const double x = s->x[c->at];
         double *right = s->dx + c->at;
         if (c->count == 3) {
-            wanted(c, aim, second, want);
-            apply_scaling(c, true, want, back);
+            cone_wanted(c->scaled, aim, second ? c->second : NULL, want);
+            cone_scale(&c->by, true, want, back);
             for (int k = 0; k < 3; ++k) right[k] += back[k];
             continue;
         }
@@ -266,11 +190,11 @@ static double find_step(struct interior *s, double aim, bool second)
         const double *x = s->x + c->at, *dx = s->dx + c->at;
         if (c->count == 3) {
             double changed[3];
-            wanted(c, aim, second, want);
-            apply_scaling(c, true, dx, changed);
+            cone_wanted(c->scaled, aim, second ? c->second : NULL, want);
+            cone_scale(&c->by, true, dx, changed);
             for (int k = 0; k < 3; ++k) want[k] -= changed[k];
-            apply_scaling(c, true, want, c->step);
-            way = fmin(way, fmin(way_to_boundary(x, dx), way_to_boundary(c->dual, c->step)));
+            cone_scale(&c->by, true, want, c->step);
+            way = fmin(way, fmin(cone_way_to_boundary(x, dx), cone_way_to_boundary(c->dual, c->step)));
             continue;
         }
         for (int side = 0; side < 2; ++side) {
@@ -295,9 +219,9 @@ static void find_second_order(struct interior *s)
             c->second[0] = dx[0] * c->step[0], c->second[1] = -dx[0] * c->step[1];
             continue;
         }
-        apply_scaling(c, true, dx, a);
-        apply_scaling(c, false, c->step, b);
-        multiply(a, b, c->second);
+        cone_scale(&c->by, true, dx, a);
+        cone_scale(&c->by, false, c->step, b);
+        cone_multiply(a, b, c->second);
     }
 }
 

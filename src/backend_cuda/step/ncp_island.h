@@ -1,0 +1,283 @@
+/* The dense contact solve (core/solve/ncp.h) on the device: an island by a thread block, in double.
+ *
+ *     bodies are nodes of trees (core/solve/articulation_tree.h), those without joints by themselves
+ *     locks and laws with compliance and without bounds are part of the trees' factor (ncp_tree.h)
+ *     contacts and all other rows are numbers of a dense problem: u = G lambda + u_free, by how the trees respond
+ *     (ncp_response.h), and laws of theirs; semismooth Newton steps find them (ncp_newton.h)
+ *
+ * Rows with bounds have numbers once their law is not met without. Every sum is made by one thread, in one order:
+ * results do not depend on how many threads a block has. */
+#ifndef SADMM_CUDA_STEP_NCP_ISLAND_H
+#define SADMM_CUDA_STEP_NCP_ISLAND_H
+
+#include "backend_cuda/device/double.h"
+#include "core/math/contact.h"
+#include "core/math/ldl6.h"
+
+enum {
+    NCP_BODIES = 128,   /* of an island, at most; */
+    NCP_PARTS = 32,     /* articulations; */
+    NCP_CONTACTS = 128, /* points; */
+    NCP_NUMBERS = 256   /* numbers of the dense problem */
+};
+
+/* What its joint leaves of a body's motion past its parent's. In the island's `pool` are directions S, U = A S, H and
+ * what it is the inverse of. */
+struct ncp_node {
+    int32_t body, parent;      /* raw; node, -1: none */
+    int32_t child, sibling;    /* nodes, -1: none */
+    int32_t level;             /* joints to the root */
+    int32_t bound;             /* its joint has rows */
+    int32_t free, pool;        /* directions; where they are in the pool: 6 free, 6 free, free^2, free^2 */
+    int32_t first_row, rows;
+    int32_t first_joint, joints; /* of v.ncp.joints */
+    int32_t locks[2], lock[6]; /* translations, then rotations: rows */
+    double offset[3];          /* from the parent's centre of mass */
+    struct cuda_articulation_body own;
+    double M[36];              /* A, then what it hands on to its parent */
+    double met[6], held[6];    /* s, which meets the locks; A s */
+    double load[6], up[6];     /* on the way to the root; what is handed on */
+    double q[6], velocity[6];
+};
+
+struct ncp_contact {
+    int32_t pair, point;
+    int32_t node[2];    /* -1: not dynamic */
+    double frame[9];    /* normal, tangents */
+    double arm[2][3];
+    double given[3];    /* velocity of what is not dynamic, and e */
+};
+
+enum ncp_role { NCP_LOCK, NCP_SOFT, NCP_BOUNDED, NCP_FIXED };
+
+struct ncp_row {
+    int32_t slot, side; /* in v.raw.rows; of the node's body */
+    int32_t node;       /* whose joint it is of, -1: it acts by its Jacobians on both sides (gears) */
+    int32_t role;
+    int32_t along;      /* where S^T J^T is in the pool */
+    int32_t number;     /* of the dense problem; -1: none */
+    double jacobian[6]; /* on the node's body */
+    double gain, bias, compliance, lo, hi;
+    double lambda, u;   /* multiplier; gain x + bias + compliance lambda */
+    double response;    /* what the natural map takes u to lambda by */
+};
+
+/* A law of the dense problem: a contact's three numbers, or a row's one. */
+struct ncp_law {
+    int32_t first, count;
+    int32_t of;         /* contact, or row */
+    double response, friction, lo, hi;
+    double gain, compliance; /* of its numbers in G: 1, 0 of contacts */
+};
+
+/* Memory of a block: its own first, then what is far. */
+struct ncp_memory {
+    char *at, *end, *far_at, *far_end;
+    bool full;
+};
+template <class T> static __device__ __forceinline__ T *take(ncp_memory *memory, size_t count)
+{
+    const size_t bytes = (count * sizeof(T) + 15) / 16 * 16;
+    char *out = memory->at;
+    if (out + bytes <= memory->end) {
+        memory->at += bytes;
+        return (T *)out;
+    }
+    out = memory->far_at;
+    if (out + bytes > memory->far_end) {
+        memory->full = true;
+        return (T *)memory->far_end; /* nobody uses it */
+    }
+    memory->far_at += bytes;
+    return (T *)out;
+}
+
+struct ncp_island {
+    int32_t label, first_slot, bodies, contacts, rows, first_gear, levels; /* rows of gears come last */
+    ncp_node *node;
+    ncp_contact *contact;
+    ncp_row *row;
+    double *pool;
+    /* of contacts x 3: impulses along their frames */
+    double *impulse;
+    /* the dense problem */
+    int32_t laws, numbers;
+    ncp_law *law;
+    double *lambda, *u, *free, *step, *moved, *best_lambda, *best_u, *D;
+    int32_t *list, *pivot;
+    double *G, *M;
+};
+
+/* What the block's threads share. */
+struct ncp_shared {
+    unsigned long long most;
+    int32_t flag, count, pivot;
+    int32_t of[NCP_BODIES], at[NCP_BODIES]; /* by body of the island */
+    int32_t parts, part[NCP_PARTS];         /* of the island */
+};
+
+/* Calls f(k) for k < count, by a thread each. */
+template <class F> static __device__ __forceinline__ void each(int32_t count, const F &f)
+{
+#pragma unroll 1
+    for (int32_t k = (int32_t)threadIdx.x; k < count; k += (int32_t)blockDim.x) f(k);
+}
+
+/* Eight lanes a node of a level; f(node, lane), lanes below 6. */
+template <class F>
+static __device__ __forceinline__ void each_lane(const ncp_island &s, int32_t level, const F &f)
+{
+    each(s.bodies * LANES, [&](int32_t t) {
+        ncp_node *node = &s.node[t / LANES];
+        if (node->level == level && t % LANES < 6) f(node, t % LANES);
+    });
+    __syncthreads();
+}
+template <class F>
+static __device__ __forceinline__ void each_node(const ncp_island &s, int32_t level, const F &f)
+{
+    each(s.bodies, [&](int32_t n) {
+        if (s.node[n].level == level) f(&s.node[n]);
+    });
+    __syncthreads();
+}
+
+/* *at = of[0] + ... before each of `count`; returns the sum. */
+static __device__ __forceinline__ int32_t add_up(int32_t count, const int32_t *of, int32_t *at, int32_t *sum)
+{
+    __syncthreads();
+    if (threadIdx.x == 0) {
+        int32_t total = 0;
+        for (int32_t k = 0; k < count; ++k) {
+            const int32_t own = of[k];
+            at[k] = total;
+            total += own;
+        }
+        *sum = total;
+    }
+    __syncthreads();
+    const int32_t out = *sum;
+    __syncthreads();
+    return out;
+}
+
+/* The largest of all threads' numbers, none of which is negative; what is not a number is the most. */
+static __device__ __forceinline__ double most_of(double own, ncp_shared *shared)
+{
+    __syncthreads();
+    if (threadIdx.x == 0) shared->most = 0;
+    __syncthreads();
+    if (!(own <= 0)) atomicMax(&shared->most, (unsigned long long)__double_as_longlong(fabs(own)));
+    __syncthreads();
+    return __longlong_as_double((long long)shared->most);
+}
+static __device__ __forceinline__ bool any_of(bool own, ncp_shared *shared)
+{
+    __syncthreads();
+    if (threadIdx.x == 0) shared->flag = 0;
+    __syncthreads();
+    if (own) shared->flag = 1;
+    __syncthreads();
+    return shared->flag != 0;
+}
+
+/* ---- small products ---------------------------------------------------------------------------------------------- */
+
+static __device__ __forceinline__ double along(int n, const double *a, const double *b)
+{
+    double sum = 0;
+    for (int k = 0; k < n; ++k) sum += a[k] * b[k];
+    return sum;
+}
+
+/* X v: a velocity at a place r further on; p + X^T of a load there. */
+static __device__ __forceinline__ void carry(const double r[3], const double v[6], double to[6])
+{
+    for (int k = 0; k < 6; ++k) to[k] = v[k];
+    add_cross(v + 3, r, 1, to);
+}
+static __device__ __forceinline__ void add_load(const double r[3], const double p[6], double to[6])
+{
+    for (int k = 0; k < 6; ++k) to[k] += p[k];
+    add_cross(r, p, 1, to + 3);
+}
+
+static __device__ __forceinline__ double *directions_of(const ncp_island &s, const ncp_node &node)
+{
+    return s.pool + node.pool;
+}
+static __device__ __forceinline__ double *forces_of(const ncp_island &s, const ncp_node &node)
+{
+    return s.pool + node.pool + 6 * node.free;
+}
+static __device__ __forceinline__ double *inverse_of(const ncp_island &s, const ncp_node &node)
+{
+    return s.pool + node.pool + 12 * node.free;
+}
+static __device__ __forceinline__ double *stiffness_of(const ncp_island &s, const ncp_node &node)
+{
+    return s.pool + node.pool + node.free * (12 + node.free);
+}
+
+/* Does it hand anything on? */
+static __device__ __forceinline__ bool is_carried(const ncp_node &node) { return node.parent >= 0 && node.bound; }
+
+/* The node of a body; of a side of a gear. */
+static __device__ __forceinline__ int32_t node_of_body(const cuda_view &v, int32_t body)
+{
+    return body >= 0 ? v.ncp.number[body] : -1;
+}
+static __device__ __forceinline__ int32_t side_of_gear(const cuda_view &v, int32_t slot, int side)
+{
+    const struct sadmm_row_constraint *constraint = &v.raw.constraints[slot / SADMM_MAX_ROWS];
+    return node_of_body(v, side ? constraint->body_b : constraint->body_a);
+}
+
+/* ---- bodies and rows --------------------------------------------------------------------------------------------- */
+
+static __device__ __forceinline__ mat3 inertia_of(const struct cuda_articulation_body &body)
+{
+    mat3 inertia;
+    inertia.r[0] = v3(body.inertia[0], body.inertia[3], body.inertia[4]);
+    inertia.r[1] = v3(body.inertia[3], body.inertia[1], body.inertia[5]);
+    inertia.r[2] = v3(body.inertia[4], body.inertia[5], body.inertia[2]);
+    return inertia;
+}
+
+/* Of a row: J A^-1 J^T. */
+static __device__ __forceinline__ double own_response(const struct cuda_articulation_body &body, const double row[6])
+{
+    const vec3 turn = v3_load(row + 3);
+    return v3_norm2(v3_load(row)) / body.mass + v3_dot(turn, m3_solve(inertia_of(body), turn));
+}
+
+/* x of a row: its body's velocity less what its parent takes it along with, or both sides'. */
+static __device__ __forceinline__ double rate_of(const cuda_view &v, const ncp_island &s, const ncp_row &row)
+{
+    double held[6] = {0, 0, 0, 0, 0, 0}, x = 0;
+    if (row.node >= 0) {
+        const ncp_node &node = s.node[row.node];
+        if (node.parent >= 0) carry(node.offset, s.node[node.parent].velocity, held);
+        for (int k = 0; k < 6; ++k) held[k] = node.velocity[k] - held[k];
+        return six_product(row.jacobian, held);
+    }
+    for (int side = 0; side < 2; ++side) {
+        const int32_t n = side_of_gear(v, row.slot, side);
+        if (n >= 0) x += six_product(v.raw.rows[row.slot].jacobian[side], s.node[n].velocity);
+    }
+    return x;
+}
+
+static __device__ __forceinline__ void contact_row(const ncp_contact &c, int i, int side, double row[6])
+{
+    sadmm_contact_row(v3_load(c.frame + 3 * i), c.arm[side], side ? 1 : -1, row);
+}
+
+/* The law of a number, and which of its numbers it is. */
+static __device__ __forceinline__ int32_t law_of(const ncp_island &s, int32_t number, int *k)
+{
+    *k = number < 3 * s.contacts ? number % 3 : 0;
+    return number < 3 * s.contacts ? number / 3 : number - 2 * s.contacts;
+}
+
+#endif

@@ -1,0 +1,233 @@
+/* The solution of an island: impulses of contacts, multipliers of rows and velocities (core/solve/ncp_solve.c). */
+#ifndef SADMM_CUDA_STEP_NCP_SEARCH_H
+#define SADMM_CUDA_STEP_NCP_SEARCH_H
+
+#include "ncp_interior.h"
+#include "ncp_load.h"
+#include "ncp_response.h"
+
+/* As in core/solve/ncp_solve.c: contacts that cannot be met give by this share of their response; a solution of so many
+ * times the energy that is expected is held against that of contacts that give; the regularisation of contacts, m/s, of
+ * the one with the largest load. */
+#define NCP_GIVES 1e-2
+#define NCP_MOST_ENERGY 10
+#define NCP_REGULARISATION 3e-12
+
+/* How often rows that are not met without one get a number, in one solve. */
+enum { NCP_ROUNDS = 8 };
+
+/* ---- the dense problem ------------------------------------------------------------------------------------------- */
+
+static __device__ void find_contact_velocity(const ncp_island &s, int32_t i, double u[3])
+{
+    const ncp_contact *c = &s.contact[i];
+    for (int k = 0; k < 3; ++k) {
+        double row[6];
+        u[k] = c->given[k];
+        for (int side = 0; side < 2; ++side) {
+            if (c->node[side] < 0) continue;
+            contact_row(*c, k, side, row);
+            u[k] += six_product(row, s.node[c->node[side]].velocity);
+        }
+    }
+}
+
+/* Has a row to get a number? Where it is not met without one, or is not at a bound. */
+static __device__ __forceinline__ bool asks_for_number(const ncp_row &row)
+{
+    if (row.role != NCP_BOUNDED || row.number >= 0) return false;
+    const double to = articulation_clamp(row.lambda - row.u / row.response, row.lo, row.hi);
+    const bool at_bound = row.lambda == row.lo || row.lambda == row.hi;
+    return !at_bound || !(fabs(row.lambda - to) * row.response <= NCP_ENOUGH / 10);
+}
+
+/* Rows that ask for numbers get them, in their order. Did any? */
+static __device__ bool number_rows(ncp_island *s, ncp_shared *shared)
+{
+    const int32_t before = s->laws;
+    if (threadIdx.x < WARP) {
+        int32_t laws = before;
+        for (int32_t first = 0; first < s->rows; first += WARP) {
+            const int32_t r = first + (int32_t)threadIdx.x;
+            const bool asks = r < s->rows && asks_for_number(s->row[r]);
+            const unsigned lanes = __ballot_sync((unsigned)ALL_LANES, asks);
+            if (asks) {
+                ncp_row *row = &s->row[r];
+                const int32_t law = laws + __popc(lanes & ((1u << threadIdx.x) - 1));
+                row->number = law + 2 * s->contacts;
+                s->law[law] = {row->number, 1, r, row->response, 0, row->lo, row->hi, row->gain, row->compliance};
+            }
+            laws += __popc(lanes);
+        }
+        if (threadIdx.x == 0) shared->count = laws;
+    }
+    __syncthreads();
+    s->laws = shared->count;
+    s->numbers = 2 * s->contacts + s->laws;
+    __syncthreads();
+    return s->laws > before;
+}
+
+/* Memory of the dense problem. */
+static __device__ bool take_numbers(ncp_island *s, ncp_memory *memory)
+{
+    const size_t n = (size_t)s->numbers;
+    s->lambda = take<double>(memory, n);
+    s->u = take<double>(memory, n);
+    s->step = take<double>(memory, n);
+    s->moved = take<double>(memory, n);
+    s->best_lambda = take<double>(memory, n);
+    s->best_u = take<double>(memory, n);
+    s->D = take<double>(memory, 9 * (size_t)s->laws);
+    s->list = take<int32_t>(memory, n);
+    s->pivot = take<int32_t>(memory, n);
+    s->G = take<double>(memory, n * n);
+    return !memory->full;
+}
+
+/* lambda as it is; u by the velocities. */
+static __device__ void load_numbers(const ncp_island &s)
+{
+    each(s.contacts, [&](int32_t i) {
+        for (int k = 0; k < 3; ++k) s.lambda[3 * i + k] = s.impulse[3 * i + k];
+        find_contact_velocity(s, i, s.u + 3 * i);
+    });
+    each(s.laws - s.contacts, [&](int32_t i) {
+        const ncp_row *row = &s.row[s.law[s.contacts + i].of];
+        s.lambda[row->number] = row->lambda;
+        s.u[row->number] = row->u;
+    });
+    __syncthreads();
+}
+
+/* Impulses and multipliers are what has been found. */
+static __device__ void store_numbers(const ncp_island &s)
+{
+    each(s.numbers, [&](int32_t n) {
+        if (n < 3 * s.contacts) s.impulse[n] = s.lambda[n];
+        else s.row[s.law[n - 2 * s.contacts].of].lambda = s.lambda[n];
+    });
+    __syncthreads();
+}
+
+/* Contacts give by a share of their response. sign: it is added, or taken off again. */
+static __device__ void regularise(const ncp_island &s, double share, double sign)
+{
+    each(3 * s.contacts, [&](int32_t n) {
+        const double more = sign * share * s.law[n / 3].response;
+        s.G[n * s.numbers + n] += more;
+        s.u[n] += more * s.lambda[n];
+    });
+    __syncthreads();
+}
+
+/* That of the contact with the largest load is NCP_REGULARISATION, m/s, by any of them. */
+static __device__ double regularisation_of(const ncp_island &s, ncp_shared *shared)
+{
+    double own = 0;
+    each(3 * s.contacts, [&](int32_t n) { own = fmax(own, s.law[n / 3].response * fabs(s.impulse[n])); });
+    const double most = most_of(own, shared);
+    return NCP_REGULARISATION < most ? NCP_REGULARISATION / most : 0;
+}
+
+/* The natural map of all laws, of contacts that give by `share`. */
+static __device__ double map_of_all(const ncp_island &s, double share, ncp_shared *shared)
+{
+    double own = 0;
+    each(s.contacts, [&](int32_t i) {
+        double u[3];
+        find_contact_velocity(s, i, u);
+        for (int k = 0; k < 3; ++k) u[k] += share * s.law[i].response * s.impulse[3 * i + k];
+        const double map = natural_map_of(s.law[i], s.impulse + 3 * i, u);
+        if (!(map <= own)) own = map;
+    });
+    each(s.rows, [&](int32_t r) {
+        const ncp_row *row = &s.row[r];
+        if (row->role != NCP_BOUNDED) return;
+        const ncp_law law = {0, 1, r, row->response, 0, row->lo, row->hi, row->gain, row->compliance};
+        const double map = natural_map_of(law, &row->lambda, &row->u);
+        if (!(map <= own)) own = map;
+    });
+    return most_of(own, shared);
+}
+
+/* ---- the search -------------------------------------------------------------------------------------------------- */
+
+/* From where impulses and multipliers are. gives: contacts do. Returns the natural map of what is found. */
+static __device__ double search(const cuda_view &v, ncp_island *s, const ncp_memory &memory, bool gives,
+                                ncp_shared *shared)
+{
+    const double share = gives ? NCP_GIVES : regularisation_of(*s, shared);
+    double map = INFINITY;
+    solve_trees(v, *s);
+#pragma unroll 1
+    for (int round = 0; round < NCP_ROUNDS; ++round) {
+        const bool more = number_rows(s, shared);
+        map = map_of_all(*s, gives ? share : 0, shared);
+        if (!(map > NCP_ENOUGH / 10) || s->numbers > NCP_NUMBERS || (round > 0 && !more && !(map > NCP_ENOUGH)))
+            return map;
+        ncp_memory left = memory;
+        ncp_ways ways;
+        if (!take_numbers(s, &left)) return INFINITY;
+        const ncp_memory before = left;
+        if (!lay_ways(v, *s, &left, &ways, shared)) return INFINITY;
+        find_responses(v, *s, ways);
+        left = before; /* ways are not needed any more */
+        s->M = take<double>(&left, (size_t)s->numbers * (size_t)(s->numbers + 1));
+        if (left.full) return INFINITY;
+        load_numbers(*s);
+        regularise(*s, share, 1);
+        if (!(take_steps(*s, NCP_FROM_START, shared) <= NCP_ENOUGH)) {
+            (void)go_inside(*s, left, shared);
+            (void)take_steps(*s, NCP_FROM_INSIDE, shared);
+        }
+        store_numbers(*s);
+        solve_trees(v, *s);
+    }
+    return map_of_all(*s, gives ? share : 0, shared);
+}
+
+/* From nothing. */
+static __device__ void forget(ncp_island *s)
+{
+    each(3 * s->contacts, [&](int32_t n) { s->impulse[n] = 0; });
+    each(s->rows, [&](int32_t r) {
+        ncp_row *row = &s->row[r];
+        if (row->role == NCP_BOUNDED) row->lambda = articulation_clamp(0, row->lo, row->hi);
+    });
+    __syncthreads();
+}
+
+/* Twice the energy of the island's motion; what forces alone, and all at the speed of corrections, would give it. */
+static __device__ void find_energies(const cuda_view &v, const ncp_island &s, double *now, double *expected)
+{
+    const double speed = v.model.settings->correction_speed;
+    each(s.bodies, [&](int32_t n) {
+        ncp_node *node = &s.node[n];
+        const double *w = node->velocity + 3, *I = node->own.inertia;
+        node->up[0] = node->own.mass * dot3(node->velocity, node->velocity) +
+                      w[0] * (I[0] * w[0] + I[3] * w[1] + I[4] * w[2]) +
+                      w[1] * (I[3] * w[0] + I[1] * w[1] + I[5] * w[2]) +
+                      w[2] * (I[4] * w[0] + I[5] * w[1] + I[2] * w[2]);
+        const vec3 moved = v3_scale(v3_load(node->own.b), 1 / node->own.mass), turn = v3_load(node->own.b + 3);
+        node->up[1] = node->own.mass * (v3_norm2(moved) + speed * speed) +
+                      v3_dot(turn, m3_solve(inertia_of(node->own), turn));
+    });
+    __syncthreads();
+    *now = *expected = 0;
+    for (int32_t n = 0; n < s.bodies; ++n) *now += s.node[n].up[0], *expected += s.node[n].up[1];
+    __syncthreads();
+}
+
+/* Is it solved? By impulses, multipliers and velocities as they are then. */
+static __device__ bool search_all(const cuda_view &v, ncp_island *s, const ncp_memory &memory, ncp_shared *shared)
+{
+    double now, expected;
+    const bool solved = search(v, s, memory, false, shared) <= NCP_ENOUGH;
+    find_energies(v, *s, &now, &expected);
+    if (solved && now <= NCP_MOST_ENERGY * expected) return true;
+    forget(s);
+    return search(v, s, memory, true, shared) <= NCP_ENOUGH;
+}
+
+#endif

@@ -1,0 +1,224 @@
+/* The dense contact solve on the device (ncp_island.h): small islands before the iterations, and those that are not
+ * solved then once more after them. What is found is kept apart, and put where the end of the step reads it. */
+#include <algorithm>
+
+#include "backend_cuda/device/double.h"
+
+#include "backend_cuda/assemble/body.h"
+#include "backend_cuda/device/condition.h"
+#include "backend_cuda/device/plan_check.h"
+#include "world.h"
+#include "ncp_search.h"
+
+enum { NCP_THREADS = 256 };
+
+/* Are all islands left to the iterations? Where some are seen from their supports, or are pushed apart. */
+static __device__ __forceinline__ bool is_left(const cuda_view &v)
+{
+    return v.model.live->abort_code || is_supported(v) || (v.push.planned && v.push.due[PUSH_DUE]);
+}
+
+/* ---- islands ----------------------------------------------------------------------------------------------------- */
+
+static __device__ void store_island(const cuda_view &v, const ncp_island &s)
+{
+    each(s.bodies * LANES, [&](int32_t t) {
+        if (t % LANES < 6)
+            v.joints.velocity[6 * (size_t)s.node[t / LANES].body + (size_t)(t % LANES)] =
+                s.node[t / LANES].velocity[t % LANES];
+    });
+    each(s.contacts, [&](int32_t i) {
+        const ncp_contact *c = &s.contact[i];
+        for (int k = 0; k < 3; ++k)
+            v.ncp.impulse[3 * (size_t)c->point + (size_t)k] = c->frame[k] * s.impulse[3 * i] +
+                                                              c->frame[3 + k] * s.impulse[3 * i + 1] +
+                                                              c->frame[6 + k] * s.impulse[3 * i + 2];
+    });
+    store_locks(v, s);
+    __syncthreads();
+}
+
+/* Does any body have another inertia by the forces that have been found? */
+static __device__ bool stiffen_island(const cuda_view &v, const ncp_island &s, ncp_shared *shared)
+{
+    bool any = false;
+    each(s.bodies, [&](int32_t n) {
+        const int32_t body = s.node[n].body;
+        if (v.ncp.part_of[body] < 0 || !stiffen_body(v, body, true)) return;
+        s.node[n].own = v.joints.bodies[body] = stiffened_body(v, body);
+        any = true;
+    });
+    return any_of(any, shared);
+}
+
+static __device__ bool solve_island(const cuda_view &v, ncp_island *s, ncp_memory memory, bool after,
+                                    ncp_shared *shared)
+{
+    if (!make_nodes(v, s, &memory, shared) || !make_rows(v, s, &memory, after, shared)) return false;
+    if (!make_contacts(v, s, &memory, after, shared)) return false;
+#pragma unroll 1
+    for (int turn = 0; turn < 2; ++turn) {
+        s->laws = s->contacts;
+        s->numbers = 3 * s->contacts;
+        each(s->rows, [&](int32_t r) { s->row[r].number = -1; });
+        factor_trees(*s);
+        if (!search_all(v, s, memory, shared)) return false;
+        store_island(v, *s);
+        if (after || turn > 0 || !stiffen_island(v, *s, shared)) break;
+    }
+    return true;
+}
+
+/* Blocks take islands in turn. args.count: after the iterations. */
+static __global__ void __launch_bounds__(NCP_THREADS)
+    ncp_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    CUDA_DYNAMIC_SHARED(dynamic);
+    ncp_shared *shared = (ncp_shared *)dynamic;
+    pdl_wait();
+    if (is_left(v)) return;
+    const int32_t islands = *v.ncp.count;
+#pragma unroll 1
+    for (int32_t k = (int32_t)blockIdx.x; k < islands; k += (int32_t)gridDim.x) {
+        ncp_island s;
+        ncp_memory memory;
+        char *far = v.ncp.memory + (size_t)blockIdx.x * v.ncp.bytes;
+        s.label = v.ncp.islands[k];
+        if (args.count && v.ncp.solved[s.label]) continue;
+        s.first_slot = v.graph.slot_of[s.label];
+        s.bodies = v.graph.island_bodies[s.label];
+        memory.at = (char *)(shared + 1);
+        memory.end = (char *)dynamic + args.cluster;
+        memory.far_at = far;
+        memory.far_end = far + v.ncp.bytes;
+        memory.full = false;
+        const bool solved = solve_island(v, &s, memory, args.count != 0, shared);
+        __syncthreads();
+        if (threadIdx.x > 0) continue;
+        v.ncp.solved[s.label] = solved;
+        if (solved && args.checks > 0 && v.islands.info[s.label].stopped == 0) /* a check has counted it */
+            atomicAdd(&v.islands.stop->unmet[args.checks % CHECKS_KEPT], -1);
+    }
+}
+
+/* Islands that there are, in no order. Bodies that nothing touches are by themselves. */
+static __global__ void begin_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    pdl_wait_if(all_pdl(v.model.bodies));
+    const int32_t i = thread_index();
+    if (i >= v.model.bodies || v.model.live->abort_code) return;
+    const int32_t slot = v.graph.slot_of[i];
+    const bool touched = v.graph.offsets[slot] < v.graph.offsets[slot + 1];
+    v.ncp.solved[i] = !touched && !is_left(v);
+    if (!touched) {
+        const struct cuda_articulation_body body = v.joints.bodies[i];
+        const vec3 turn = m3_solve(inertia_of(body), v3_load(body.b + 3));
+        for (int k = 0; k < 3; ++k) v.joints.velocity[6 * (size_t)i + (size_t)k] = body.b[k] / body.mass;
+        v3_store(turn, v.joints.velocity + 6 * (size_t)i + 3);
+    } else if (v.graph.label[i] == i && v.graph.island_bodies[i] <= NCP_BODIES) {
+        v.ncp.islands[atomicAdd(v.ncp.count, 1)] = i;
+    }
+}
+
+/* ---- where the step reads it ------------------------------------------------------------------------------------- */
+
+static __device__ __forceinline__ void put_velocity(const cuda_view &v, int32_t i)
+{
+    for (int k = 0; k < 6; ++k)
+        v.bodies.state[(size_t)i * ROW + (size_t)k] = (solver_real)v.joints.velocity[6 * (size_t)i + (size_t)k];
+    if (v.graph.label[i] != i || !v.islands.info) return;
+    v.islands.info[i].slow_down = 1; /* its energy and its momentum are right */
+    v.islands.info[i].anchored = 1;
+}
+
+static __device__ __forceinline__ void put_pair(const cuda_view &v, int32_t p)
+{
+    const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
+    if (!is_solved(v, pair->body_a >= 0 ? pair->body_a : pair->body_b)) return;
+    for (int32_t k = 0; k < pair->count && k < v.contacts.point_slots; ++k)
+        for (int j = 0; j < 3; ++j)
+            v.contacts.lambda[(size_t)j * v.contacts.lambda_stride + point_slot(v.contacts, p, k)] =
+                (solver_real)v.ncp.impulse[3 * (size_t)(pair->first + k) + (size_t)j];
+}
+
+static __device__ __forceinline__ void put_constraint(const cuda_view &v, int32_t i)
+{
+    const struct sadmm_row_constraint *constraint = &v.raw.constraints[i];
+    const int32_t body = constraint->body_a >= 0 ? constraint->body_a : constraint->body_b;
+    if (constraint->count == 0 || body < 0 || !is_solved(v, body)) return;
+    for (int32_t r = 0; r < constraint->count; ++r) {
+        const size_t at = (size_t)i * SADMM_MAX_ROWS + (size_t)r;
+        v.rows.data[at].lambda = (solver_real)v.joints.solution[at];
+    }
+}
+
+/* A thread a body, then a pair, then a constraint. args.count: after the iterations. */
+static __global__ void put_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    pdl_wait_if(all_pdl(v.model.bodies));
+    int32_t i = thread_index();
+    if (v.model.live->abort_code) return;
+    if (i < v.model.bodies) {
+        if (!is_solved(v, i)) {
+            if (!args.count) *v.ncp.unsolved = 1;
+            return;
+        }
+        put_velocity(v, i);
+        return;
+    }
+    i -= v.model.bodies;
+    if (i < v.contacts.pair_capacity) {
+        if (i < live_pairs(v.model)) put_pair(v, i);
+        return;
+    }
+    i -= v.contacts.pair_capacity;
+    if (i < v.rows.count) put_constraint(v, i);
+}
+
+/* Are there iterations to be done? */
+static __global__ void ask_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    pdl_wait_if(all_pdl(v.model.bodies));
+    if (thread_index() == 0) set_condition(args.condition, *v.ncp.unsolved != 0 && !v.model.live->abort_code);
+}
+
+/* ---- launches ---------------------------------------------------------------------------------------------------- */
+
+/* Bytes of a block's own memory: two blocks fit on a multiprocessor. */
+enum { NCP_SHARED = 104 * 1024 };
+
+sadmm_status CUDA(launch_ncp)(struct sadmm_context *c, bool after, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    struct cuda_partition blocks = {};
+    if (!after) {
+        CUDA_CALL(c, cudaMemsetAsync(c->view.ncp.count, 0, 2 * sizeof(int32_t), c->stream), "cudaMemsetAsync(islands)");
+        TRY(CUDA(launch)(c, begin_kernel, "islands to be solved", blocks_for(c->view.model.bodies), &args, error));
+    }
+    args.count = after;
+    args.checks = after ? c->checks : 0;
+    args.cluster = std::min((int)NCP_SHARED, c->shared_limit);
+    blocks.parts = c->step->ncp_blocks;
+    blocks.cluster = 1;
+    blocks.threads = NCP_THREADS;
+    blocks.shared = (size_t)args.cluster;
+    return CUDA(launch_partition)(c, ncp_kernel, "dense contact solve", &blocks, &args, error);
+}
+
+sadmm_status CUDA(launch_ncp_put)(struct sadmm_context *c, bool after, unsigned long long condition,
+                                  struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.count = after;
+    const int64_t threads = (int64_t)c->view.model.bodies + c->view.contacts.pair_capacity + c->view.rows.count;
+    TRY(CUDA(launch)(c, put_kernel, "solved islands", blocks_for(threads), &args, error));
+    if (!condition) return SADMM_OK;
+    args.condition = condition;
+    return CUDA(launch)(c, ask_kernel, "islands that are left", 1, &args, error);
+}
+
+cudaError_t CUDA(ncp_allow)(int shared_limit)
+{
+    return cudaFuncSetAttribute((const void *)ncp_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                std::min((int)NCP_SHARED, shared_limit));
+}

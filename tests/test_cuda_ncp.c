@@ -1,0 +1,90 @@
+/* The dense contact solve on the device: islands of worlds with joints are solved to rounding there, without
+ * iterations, and as the host solves them. */
+#include "cuda_worlds.h"
+#include "fewer.h"
+
+/* Scenes whose islands are trees of joints with contacts, the steps of them from which on they are compared, and how
+ * many points an island may have: of 8 some ragdolls have more, and iterate beside others. */
+static const struct {
+    const char *name;
+    int from, steps, points;
+} cases[] = {{"ragdolls:1", 95, 6, 128},
+             {"ragdolls:2", 130, 3, 128},
+             {"ragdolls:2", 130, 2, 8},
+             {"grippers:2", 60, 4, 128},
+             {"grippers:40", 110, 2, 128},
+             {"chain:4", 10, 4, 128}};
+enum { CASES = sizeof cases / sizeof *cases };
+
+static sadmm_world *scene_world(const char *name, int points, int precision)
+{
+    struct sadmm_scene scene = open_scene(name);
+    scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.precision = (sadmm_precision)precision;
+    scene.def.settings.method = SADMM_METHOD_FAST;
+    scene.def.settings.threads = 1;
+    scene.def.settings.certify = true;
+    scene.def.settings.ncp_points = points;
+    return build_scene(&scene);
+}
+
+/* One step by each from the same state: velocities, impulses. The bound: both are within 1e-9 m/s of the laws, and what
+ * passes on forces through light links is worse by what these are lighter. */
+static void expect_same_step(sadmm_world *host, sadmm_world *device, const char *name, int step)
+{
+    double apart = 0;
+    for (int32_t i = 0; i < sadmm_world_body_count(host); ++i) {
+        const sadmm_body_state a = body_state(host, body_at(host, i)), b = body_state(device, body_at(device, i));
+        for (int k = 0; k < 3; ++k) {
+            apart = fmax(apart, fabs(a.linear_velocity[k] - b.linear_velocity[k]));
+            apart = fmax(apart, fabs(a.angular_velocity[k] - b.angular_velocity[k]));
+        }
+    }
+    ck_assert_msg(apart <= 1e-7, "%s, step %d: velocities are %g apart", name, step, apart);
+}
+
+/* `to` becomes what `from` is. */
+static void copy_world(sadmm_world *from, sadmm_world *to)
+{
+    size_t size;
+    MUST(from, sadmm_world_save(from, NULL, 0, &size));
+    void *bytes = malloc(size);
+    ck_assert_ptr_nonnull(bytes);
+    MUST(from, sadmm_world_save(from, bytes, size, &size));
+    MUST(to, sadmm_world_restore(to, bytes, size));
+    free(bytes);
+}
+
+START_TEST(islands_are_solved_as_by_the_host)
+{
+    const int which = _i / tested_precisions(), precision = _i % tested_precisions(), points = cases[which].points;
+    const char *name = cases[which].name;
+    sadmm_world *host = scene_world(name, points, precision), *device = scene_world(name, points, precision);
+    int solved = 0;
+    step_world(host, cases[which].from);
+    copy_world(host, device);
+    use_device(device, precision, 0);
+    for (int step = 0; step < cases[which].steps; ++step) {
+        step_world(device, 1);
+        step_world(host, 1);
+        ck_assert(device->resident.loaded); /* it was the device that made it */
+        const sadmm_step_report report = world_report(device);
+        solved += report.iterations == 0;
+        if (points < 128) continue;
+        ck_assert_msg(report.certificate.ncp_max <= 1e-8, "%s, step %d: natural map %g, %d iterations", name, step,
+                      report.certificate.ncp_max, report.iterations);
+        expect_same_step(host, device, name, step);
+    }
+    ck_assert_msg(solved == (points < 128 ? 0 : cases[which].steps), "%s: %d steps without iterations", name, solved);
+    sadmm_world_destroy(host);
+    sadmm_world_destroy(device);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("cuda_ncp");
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
+    ADD_CASE(suite, islands_are_solved_as_by_the_host, 0, CASES * tested_precisions());
+    return run_cuda_suite(suite);
+}
