@@ -358,7 +358,7 @@ def test_sessions_run_by_the_clock_and_begin_again():
     assert session.advance(10 * dt, 1.0) == 5
     session.running = False
     assert session.advance(1.0, 1.0) == 0
-    session.change(method="paper", iterations=77)
+    session.change(method="paper", iterations=77, tolerance=0.0, ncp_points=0)
     session.step()
     assert session.world.report.iterations == 77 and session.steps == 110 and len(session.history["ms"]) == 110
     with pytest.raises(subadmm.InvalidArgument):

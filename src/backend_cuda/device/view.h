@@ -353,8 +353,8 @@ struct push_view {
     struct sadmm_contact_point *contacts;
 };
 
-/* Trees of a part (step/ncp_plan.cu): its nodes, 0: it is none; where they begin in ncp_view.nodes. Its gears' constraints
- * are in ncp_view.joints. */
+/* Trees of a part (step/ncp_plan.cu): its nodes, 0: it is none; where they begin in ncp_view.nodes. Its gears'
+ * constraints are in ncp_view.joints. */
 struct cuda_ncp_part {
     int32_t nodes, first, levels, first_gear, gears;
 };
