@@ -7,11 +7,11 @@
 #include <string.h>
 
 #include "cuda_suite.h"
+#include "fixed_work.h"
 #include "runner.h"
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
-#include "fixed_work.h"
 #define CUDA(name) sadmm_cuda_##name##_emulated_f32
 #include "backend_cuda/device/entries.h"
 #undef CUDA
