@@ -324,8 +324,8 @@ static __device__ double go_inside(const ncp_island &s, ncp_memory memory, ncp_s
     for (int step = 0, brief = 0;; ++step) {
         measure_interior(s, &p, shared);
         const double map = natural_map(s, shared);
-        if (!(map > NCP_AIM && map < INFINITY) || step == NCP_MOST_STEPS || brief == NCP_MOST_SHORT ||
-            p.complementarity < NCP_LEAST_PRODUCT * size * size)
+        if (!(map > NCP_AIM && map < INFINITY) || step == affordable_steps(NCP_MOST_STEPS, p.count) ||
+            brief == NCP_MOST_SHORT || p.complementarity < NCP_LEAST_PRODUCT * size * size)
             return map;
         const double way = step_inside(s, p, shared);
         if (way == 0) return map;

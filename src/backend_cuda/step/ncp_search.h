@@ -177,9 +177,9 @@ static __device__ double search(const cuda_view &v, ncp_island *s, const ncp_mem
         if (left.full) return INFINITY;
         load_numbers(*s);
         regularise(*s, share, 1);
-        if (!(take_steps(*s, NCP_FROM_START, shared) <= NCP_ENOUGH)) {
+        if (!(take_steps(*s, affordable_steps(NCP_FROM_START, s->numbers), shared) <= NCP_ENOUGH)) {
             (void)go_inside(*s, left, shared);
-            (void)take_steps(*s, NCP_FROM_INSIDE, shared);
+            (void)take_steps(*s, affordable_steps(NCP_FROM_INSIDE, s->numbers), shared);
         }
         store_numbers(*s);
         solve_trees(v, *s);
