@@ -92,7 +92,7 @@ static bool make_room(struct sadmm_ncp *d, const struct sadmm_articulations *art
            SADMM_GROW(d->first_node, 0, (size_t)articulations->order.parts + 1) &&
            SADMM_GROW(d->passed, 0, 2 * depth * size) && SADMM_GROW(d->passed_at, 0, 2 * n) &&
            SADMM_GROW(d->passed_counts, 0, size) && SADMM_GROW(d->rows, 0, system->rows->row_count) &&
-           SADMM_GROW(d->states, 0, 2 * states);
+           SADMM_GROW(d->states, 0, 2 * states + 1);
 }
 
 bool sadmm_ncp_make_lists(struct sadmm_ncp *d, const struct sadmm_ncp_input *input, const struct sadmm_system *system)
@@ -179,7 +179,7 @@ bool sadmm_ncp_keep(struct sadmm_ncp *d, const struct sadmm_system *system)
                  points = system->contacts->point_count;
     if (!SADMM_GROW(d->kept, 0, numbers + rows + 3 * points)) return false;
     memcpy(d->kept, system->velocity, numbers * sizeof *d->kept);
-    memcpy(d->kept + numbers, system->rows->lambda, rows * sizeof *d->kept);
+    if (rows > 0) memcpy(d->kept + numbers, system->rows->lambda, rows * sizeof *d->kept);
     for (size_t k = 0; k < points; ++k)
         memcpy(d->kept + numbers + rows + 3 * k, system->contacts->points[k].impulse, 3 * sizeof *d->kept);
     return true;
