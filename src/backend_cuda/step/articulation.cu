@@ -5,7 +5,7 @@
 #include "backend_cuda/device/plan_check.h"
 
 #include "articulation_contacts.h"
-#include "backend_cuda/assemble/body.h"
+#include "assemble_again.h"
 #include "core/model/joint_close.h"
 #include "world.h"
 
@@ -201,18 +201,6 @@ static __device__ __forceinline__ void store_part(const cuda_view &v, const arti
 }
 
 /* ---- geometric stiffness ----------------------------------------------------------------------------------------- */
-
-/* A body whose inertia is another one by the forces that have been found. */
-static __device__ __noinline__ void assemble_again(const cuda_view &v, int32_t i)
-{
-    const struct cuda_articulation_body body = stiffened_body(v, i);
-    double A[36], b[6];
-    v.joints.bodies[i] = body;
-    if (v.joints.apart) return; /* it does not iterate */
-    take_articulation_body(body, A, b);
-    if (v.model.fast || v.step.limits) put_body<true>(v, i, A, b);
-    else put_body<false>(v, i, A, b);
-}
 
 /* Does any body of the part have another inertia by the forces that have been found? */
 static __device__ __forceinline__ bool stiffen_part(const cuda_view &v, const articulation_view &p,

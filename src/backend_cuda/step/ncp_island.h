@@ -99,7 +99,7 @@ struct ncp_island {
     ncp_row *row;
     double *pool;
     /* of contacts x 3: impulses along their frames */
-    double *impulse;
+    double *impulse, *kept; /* kept: with multipliers of rows, a solution that is held against another one */
     /* the dense problem */
     int32_t laws, numbers;
     ncp_law *law;

@@ -2,11 +2,11 @@
 #ifndef SADMM_CUDA_STEP_NCP_LOAD_H
 #define SADMM_CUDA_STEP_NCP_LOAD_H
 
-#include "move.h"
 #include "core/model/articulation.h"
+#include "move.h"
 #include "ncp_tree.h"
 
-/* A tree of a part, or a body without joints. */
+/* Nodes of a part's trees. right: becomes false where they are not all of this island. */
 static __device__ void make_tree(const cuda_view &v, const ncp_island &s, int32_t part, int32_t base, bool *right)
 {
     const struct cuda_ncp_part plan = v.ncp.parts[part];
@@ -236,6 +236,7 @@ static __device__ bool make_contacts(const cuda_view &v, ncp_island *s, ncp_memo
     const size_t laws = (size_t)(s->contacts + bounded);
     s->contact = take<ncp_contact>(memory, (size_t)s->contacts);
     s->impulse = take<double>(memory, 3 * (size_t)s->contacts);
+    s->kept = take<double>(memory, 3 * (size_t)s->contacts + (size_t)s->rows);
     s->law = take<ncp_law>(memory, laws);
     if (memory->full) return false;
     each(s->bodies, [&](int32_t t) {

@@ -110,11 +110,11 @@ static __device__ void store_numbers(const ncp_island &s)
     __syncthreads();
 }
 
-/* Contacts give by a share of their response. sign: it is added, or taken off again. */
-static __device__ void regularise(const ncp_island &s, double share, double sign)
+/* Contacts give by a share of their response. */
+static __device__ void regularise(const ncp_island &s, double share)
 {
     each(3 * s.contacts, [&](int32_t n) {
-        const double more = sign * share * s.law[n / 3].response;
+        const double more = share * s.law[n / 3].response;
         s.G[n * s.numbers + n] += more;
         s.u[n] += more * s.lambda[n];
     });
@@ -176,7 +176,7 @@ static __device__ double search(const cuda_view &v, ncp_island *s, const ncp_mem
         s->M = take<double>(&left, (size_t)s->numbers * (size_t)(s->numbers + 1));
         if (left.full) return INFINITY;
         load_numbers(*s);
-        regularise(*s, share, 1);
+        regularise(*s, share);
         if (!(take_steps(*s, affordable_steps(NCP_FROM_START, s->numbers), shared) <= NCP_ENOUGH)) {
             (void)go_inside(*s, left, shared);
             (void)take_steps(*s, affordable_steps(NCP_FROM_INSIDE, s->numbers), shared);
@@ -219,15 +219,36 @@ static __device__ void find_energies(const cuda_view &v, const ncp_island &s, do
     __syncthreads();
 }
 
-/* Is it solved? By impulses, multipliers and velocities as they are then. */
+/* A solution is kept, or is that again. */
+static __device__ void keep_solution(const ncp_island &s)
+{
+    each(3 * s.contacts, [&](int32_t n) { s.kept[n] = s.impulse[n]; });
+    each(s.rows, [&](int32_t r) { s.kept[3 * s.contacts + r] = s.row[r].lambda; });
+    __syncthreads();
+}
+static __device__ void take_kept(const cuda_view &v, const ncp_island &s)
+{
+    each(3 * s.contacts, [&](int32_t n) { s.impulse[n] = s.kept[n]; });
+    each(s.rows, [&](int32_t r) { s.row[r].lambda = s.kept[3 * s.contacts + r]; });
+    __syncthreads();
+    solve_trees(v, s);
+}
+
+/* Is it solved? By impulses, multipliers and velocities as they are then. A solution of much energy, as drives may ask
+ * for, stays where contacts that give do not have less than half of it. */
 static __device__ bool search_all(const cuda_view &v, ncp_island *s, const ncp_memory &memory, ncp_shared *shared)
 {
-    double now, expected;
+    double energy, expected, given;
     const bool solved = search(v, s, memory, false, shared) <= NCP_ENOUGH;
-    find_energies(v, *s, &now, &expected);
-    if (solved && now <= NCP_MOST_ENERGY * expected) return true;
+    find_energies(v, *s, &energy, &expected);
+    if (solved && energy <= NCP_MOST_ENERGY * expected) return true;
+    keep_solution(*s);
     forget(s);
-    return search(v, s, memory, true, shared) <= NCP_ENOUGH;
+    const bool gives = search(v, s, memory, true, shared) <= NCP_ENOUGH;
+    find_energies(v, *s, &given, &expected);
+    if (gives && !(solved && given > energy / 2)) return true;
+    if (solved) take_kept(v, *s);
+    return solved;
 }
 
 #endif

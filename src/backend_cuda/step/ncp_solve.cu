@@ -4,11 +4,11 @@
 
 #include "backend_cuda/device/double.h"
 
-#include "backend_cuda/assemble/body.h"
 #include "backend_cuda/device/condition.h"
 #include "backend_cuda/device/plan_check.h"
-#include "world.h"
+#include "assemble_again.h"
 #include "ncp_search.h"
+#include "world.h"
 
 enum { NCP_THREADS = 256 };
 
@@ -45,7 +45,8 @@ static __device__ bool stiffen_island(const cuda_view &v, const ncp_island &s, n
     each(s.bodies, [&](int32_t n) {
         const int32_t body = s.node[n].body;
         if (v.ncp.part_of[body] < 0 || !stiffen_body(v, body, true)) return;
-        s.node[n].own = v.joints.bodies[body] = stiffened_body(v, body);
+        assemble_again(v, body);
+        s.node[n].own = v.joints.bodies[body];
         any = true;
     });
     return any_of(any, shared);

@@ -6,7 +6,7 @@
  *   queue.cu        run steps and see what became of them; repeat those whose plan did not hold
  *   read.cu         bring the world and the report back
  *   push.cu         islands that are pushed apart by a second problem
- *   ncp_*        small islands, solved to rounding
+ *   ncp_*           small islands, solved to rounding
  *   kinematic.cu, joints.cu, gears.cu, articulation.cu   kinematic bodies, joints, gears, and articulations
  */
 #ifndef SADMM_CUDA_STEP_WORLD_H
