@@ -9,6 +9,7 @@
 #include "cli/output.h"
 #include "core/base/clock.h"
 #include "core/base/parallel.h"
+#include "core/base/processors.h"
 #include "core/solve/schedule.h"
 
 static const struct {

@@ -2,23 +2,20 @@
  * limits, unloading. That results do not depend on their number is also in test_fast, test_reduced_form, test_collision
  * and test_scenes, kernel by kernel and scene by scene. */
 #include <dlfcn.h>
+#include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "core/base/barrier.h"
 #include "core/base/parallel.h"
+#include "core/base/processors.h"
 #include "fixed_work.h"
 #include "scene_tools.h"
 #include "task_pool.h"
-
-#ifdef _OPENMP
-enum { HAVE_OPENMP = 1 };
-#else
-enum { HAVE_OPENMP = 0 };
-#endif
 
 static sadmm_world *open_world(const char *spec, int threads, const struct pool *pool)
 {
@@ -70,7 +67,7 @@ static void go_round(void *argument, int thread, int threads)
     atomic_store(&r->members, threads);
 }
 
-static void expect_region(struct sadmm_team *team, int threads)
+static int expect_region(struct sadmm_team *team, int threads)
 {
     static struct rounds r;
     memset(&r, 0, sizeof r);
@@ -81,16 +78,76 @@ static void expect_region(struct sadmm_team *team, int threads)
     ck_assert_int_eq(atomic_load(&r.members), ran);
     for (int t = 0; t < threads; ++t) ck_assert_int_eq(atomic_load(&r.calls[t]), t < ran);
     for (int i = 0; i < ITEMS; ++i) ck_assert_int_eq(r.values[0][i], (i + 20) % ITEMS);
+    return ran;
 }
 
-START_TEST(openmp_gives_what_is_asked_for)
+START_TEST(the_library_gives_what_is_forced)
 {
     struct sadmm_team team = {.ran = 0};
+    sadmm_test_force_threads(true);
     for (int threads = 1; threads <= 9; threads += 2) {
         expect_region(&team, threads);
-        ck_assert_int_eq(team.ran, HAVE_OPENMP ? threads : 1);
+        ck_assert_int_eq(team.ran, threads);
     }
-    expect_region(NULL, 4);
+    ck_assert_int_eq(expect_region(NULL, 4), 4);
+    ck_assert_int_eq(team.ran, 9);
+}
+END_TEST
+
+/* Otherwise it does not wait for threads that come late. That they come at all is asked for. */
+START_TEST(the_library_gives_what_it_can)
+{
+    struct sadmm_team team = {.ran = 0};
+    for (int i = 0; i < 50; ++i) expect_region(&team, 1 + i % 9);
+    while (team.ran < 3) expect_region(&team, 3);
+}
+END_TEST
+
+/* The workers are shared by all threads of the program. */
+static void *regions_of_a_thread(void *argument)
+{
+    static _Thread_local struct rounds r;
+    (void)argument;
+    for (int i = 0; i < 2000; ++i) {
+        memset(&r.calls, 0, sizeof r.calls);
+        sadmm_test_force_threads(i % 2 == 1);
+        const int ran = sadmm_parallel(NULL, 3, go_round, &r);
+        for (int t = 0; t < 3; ++t) ck_assert_int_eq(atomic_load(&r.calls[t]), t < ran);
+    }
+    return NULL;
+}
+
+START_TEST(threads_share_the_workers)
+{
+    pthread_t others[3];
+    for (int i = 0; i < 3; ++i) ck_assert_int_eq(pthread_create(&others[i], NULL, regions_of_a_thread, NULL), 0);
+    for (int i = 0; i < 3; ++i) pthread_join(others[i], NULL);
+}
+END_TEST
+
+static void sleep_as_second(void *argument, int thread, int threads)
+{
+    struct rounds *r = (struct rounds *)argument;
+    if (thread == threads - 1) nanosleep(&(struct timespec){.tv_nsec = 200000000}, NULL);
+    sadmm_barrier_wait(&r->barrier, threads);
+}
+
+static double cpu_seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* A member that waits for another one takes no processor meanwhile: here a fifth of a second, by three. */
+START_TEST(members_that_wait_sleep)
+{
+    static struct rounds r;
+    sadmm_test_force_threads(true);
+    sadmm_parallel(NULL, 4, sleep_as_second, &r);
+    const double before = cpu_seconds();
+    sadmm_parallel(NULL, 4, sleep_as_second, &r);
+    ck_assert_double_lt(cpu_seconds() - before, 0.1);
 }
 END_TEST
 
@@ -143,13 +200,68 @@ END_TEST
 START_TEST(threads_are_an_upper_bound)
 {
     int processors = sadmm_processors();
+    ck_assert_int_ge(processors, 1);
     ck_assert_int_eq(threads_of("sliding_cubes:100", 64), 1);
     ck_assert_int_eq(threads_of("sliding_cubes:1000", 1), 1);
-    ck_assert_int_eq(threads_of("sliding_cubes:1000", 2), processors < 2 ? 1 : 2);
+    ck_assert_int_le(threads_of("sliding_cubes:1000", 2), processors < 2 ? 1 : 2);
     ck_assert_int_le(threads_of("sliding_cubes:1000", 64), processors);
     sadmm_test_force_threads(true);
-    ck_assert_int_eq(threads_of("sliding_cubes:100", 5), HAVE_OPENMP ? 5 : 1);
+    ck_assert_int_eq(threads_of("sliding_cubes:100", 5), 5);
     sadmm_test_force_threads(false);
+}
+END_TEST
+
+static void put_file(const char *folder, const char *name, const char *text)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    for (char *slash = path + strlen(folder) + 1; (slash = strchr(slash, '/')); ++slash) {
+        *slash = 0;
+        ck_assert(mkdir(path, 0700) == 0 || errno == EEXIST);
+        *slash = '/';
+    }
+    FILE *file = fopen(path, "w");
+    ck_assert_ptr_nonnull(file);
+    ck_assert_int_ge(fputs(text, file), 0);
+    fclose(file);
+}
+
+/* What the kernel's files say, of versions 1 and 2, and how many processors that is. */
+static const struct {
+    const char *groups, *files[6]; /* name, text, ...; the folder is the root of the groups */
+    int quota;
+} quotas[] = {
+    {"0::/\n", {"cpu.max", "200000 100000\n"}, 2},
+    {"0::/\n", {"cpu.max", "max 100000\n"}, 0},
+    {"0::/\n", {NULL}, 0},
+    {"0::/\n", {"cpu.max", "250000 100000\n"}, 2},
+    {"0::/\n", {"cpu.max", "20000 100000\n"}, 1},
+    {"0::/\n", {"cpu.max", "nonsense\n"}, 0},
+    {"0::/\n", {"cpu.max", "100000 0\n"}, 0},
+    {"0::/\n", {"cpu.max", "9000000000000000000 1\n"}, 1000000},
+    {"0::/a/b\n", {"a/b/cpu.max", "max 100000\n", "a/cpu.max", "300000 100000\n"}, 3},
+    {"0::/a/b\n", {"a/b/cpu.max", "400000 100000\n", "a/cpu.max", "300000 100000\n"}, 3},
+    {"0::/seen/from/outside\n", {"cpu.max", "500000 100000\n"}, 5},
+    {"3:cpu,cpuacct:/\n", {"cpu/cpu.cfs_quota_us", "150000\n", "cpu/cpu.cfs_period_us", "50000\n"}, 3},
+    {"3:cpuacct,cpu:/x\n", {"cpu/x/cpu.cfs_quota_us", "400000\n", "cpu/x/cpu.cfs_period_us", "100000\n"}, 4},
+    {"3:cpu:/\n", {"cpu/cpu.cfs_quota_us", "-1\n", "cpu/cpu.cfs_period_us", "100000\n"}, 0},
+    {"3:cpuset:/\n", {"cpu/cpu.cfs_quota_us", "100000\n", "cpu/cpu.cfs_period_us", "100000\n"}, 0},
+    {"no groups\n", {"cpu.max", "100000 100000\n"}, 0},
+};
+
+START_TEST(the_quota_of_a_container_bounds_them)
+{
+    char folder[] = "/tmp/subadmm_groups_XXXXXX", groups[64], command[64];
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    put_file(folder, "groups", quotas[_i].groups);
+    for (int k = 0; k < 6 && quotas[_i].files[k]; k += 2)
+        put_file(folder, quotas[_i].files[k], quotas[_i].files[k + 1]);
+    snprintf(groups, sizeof groups, "%s/groups", folder);
+    const int quota = sadmm_processor_quota(groups, folder);
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    ck_assert_int_eq(system(command), 0);
+    ck_assert_int_eq(quota, quotas[_i].quota);
+    ck_assert_int_eq(sadmm_processor_quota(groups, folder), 0); /* there are no such files */
 }
 END_TEST
 
@@ -258,7 +370,7 @@ START_TEST(problems_take_tasks)
         ck_assert_int_gt(sadmm_problem_contact_count(problem), 0);
         ck_assert_int_eq(sadmm_problem_set_tasks(problem, run == 1 ? &tasks : NULL), SADMM_OK);
         ck_assert_int_eq(sadmm_problem_solve(problem, SADMM_BACKEND_CPU, SADMM_F64, &settings, &report), SADMM_OK);
-        if (run != 1) ck_assert_int_eq(report.threads, HAVE_OPENMP ? 3 : 1);
+        if (run != 1) ck_assert_int_eq(report.threads, 3);
         velocities[run] = malloc(6 * (size_t)sadmm_problem_body_count(problem) * sizeof(double));
         ck_assert_int_eq(sadmm_problem_get_solution(problem, velocities[run], NULL, NULL), SADMM_OK);
         ck_assert((pool.enqueued > 0) == (run > 0));
@@ -320,7 +432,7 @@ static int child_steps(sadmm_world *world, const struct pool *pool, uint64_t exp
     return world_report(world).threads == 1 && pool->enqueued == enqueued ? 0 : 3;
 }
 
-/* OpenMP's threads stay with the parent; so do those of a pool. */
+/* The library's threads stay with the parent; so do those of a pool. */
 START_TEST(a_forked_child_goes_on_alone)
 {
     struct pool pool = {.enqueued = 0};
@@ -336,7 +448,7 @@ START_TEST(a_forked_child_goes_on_alone)
     ck_assert_int_eq(status_of(child), 0);
     step_world(world, 20);
     ck_assert(state_hash(world) == expected);
-    ck_assert(_i || world_report(world).threads == (HAVE_OPENMP ? 3 : 1));
+    ck_assert(_i || world_report(world).threads == 3);
     sadmm_world_destroy(world);
     if (_i) pool_stop(&pool);
 }
@@ -385,11 +497,7 @@ static int limited_steps(uint64_t expected)
     step_world(world, 20);
     if (state_hash(world) != expected) return 2;
     const int ran = world_report(world).threads;
-#ifdef __clang__
-    return ran == 1 ? 0 : 3; /* LLVM's runtime: core/base/parallel.c */
-#else
-    return HAVE_OPENMP ? ran > 1 && ran < 64 ? 0 : 3 : 0;
-#endif
+    return ran > 1 && ran < 64 ? 0 : 3;
 }
 
 /* Threads that cannot be made are not waited for, and end nobody. */
@@ -422,7 +530,11 @@ int main(void)
     TCase *cases = tcase_create("threads");
     suite_add_tcase(suite, cases);
     tcase_set_timeout(cases, 30);
-    tcase_add_test(cases, openmp_gives_what_is_asked_for);
+    tcase_add_test(cases, the_library_gives_what_is_forced);
+    tcase_add_test(cases, the_library_gives_what_it_can);
+    tcase_add_test(cases, threads_share_the_workers);
+    tcase_add_test(cases, members_that_wait_sleep);
+    tcase_add_loop_test(cases, the_quota_of_a_container_bounds_them, 0, sizeof quotas / sizeof *quotas);
     tcase_add_loop_test(cases, a_pool_gives_what_it_can, 0, POOL_KINDS);
     tcase_add_test(cases, handing_out_waits_for_nobody);
     tcase_add_test(cases, threads_are_an_upper_bound);

@@ -29,6 +29,7 @@ def _arguments():
         command.add_argument("--precision", choices=_names["precision"], help="default: the scene's")
         command.add_argument("--method", choices=_names["method"], help="default: the scene's")
         command.add_argument("--iterations", type=int, help="a step; default: the scene's")
+        command.add_argument("--threads", type=int, help="at most so many; 0: no bound; default: the scene's")
     for command in (record, picture):
         command.add_argument("-o", "--output", required=True, help="the file to write")
         length = command.add_mutually_exclusive_group()
@@ -172,7 +173,8 @@ def main(arguments=None):
     given = _arguments().parse_args(arguments)
 
     def build():
-        settings = {} if given.iterations is None else {"iterations": given.iterations}
+        settings = {name: getattr(given, name) for name in ("iterations", "threads")
+                    if getattr(given, name) is not None}
         if given.scene.endswith(MODELS):
             world = subadmm.load(given.scene, backend=given.backend, precision=given.precision or "f64").world
             changed = world.settings

@@ -466,6 +466,15 @@ def test_what_is_not_carried_over_is_named():
     assert loaded.bodies["a"].position[2] == pytest.approx(1, abs=1e-12)  # its weight is compensated
 
 
+def test_threads_take_the_place_of_those_of_the_settings():
+    settings = subadmm.Settings(threads=3)
+    assert subadmm.load(model(ARM)).world.settings.threads == 0
+    assert subadmm.load(model(ARM), settings=settings).world.settings.threads == 3
+    assert subadmm.load(model(ARM), settings=settings, threads=1).world.settings.threads == 1 and settings.threads == 3
+    with pytest.raises(subadmm.InvalidArgument, match=r"threads = -1: must be in \[0, 1024\]"):
+        subadmm.load(model(ARM), threads=-1)
+
+
 def test_errors_name_what_they_are_about(tmp_path):
     source = model(ARM)
     with pytest.raises(ValueError, match="keyframe: 'home'"):

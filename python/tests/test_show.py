@@ -104,7 +104,8 @@ def test_pictures_show_the_scene_and_are_the_same_every_time(tmp_path):
     world.step(20)
     assert (first != show.picture(world, 160, 100)).any()
     out = tmp_path / "a.png"
-    assert main(["picture", "pile:30", "--steps", "20", "--backend", "cpu", "--size", "160x100", "-o", str(out)]) == 0
+    assert main(["picture", "pile:30", "--steps", "20", "--backend", "cpu", "--size", "160x100", "--threads", "1",
+                 "-o", str(out)]) == 0
     assert (decoded(out.read_bytes()) == show.picture(world, 160, 100)).all()
 
 
@@ -163,6 +164,7 @@ def test_what_is_wrong_is_said(tmp_path, capsys):
         (["picture", "pile:3", "-o", "a.gif"], "a.gif"),
         (["record", "pile:3", "-o", str(tmp_path / "no" / "a.html"), "--steps", "1"], "no"),
         (["picture", "pile:3", "-o", "a.png", "--size", "4"], "--size: 4"),
+        (["picture", "pile:3", "-o", "a.png", "--threads", "1025"], "threads = 1025: must be in [0, 1024]"),
     ]:
         assert main(arguments) == 1
         assert said in capsys.readouterr().err

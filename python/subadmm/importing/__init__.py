@@ -32,6 +32,13 @@ def _threshold_of(decompose):
     return THRESHOLD if decompose is True else real("decompose", decompose, 0.01, 1)
 
 
+def _take_threads(world, threads):
+    if threads is not None:
+        settings = world.settings
+        settings.threads = threads
+        world.settings = settings
+
+
 def _is_stage(path):
     """Is it a USD stage, or the name of one?"""
     if isinstance(path, (str, os.PathLike)):
@@ -50,6 +57,7 @@ def load(
     backend="auto",
     precision="f64",
     device=0,
+    threads=None,
     carrier_share=1e-4,
     overlaps="ignore",
     decompose=False,
@@ -59,6 +67,7 @@ def load(
 
     path: the file; or a mujoco.MjModel that is compiled already, or a pxr.Usd.Stage that is open.
     settings: a subadmm.Settings; default: the file's time step and gravity. backend, precision, device: as of World.
+    threads: in place of settings.threads.
     decompose: True makes several hulls of each mesh of a body that moves, by coacd (pip install subadmm[decompose]); a
         number in [0.01, 1] is the concavity that may remain (True: 0.05). Default: one hull, which is in the report
         where it is much larger than the mesh.
@@ -88,7 +97,9 @@ def load(
                 raise ValueError(f"{name}: a USD stage has none; it starts as it is")
         from .usd import load_stage
 
-        return load_stage(path, settings, threshold, backend=backend, precision=precision, device=device)
+        loaded = load_stage(path, settings, threshold, backend=backend, precision=precision, device=device)
+        _take_threads(loaded.world, threads)
+        return loaded
     try:
         import mujoco
     except ImportError as error:
@@ -109,6 +120,7 @@ def load(
         device=device,
         settings=settings if settings is not None else settings_of(source),
     )
+    _take_threads(world, threads)
     loaded = LoadedModel(world, source, report)
     report_options(source, report)
     add_tree(loaded, data, carrier_share)

@@ -1,13 +1,12 @@
 /* Work by several threads: every parallel region of the library is one call of sadmm_parallel.
  *
- * The threads are OpenMP's, or come as tasks from the host's own pool (subadmm/tasks.h). How many take part is known
- * when the region begins and may be fewer than asked for: OpenMP gives what it can, the process may not be able to make
- * more, tasks of a busy pool come too late. A region is therefore written for any number of members, and gives the same
- * result, bit for bit, for all of them.
+ * The threads are the library's own (workers.h), or come as tasks from the host's pool (subadmm/tasks.h). The calling
+ * thread waits for them some microseconds. From then on the number of members is known, and those that come late go
+ * home: on a busy machine a region is done by those that are there. A region is therefore written for any number of
+ * members, and gives the same result, bit for bit, for all of them.
  *
- * OpenMP's runtimes end the process where they cannot make a thread. So threads are tried before a region that needs
- * more of them than the calling thread has had. They also do not survive a fork: a child of a process that has used
- * them goes on with one thread (as do the objects in it that were given a pool of the parent's). */
+ * Threads do not survive a fork: a child of a process that has used them goes on with one thread (as do the objects in
+ * it that were given a pool of the parent's). */
 #ifndef SADMM_CORE_PARALLEL_H
 #define SADMM_CORE_PARALLEL_H
 
@@ -15,23 +14,21 @@
 #include <stddef.h>
 
 #include "error.h"
-#include "subadmm/tasks.h"
+#include "workers.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-enum { SADMM_MOST_THREADS = 1024 };
-
-/* Whose threads work for a world or a problem. All 0: OpenMP's. */
+/* Whose threads work for a world or a problem. All 0: the library's. */
 struct sadmm_team {
     sadmm_tasks tasks;
     unsigned forks; /* of the process when the tasks were given */
     int ran;        /* the most members a region has had since somebody set this to 0 */
 };
 
-/* `tasks` may be NULL, for OpenMP's threads. `name` is the argument's in messages. Errors: INVALID_ARGUMENT (`team` is
- * left alone), OUT_OF_MEMORY. */
+/* `tasks` may be NULL, for the library's threads. `name` is the argument's in messages. Errors: INVALID_ARGUMENT
+ * (`team` is left alone), OUT_OF_MEMORY. */
 sadmm_status sadmm_team_init(struct sadmm_team *team, const sadmm_tasks *tasks, const char *name,
                              struct sadmm_error *error);
 
@@ -43,7 +40,7 @@ int sadmm_team_threads(const struct sadmm_team *team, int wanted, size_t deserve
 typedef void sadmm_parallel_function(void *argument, int thread, int threads);
 
 /* Have the function called by up to `threads` threads at a time, once by each; return when all are done. Returns how
- * many they were. The function may wait at barriers (barrier.h); it begins no region. `team`: NULL for OpenMP's
+ * many they were. The function may wait at barriers (barrier.h); it begins no region. `team`: NULL for the library's
  * threads. */
 int sadmm_parallel(struct sadmm_team *team, int threads, sadmm_parallel_function *function, void *argument);
 
@@ -55,11 +52,8 @@ static inline void sadmm_share(size_t count, int thread, int threads, size_t *be
     *end = *begin + base + (t < extra ? 1 : 0);
 }
 
-/* Processors that OpenMP would use; 1 without it. */
-int sadmm_processors(void);
-
 /* Tests and benchmarks: in calls of this thread take as many threads as the settings ask for, however little there is
- * to do and however few processors there are. */
+ * to do and however few processors there are, and wait for all of the library's. */
 void sadmm_test_force_threads(bool force);
 bool sadmm_test_forces_threads(void);
 
