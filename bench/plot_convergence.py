@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Draw the CSV of `subadmm-bench convergence`: errors of cold solves against iterations and against wall time, a panel
-a problem, and errors of warm steps against the iterations a step, a panel a scene.
+"""Draw the CSV of `subadmm-bench convergence`: errors of cold solves against iterations, a panel a problem, and errors
+of warm steps against the iterations a step, a panel a scene.
 
     subadmm-bench convergence --csv convergence.csv
     bench/plot_convergence.py convergence.csv docs/convergence
 
-writes docs/convergence_iterations.png, docs/convergence_time.png and docs/convergence_warm.png. Needs matplotlib.
+writes docs/convergence_iterations.png and docs/convergence_warm.png, as bench/report.py does. Needs matplotlib.
 """
 import argparse
 import csv
@@ -26,12 +26,12 @@ def read_curves(paths, kind, x, y):
     curves = defaultdict(lambda: defaultdict(list))
     for path in paths:
         with open(path, newline="") as file:
-            for row in csv.DictReader(file):
+            for row in csv.DictReader(line for line in file if not line.startswith("#")):
                 point = number(row[x]), number(row[y])
                 if row["kind"] != kind or not all(math.isfinite(value) for value in point):
                     continue
                 series = f'{row["backend"]} {row["precision"]}'
-                if row["backend"] == "cpu":
+                if row["backend"] == "cpu" and "threads" in row:
                     series += f', {row["threads"]} thread{"" if row["threads"] == "1" else "s"}'
                 curves[row["name"]][row["method"], series].append(point)
     return curves
@@ -87,10 +87,8 @@ def main():
     import matplotlib.pyplot as plt
 
     error = "error, m/s"
-    for kind, x, x_label, name in (("curve", "iterations", "iterations", "iterations"),
-                                   ("curve", "ms", "ms", "time"),
-                                   ("warm", "iterations", "iterations a step", "warm")):
-        draw(plt, read_curves(arguments.csv, kind, x, "ncp_balanced"),
+    for kind, x_label, name in (("curve", "iterations", "iterations"), ("warm", "iterations a step", "warm")):
+        draw(plt, read_curves(arguments.csv, kind, "iterations", "ncp_balanced"),
              f"{arguments.prefix}_{name}.{arguments.suffix}", x_label, error)
 
 

@@ -2,7 +2,7 @@
 """Draw the JSON of `subadmm-bench motion`: errors against ms per simulated second, a panel a scene.
 
     subadmm-bench motion --scene pile:300 --json pile.json
-    bench/plot_motion.py pile.json docs/motion.png
+    bench/plot_motion.py pile.json pile.png
 
 A line a number of iterations, from the whole time step at its left end to the finest. Solid: the error, to the
 reference; dashed: of the time step alone, with many iterations; dotted: of the iterations, to many at the same step.

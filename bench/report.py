@@ -5,9 +5,10 @@
     bench/report.py --tables                                the tables alone, from the CSV files that there are
     bench/report.py --check                                 are the tables those of the CSV files? (part of the tests)
 
-A table stands in a document between the lines `<!-- report: NAME -->` and `<!-- end -->`. A CSV file says in its first
-lines on which machine, when, by which version and by which command its figures were measured. Times are medians over
-the repeats of the median step; errors are measured in runs of their own, since the certificate takes time.
+A table stands in a document between the lines `<!-- report: NAME -->` and `<!-- end -->`; no other table has figures
+(tests/test_docs.py). A CSV file says in its first lines on which machine, when, by which version and by which command
+its figures were measured. Times are medians over the repeats of the median step; errors are measured in runs of their
+own, since the certificate takes time. `gpu` needs a GPU; elsewhere its table stays that of the CSV file.
 """
 import argparse
 import csv
@@ -21,6 +22,7 @@ import re
 import statistics
 import subprocess
 import sys
+import typing
 
 PROJECT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 RESULTS = os.path.join(PROJECT, "docs", "results")
@@ -68,16 +70,6 @@ def rows_readme(tools):
         yield scene_row(tools, scene, "--backend", "cpu", "--precision", "f32", "--threads", "1")
 
 
-def rows_speed(tools):
-    threads = ["1"] + ([str(os.cpu_count())] if os.cpu_count() > 1 else [])
-    for scene in SCENES:
-        for method in ("fast", "paper"):
-            for precision in ("f64", "f32"):
-                for count in threads:
-                    yield scene_row(tools, scene, "--backend", "cpu", "--method", method, "--precision", precision,
-                                    "--threads", count)
-
-
 def rows_gpu(tools):
     for scene in SCENES + LARGE:
         for precision in ("f64", "f32"):
@@ -101,46 +93,74 @@ def rows_motion(tools):
 
 
 def rows_convergence(tools):
-    """Cold problems: iterations and ms to each tolerance, the methods beside each other."""
-    cold = {}
-    for row in csv.DictReader(io.StringIO(tools.output([tools.bench, "convergence", "--only", "cold", "--csv", "-"]))):
-        if row["kind"] != "count":
-            continue
-        problem = cold.setdefault((row["name"], row["tolerance"]), {
-            "problem": row["name"], "bodies": row["bodies"], "contacts": row["contacts"],
-            "tolerance": row["tolerance"]})
-        problem[row["method"] + "_iterations"] = row["iterations"] or "> " + row["limit"]
-        problem[row["method"] + "_ms"] = row["ms"]
-    yield from cold.values()
+    """All that the bench measures but times, which this is not about."""
+    text = tools.output([tools.bench, "convergence", "--max-seconds", "600", "--csv", "-"])
+    for row in csv.DictReader(io.StringIO(text)):
+        yield {key: row[key] for key in ("kind", "name", "method", "backend", "precision", "contacts", "limit",
+                                         "iterations", "tolerance", "ncp_balanced")}
+
+
+def draw_convergence(path):
+    done = subprocess.run([sys.executable, os.path.join(PROJECT, "bench", "plot_convergence.py"), path,
+                           os.path.join(PROJECT, "docs", "convergence")], check=False)
+    if done.returncode:
+        print("no pictures", file=sys.stderr)
+
+
+def counts_of(rows):
+    """Cold problems: iterations to 1e-6 m/s, the methods beside each other."""
+    problems = {}
+    for row in rows:
+        if row["kind"] == "count" and float(row["tolerance"]) == 1e-6:
+            problem = problems.setdefault(row["name"], {"problem": row["name"], "contacts": row["contacts"]})
+            problem[row["method"]] = row["iterations"] or "> " + row["limit"]
+    return list(problems.values())
+
+
+def times_of(rows):
+    """Milliseconds of a step, the precisions beside each other."""
+    scenes = {}
+    for row in rows:
+        scene = scenes.setdefault(row["scene"], {key: row[key] for key in ("scene", "bodies", "contacts",
+                                                                            "iterations")})
+        scene[row["precision"]] = row["total_ms"]
+    return list(scenes.values())
 
 
 def rows_standing(tools):
-    for scene in ("pyramid:30", "card_houses", "arch", "dry_stone", "kapla_tower"):
-        text = tools.output([tools.bench, "stand", "--scene", scene, "--steps", "600"])
+    for scene in ("pyramid:30", "arch", "dry_stone", "kapla_tower"):
+        text = tools.output([tools.bench, "stand", "--scene", scene, "--steps", "600", "--threads", "1"])
         found = {key: re.search(pattern, text) for key, pattern in (
             ("ms", r"whole step +([\d.]+) ms median"), ("penetration_m", r"penetration +(\S+) m at most"),
             ("drift_m", r"drift +(\S+) m at most"), ("ncp", r"certificate +ncp (\S+) m/s"))}
         yield {"scene": scene, "steps": 600, **{key: match.group(1) if match else "" for key, match in found.items()}}
 
 
-SCENE_COLUMNS = [("scene", "scene"), ("bodies", "bodies"), ("contacts", "contacts"), ("iterations", "iterations"),
-                 ("total_ms", "ms a step"), ("solve_ms", "of it solve"), ("ncp_end", "natural map at the end, m/s"),
-                 ("ncp_most", "largest of the run")]
-HOW_COLUMNS = [("method", "method"), ("backend", "backend"), ("precision", "precision"), ("threads", "threads")]
-# name: what measures it, columns of its table (None: all of the CSV file)
+def columns(**titles):
+    return list(titles.items())
+
+
+class Report(typing.NamedTuple):
+    rows: typing.Callable                              # of the CSV file: what measures them
+    columns: list                                      # of the table: keys and titles
+    view: typing.Callable = lambda rows: rows          # the table's rows, of those of the CSV file
+    draw: typing.Callable = lambda path: None          # pictures, of the CSV file's path
+
+
 REPORTS = {
-    "readme": (rows_readme, SCENE_COLUMNS),
-    "speed": (rows_speed, SCENE_COLUMNS[:1] + HOW_COLUMNS + SCENE_COLUMNS[2:]),
-    "gpu": (rows_gpu, SCENE_COLUMNS[:1] + [HOW_COLUMNS[2]] + SCENE_COLUMNS[1:]),
-    "scenes": (rows_scenes, [("name", "name"), ("seconds", "s"), ("iterations", "iterations"),
-                             ("description", "what")]),
-    "motion": (rows_motion, None),
-    "convergence": (rows_convergence, [("problem", "problem"), ("contacts", "contacts"), ("tolerance", "to, m/s"),
-                                       ("paper_iterations", "paper: iterations"), ("fast_iterations", "fast"),
-                                       ("paper_ms", "paper: ms"), ("fast_ms", "fast")]),
-    "standing": (rows_standing, [("scene", "scene"), ("steps", "steps"), ("ms", "ms a step"),
-                                 ("penetration_m", "penetration, m"), ("drift_m", "drift, m"),
-                                 ("ncp", "natural map, m/s")]),
+    "readme": Report(rows_readme, columns(
+        scene="scene", bodies="bodies", contacts="contacts", iterations="iterations", total_ms="ms a step",
+        solve_ms="of it solve", ncp_end="natural map at the end, m/s", ncp_most="largest of the run")),
+    "gpu": Report(rows_gpu, columns(scene="scene", bodies="bodies", contacts="contacts", iterations="iterations",
+                                    f64="ms a step, f64", f32="f32"), times_of),
+    "scenes": Report(rows_scenes, columns(name="name", iterations="iterations", description="what")),
+    "motion": Report(rows_motion, columns(**{
+        key: key for key in ("motion", "error by dt", "dt/2", "dt/4", "order", "energy left")})),
+    "convergence": Report(rows_convergence, columns(problem="problem", contacts="contacts", paper="`paper`",
+                                                    fast="`fast`"), counts_of, draw_convergence),
+    "standing": Report(rows_standing, columns(scene="scene", steps="steps", ms="ms a step",
+                                              penetration_m="penetration, m", drift_m="drift, m",
+                                              ncp="natural map, m/s")),
 }
 SAME_EVERYWHERE = {"scenes"}  # no figure of theirs is measured
 
@@ -178,7 +198,7 @@ def is_outdated(name, tools):
     """Of what is the same everywhere: is its CSV file what the tools say?"""
     with open(csv_path(name), encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("# ")))
-    return rows != [{key: str(value) for key, value in row.items()} for row in REPORTS[name][0](tools)]
+    return rows != [{key: str(value) for key, value in row.items()} for row in REPORTS[name].rows(tools)]
 
 
 def table_of(name):
@@ -186,13 +206,12 @@ def table_of(name):
     with open(csv_path(name), encoding="utf-8") as file:
         lines = file.read().splitlines()
     notes = [re.sub(r" [0-9-]{10};", "", line[2:]) for line in lines if line.startswith("# ")]  # the date is the file's
-    rows = list(csv.DictReader(line for line in lines if not line.startswith("# ")))
-    columns = REPORTS[name][1] or [(key, key) for key in rows[0]]
+    report = REPORTS[name]
     yield ""
-    yield "| " + " | ".join(title for _, title in columns) + " |"
-    yield "|" + "---|" * len(columns)
-    for row in rows:
-        yield "| " + " | ".join(row[key].replace("|", "\\|") for key, _ in columns) + " |"
+    yield "| " + " | ".join(title for _, title in report.columns) + " |"
+    yield "|" + "---|" * len(report.columns)
+    for row in report.view(list(csv.DictReader(line for line in lines if not line.startswith("# ")))):
+        yield "| " + " | ".join(row[key].replace("|", "\\|") for key, _ in report.columns) + " |"
     yield ""
     yield "*" + "; ".join("`" + note + "`" if note.startswith("bench/") else note for note in notes) + "*"
     yield ""
@@ -245,7 +264,8 @@ def main():
     tools = Tools(args.build, args.repeats)
     for name in args.names:
         print(name, flush=True)
-        write_csv(name, REPORTS[name][0](tools), tools)
+        write_csv(name, REPORTS[name].rows(tools), tools)
+        REPORTS[name].draw(csv_path(name))
     changed = put_tables(args.check)
     if args.check and os.path.exists(tools.subadmm):
         changed += [name for name in sorted(SAME_EVERYWHERE) if is_outdated(name, tools)]
