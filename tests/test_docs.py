@@ -6,7 +6,8 @@
 In README.md, CONTRIBUTING.md, CHANGELOG.md, docs/*.md, docs/guide/*.md and docs/internals/*.md: links lead to files,
 and to headings where they name one; in back quotes, files and folders exist, and so do functions, structs, macros and
 options; a block of C or Python that names a program of examples in its first line is part of that program, which is
-compiled and run; places of generated figures have an end, and a name that no other place has.
+compiled and run; places of generated figures have an end, and a name that no other place has; no other table has
+figures.
 docs/internals/architecture.md names every folder of src. README.md leads to every page of docs/internals. The user's
 guide, docs/guide, has no other block of C; its other blocks of Python compile (python/tests/test_guide.py runs them);
 its index leads to every page.
@@ -118,6 +119,18 @@ def wrong_reports(text, seen):
             yield f"{line!r}: is no begin of a report"
 
 
+def wrong_figures(text):
+    """Tables of measured figures that no generator writes: those with two cells that are a number of three digits,
+    with a point or with an exponent, alone or with a unit of time."""
+    text = re.sub(r"<!-- report: .*?<!-- end -->|^```.*?^```", "", text, flags=re.M | re.S)
+    for table in re.findall(r"(?:^\|.*\|\n)+", text, re.M):
+        cells = [cell.strip() for row in table.splitlines() for cell in re.split(r"(?<!\\)\|", row)]
+        figures = [cell for cell in cells
+                   if re.fullmatch(r"[-+]?(\d[\d,]{2,}|\d*\.\d+|[\d.]+e[-+]?\d+)( ?(ms|s|us|\u00b5s|%))?", cell)]
+        if len(figures) > 1:
+            yield f"a table has figures ({', '.join(figures[:4])}) that bench/report.py does not write"
+
+
 def missing_links(text, documents, folder):
     """Pages of a folder, written as a link has them, that a document does not lead to."""
     for document in documents:
@@ -162,7 +175,7 @@ def main():
         text = read(os.path.join(project, document))
         errors = list(wrong_links(project, document, text)) + list(wrong_names(text, paths, sources)) + \
             list(wrong_commands(text, sources)) + list(wrong_examples(project, text)) + \
-            list(wrong_reports(text, reports))
+            list(wrong_reports(text, reports)) + list(wrong_figures(text))
         if document == "README.md":
             errors += missing_links(text, documents, "docs/internals/")
         if document == "docs/internals/architecture.md":
