@@ -81,7 +81,7 @@ static double pair_response(struct sadmm_context *c, size_t record)
 /* V of every island, kept at its label. `wrenches` hold J^T lambda. */
 static void add_up_loads(struct sadmm_context *c)
 {
-    const double under_iterated = weight_under_iterated(c->plan.rigid, c->settings.iterations);
+    const int iterations = weight_spring_iterations(c->plan.warm, c->plan.rigid, c->settings.iterations);
     for (int32_t i = 0; i < c->bodies; ++i) c->islands[i].sums = (struct weight_sums){0};
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct weight_sums *sums = &c->islands[c->label[i]].sums;
@@ -92,7 +92,7 @@ static void add_up_loads(struct sadmm_context *c)
     }
     for (int32_t i = 0; i < c->bodies; ++i)
         if (c->label[i] == i)
-            weight_update_speed(&c->islands[i].weights, &c->islands[i].sums, c->plan.warm, under_iterated);
+            weight_update_speed(&c->islands[i].weights, &c->islands[i].sums, iterations);
 }
 
 /* A body's part of its island's sums. */
@@ -139,8 +139,7 @@ static void ease_separations(struct sadmm_context *c, size_t index)
     for (int l = 0; l < LANES; ++l) {
         if (block->pair[l] < 0) continue;
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
-        double share = weight_separation_share(cpu_island_of(c, pair->body_a, pair->body_b)->weights.stack_depth,
-                                               c->settings.iterations);
+        double share = cpu_island_of(c, pair->body_a, pair->body_b)->weights.separation_share;
         for (int k = 0; k < pair->count && share < 1; ++k) {
             real *error = c->plan.contact_rows == 3
                               ? (real *)&((struct point_slot *)c->slots + block->first + k)->error

@@ -116,8 +116,8 @@ static void add_up_islands(struct sadmm_context *c)
     }
     for (int32_t i = 0; i < c->system->body_count; ++i)
         if (c->bodies[i].label == i)
-            weight_update_speed(&c->bodies[i].weights, &c->bodies[i].sums, c->plan->warm,
-                                weight_under_iterated(c->plan->rigid, c->settings->iterations));
+            weight_update_speed(&c->bodies[i].weights, &c->bodies[i].sums,
+                                weight_spring_iterations(c->plan->warm, c->plan->rigid, c->settings->iterations));
 }
 
 void sadmm_ref_sum_impulses(struct sadmm_context *c)
@@ -294,8 +294,8 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
     if (c->weight_updates == 0 && c->plan->warm && c->plan->rigid)
         for (size_t k = 0; k < points; ++k) {
             struct ref_constraint *contact = &c->constraints[k];
-            double share = weight_separation_share(island_of(c, contact)->weights.stack_depth, c->settings->iterations);
-            contact->e[0] = weight_separation_error(contact->e[0], share, c->settings->slop / c->settings->dt);
+            contact->e[0] = weight_separation_error(contact->e[0], island_of(c, contact)->weights.separation_share,
+                                                    c->settings->slop / c->settings->dt);
         }
     for (size_t k = points; k < c->constraint_count; ++k) weigh_constraint(c, &c->constraints[k]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {

@@ -474,7 +474,7 @@ struct cuda_args {
     int32_t in_order;   /* slots are raw indices */
     int32_t step1_done; /* fast: Step 1 ran before in this solve */
     int32_t goes_on;    /* fast: the batch does not end with these iterations */
-    int32_t warm;       /* fast: the step starts warm */
+    int32_t spring_iterations; /* fast: weight_spring_iterations */
     int32_t checks;      /* fast: of the stop rule, in this step so far */
     int32_t begin;      /* fast, BLOCK: weights, C and factors first */
     int32_t energy_limit; /* fast; enum cuda_energy_limit */

@@ -12,10 +12,9 @@
 
 /* The contacts of deep stacks close small separations slowly. */
 static __device__ __forceinline__ void ease_separations(const model_view &model, const contact_view &contacts,
-                                                        int32_t p, double stack_depth)
+                                                        int32_t p, double share)
 {
-    const double slop = model.settings->slop / model.settings->dt,
-                 share = weight_separation_share(stack_depth, model.settings->iterations);
+    const double slop = model.settings->slop / model.settings->dt;
     const int32_t count = share < 1 ? (int32_t)contacts.difference[p].w : 0;
     for (int32_t k = 0; k < count; ++k) {
         solver_real *error = &contacts.arm[point_slot(contacts, p, k)].w;
@@ -61,8 +60,8 @@ static __device__ __forceinline__ double weigh_side(const model_view &model, con
     contacts.inv_s[p] = (solver_real)(both ? B / 2 : B);
     if (!(scale > 0)) weights.weight[p] = taken;
     if (first && bodies.rigid)
-        ease_separations(model, contacts, p, island.weights.stack_depth); /* world level: separations, a slop and a
-                                                                             step */
+        ease_separations(model, contacts, p, island.weights.separation_share); /* world level: separations, a slop and
+                                                                                  a step */
     return B;
 }
 

@@ -42,7 +42,7 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
     const cuda_island fresh = {weight_new_island(), 0, 1, !SCALES && sum[TERM_ANCHORED] > 0, 0, 0,
                                !SCALES && sum[TERM_ANCHORED] >= 1};
     if (args.start) *island = fresh;
-    weight_update_speed(&island->weights, &sums, args.warm, args.factor);
+    weight_update_speed(&island->weights, &sums, args.spring_iterations);
     if (!SCALES || island->rows) return;
     /* those that stagnate keep their weights, times what the weight scale has risen by since they were taken */
     const double rise = weight_update_scale(&island->weights, &sums);

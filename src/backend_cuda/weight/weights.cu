@@ -128,8 +128,7 @@ cuda_args CUDA(weight_args)(const struct sadmm_context *c)
 {
     cuda_args args = {};
     args.start = c->weight_updates == 0;
-    args.warm = c->plan.warm;
-    args.factor = weight_under_iterated(c->plan.rigid, c->settings.iterations);
+    args.spring_iterations = weight_spring_iterations(c->plan.warm, c->plan.rigid, c->settings.iterations);
     args.row_floor = weight_row_floor(c->plan.rigid, c->settings.iterations);
     return args;
 }

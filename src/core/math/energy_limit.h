@@ -80,7 +80,7 @@ SADMM_INLINE double energy_limit_factor(const struct island_energies *e, double 
 /* Is the island tested for a rebound? */
 SADMM_INLINE int energy_limit_tests_rebound(int warm, int iterations)
 {
-    return warm && iterations < WEIGHT_UNDER_ITERATED;
+    return warm && iterations < WEIGHT_SPRING_ITERATIONS;
 }
 
 /* `along`: v . A v_f / 2, J. */

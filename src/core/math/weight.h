@@ -24,7 +24,8 @@ SADMM_INLINE int weight_next_update(int at) { return at < WEIGHT_DOUBLE_BELOW ? 
 #define WEIGHT_FLOOR_CONTACT 3.0
 #define WEIGHT_FLOOR_ROW 30.0
 #define WEIGHT_FLOOR_ROW_LEAST 3.0
-#define WEIGHT_FLOOR_ROW_ITERATIONS 200.0 /* from as many on it is the whole */
+/* From as many iterations on it is the whole. */
+#define WEIGHT_FLOOR_ROW_ITERATIONS 200.0
 
 SADMM_INLINE double weight_row_floor(int rigid, int iterations)
 {
@@ -45,8 +46,8 @@ struct weight_sums {
 /* What the weights of an island's constraints are made of. */
 struct weight_island {
     double speed, mass; /* V in m/s; kg */
-    double stack_depth; /* in steps that start warm, else 1 */
-    double scale;       /* the weight scale */
+    double separation_share; /* of separations within the slop, that a step closes */
+    double scale;            /* the weight scale */
 };
 
 SADMM_INLINE struct weight_island weight_new_island(void)
@@ -115,71 +116,79 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
     return rise;
 }
 
-/* Deep stacks in steps that start warm. Contacts that are solved in part, step by step, are springs of stiffness
- * B iterations / dt^2, on which a tall pile buckles; and separations, closed in one step, act on them as an integral
- * controller that excites them. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is
- * twice the number of bodies that a load passes on its way to the ground. */
-#define WEIGHT_DEEP 20.0
+/* ---- contacts as springs -----------------------------------------------------------------------------------------
+ *
+ * A step that starts warm goes on from the impulses of the last one, and its K iterations change them by B K x, x the
+ * velocity at the contact: from step to step a contact is a spring of stiffness B K / dt^2. At rest B is the load over
+ * g dt. A column of n bodies on such springs buckles under its own weight (Euler) where
+ *
+ *     n^2 > 5.8 K a^2 / (g dt^2 h)       a: half the width of a body, h: its height; 5.8: the square of a root of J_0
+ *
+ * so that B K must grow as n^2. What it should be over what it is, with d = max(n / WEIGHT_SPRING_DEPTH, 1):
+ *
+ *     need = WEIGHT_SPRING_ITERATIONS / K d^2
+ *
+ * B is raised by that, up to WEIGHT_STIFFEST. Where it is not enough, separations must be closed slowly: closed in one
+ * step they act on the springs as an integral controller, which excites slow swaying. A step closes the share lack^-3
+ * of them, lack = need / WEIGHT_STIFFEST. Few iterations alone are no reason to: lack is at most d^2. */
+#define WEIGHT_SPRING_ITERATIONS 60
+#define WEIGHT_SPRING_DEPTH 20.0
+#define WEIGHT_STIFFEST 6.0
 #define WEIGHT_SEPARATION_LEAST 0.001
 
-/* 1 and more. */
-SADMM_INLINE double weight_stack_depth(double speed, double push, double mass)
+/* K of a step whose contacts are springs, 0: they are none. A problem that is solved in short batches is no row of
+ * steps: this is for worlds (`rigid`). */
+SADMM_INLINE int weight_spring_iterations(int warm, int rigid, int iterations)
 {
-    return max_of(push / (mass * speed * WEIGHT_DEEP), 1.0);
+    return warm && rigid ? iterations : 0;
 }
 
-/* Steps that start warm with fewer iterations than this: the springs above would be softer, and heavy bodies on top
- * rock on them. */
-#define WEIGHT_UNDER_ITERATED 60
-
-/* The most that V is divided by. */
-#define WEIGHT_STIFFEST 6.0
-
-/* By how much V is less for that, 1: not at all. Steps of a world alone (`rigid`): a problem that is solved in short
- * batches is no row of steps. */
-SADMM_INLINE double weight_under_iterated(int rigid, int iterations)
+/* d^2. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is n in a column. */
+SADMM_INLINE double weight_depth2(double speed, double push, double mass)
 {
-    return rigid ? min_of(max_of((double)WEIGHT_UNDER_ITERATED / iterations, 1.0), WEIGHT_STIFFEST) : 1;
+    const double depth = max_of(push / (mass * speed * WEIGHT_SPRING_DEPTH), 1.0);
+    return depth * depth;
 }
 
-/* V of a step that starts warm: less, and B more, in deep stacks and where the iterations are few; but an island whose
- * bodies move is no spring, and heavy weights are slow: no less than their speed. */
-SADMM_INLINE double weight_speed_warm(double speed, double stack_depth, double under_iterated, double kinetic,
-                                      double mass)
+SADMM_INLINE double weight_spring_need(double depth2, int iterations)
 {
-    const double stiffer = max_of(min_of(stack_depth * stack_depth, WEIGHT_STIFFEST), under_iterated);
+    return depth2 * WEIGHT_SPRING_ITERATIONS / iterations;
+}
+
+/* V: an island whose bodies move is no spring, and heavy weights are slow: no less than their speed. */
+SADMM_INLINE double weight_spring_speed(double speed, double need, double kinetic, double mass)
+{
+    const double stiffer = min_of(max_of(need, 1.0), WEIGHT_STIFFEST);
     return min_of(max_of(speed / stiffer, sqrt(kinetic / mass)), speed);
 }
 
-/* V, and what goes with it. warm: the step starts warm; under_iterated: weight_under_iterated. */
-SADMM_INLINE void weight_update_speed(struct weight_island *island, const struct weight_sums *sums, int warm,
-                                      double under_iterated)
+/* The share of a separation within the slop that a step closes. */
+SADMM_INLINE double weight_separation_share(double depth2, double need)
 {
-    const double mass = sums->mass, speed = weight_speed(sums->energy, mass);
-    island->mass = mass;
-    island->speed = speed;
-    island->stack_depth = 1;
-    if (!warm) return;
-    island->stack_depth = weight_stack_depth(speed, sums->push, mass);
-    island->speed = weight_speed_warm(speed, island->stack_depth, under_iterated, sums->kinetic, mass);
+    const double lack = min_of(need / WEIGHT_STIFFEST, depth2);
+    return min_of(max_of(1 / (lack * lack * lack), WEIGHT_SEPARATION_LEAST), 1.0);
 }
 
-/* The share of a separation within the slop that a step closes; and e with that, `slop` over dt, m/s. Contacts as
- * springs are as stiff as there are iterations, and the depth at which a stack buckles on them grows with the root of
- * these: beyond a number of them depth counts for less, and solves that go on until they are done are of e itself. The
- * number is the most that a scene's steps have, which need the rule as it is. */
-#define WEIGHT_SEPARATION_ITERATIONS 200.0
-
-SADMM_INLINE double weight_separation_share(double stack_depth, int iterations)
-{
-    const double square = stack_depth * stack_depth * min_of(WEIGHT_SEPARATION_ITERATIONS / iterations, 1.0);
-    return min_of(max_of(1 / (square * square * square), WEIGHT_SEPARATION_LEAST), 1.0);
-}
-
+/* e with that share; `slop` over dt, m/s. */
 SADMM_INLINE double weight_separation_error(double error, double share, double slop)
 {
     double eased = share * error, beyond = error - (1 - share) * slop;
     return error <= 0 ? error : eased > beyond ? eased : beyond;
+}
+
+/* V, and what goes with it; iterations: weight_spring_iterations. */
+SADMM_INLINE void weight_update_speed(struct weight_island *island, const struct weight_sums *sums, int iterations)
+{
+    const double mass = sums->mass, speed = weight_speed(sums->energy, mass);
+    double depth2, need;
+    island->mass = mass;
+    island->speed = speed;
+    island->separation_share = 1;
+    if (iterations == 0) return;
+    depth2 = weight_depth2(speed, sums->push, mass);
+    need = weight_spring_need(depth2, iterations);
+    island->speed = weight_spring_speed(speed, need, sums->kinetic, mass);
+    island->separation_share = weight_separation_share(depth2, need);
 }
 
 /* ---- B ----------------------------------------------------------------------------------------------------------- */
