@@ -24,6 +24,8 @@ import subprocess
 import sys
 import typing
 
+import constants
+
 PROJECT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 RESULTS = os.path.join(PROJECT, "docs", "results")
 SCENES = ["vertical_stacks", "oblique_stacks", "card_houses", "sliding_cubes:2000", "mixed_pile", "hand_demo"]
@@ -141,13 +143,17 @@ def rows_standing(tools):
         yield {"scene": scene, "steps": 600, **{key: match.group(1) if match else "" for key, match in found.items()}}
 
 
+def rows_constants(_):
+    return constants.rows()
+
+
 def columns(**titles):
     return list(titles.items())
 
 
 class Report(typing.NamedTuple):
     rows: typing.Callable                              # of the CSV file: what measures them
-    columns: list                                      # of the table: keys and titles
+    columns: list = ()                                 # of the table: keys and titles; no document has one without
     view: typing.Callable = lambda rows: rows          # the table's rows, of those of the CSV file
     draw: typing.Callable = lambda path: None          # pictures, of the CSV file's path
 
@@ -165,6 +171,7 @@ REPORTS = {
                                                     fast="`fast`"), counts_of, draw_convergence),
     "standing": Report(rows_standing, columns(scene="scene", steps="steps", penetration_m="penetration, m",
                                               drift_m="drift, m", ncp="natural map, m/s")),
+    "constants": Report(rows_constants),
 }
 SAME_EVERYWHERE = {"scenes"}  # no figure of theirs is measured
 

@@ -13,7 +13,7 @@
 
 /* Iterations after which a step that started cold recomputes its weights, from the loads it has found by then: 5, 10,
  * 20, 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
-enum { WEIGHT_FIRST_UPDATE = 5, WEIGHT_DOUBLE_BELOW = 40 };
+enum { WEIGHT_FIRST_UPDATE = 5, WEIGHT_DOUBLE_BELOW = 40 }; /* measured: bench/constants.py, cold */
 
 SADMM_INLINE int weight_next_update(int at) { return at < WEIGHT_DOUBLE_BELOW ? 2 * at : at + at / 2; }
 
@@ -21,11 +21,11 @@ SADMM_INLINE int weight_next_update(int at) { return at < WEIGHT_DOUBLE_BELOW ? 
  * loaded or not; but a mechanism moves along what none of its joints holds, which no body knows by itself, and an
  * iteration brings that motion on by a share of 1 / phi or so. Steps of a world (rigid) with few iterations rather miss
  * some of what joints hold, which the next steps make good, than of how bodies move, which none does. */
-#define WEIGHT_FLOOR_CONTACT 3.0
-#define WEIGHT_FLOOR_ROW 30.0
-#define WEIGHT_FLOOR_ROW_LEAST 3.0
+#define WEIGHT_FLOOR_CONTACT 3.0 /* measured: bench/constants.py, cold heaps standing */
+#define WEIGHT_FLOOR_ROW 30.0 /* measured: bench/constants.py, cold mechanisms */
+#define WEIGHT_FLOOR_ROW_LEAST 3.0 /* measured: bench/constants.py, mechanisms */
 /* From as many iterations on it is the whole. */
-#define WEIGHT_FLOOR_ROW_ITERATIONS 200.0
+#define WEIGHT_FLOOR_ROW_ITERATIONS 200.0 /* measured: bench/constants.py, mechanisms */
 
 SADMM_INLINE double weight_row_floor(int rigid, int iterations)
 {
@@ -77,13 +77,13 @@ SADMM_INLINE double weight_mass(double load, double speed, double mass)
  * order): the weights are too large. Where nothing but the contacts is left, impulses move at constant speed along
  * directions that no body feels; then the island stagnates, and keeps its weights, times what the weight scale rises
  * by: new ones would disturb the bodies. */
-enum { WEIGHT_FIRST_SCALE = 6 };
-#define WEIGHT_IMBALANCE_LEAST (1 / 3.0)
-#define WEIGHT_STAGNATION 30.0
-#define WEIGHT_SCALE_POWER 0.3
-#define WEIGHT_SCALE_STEP 4.0
-#define WEIGHT_SCALE_LEAST 0.1
-#define WEIGHT_SCALE_MOST 5.0
+enum { WEIGHT_FIRST_SCALE = 6 }; /* measured: bench/constants.py, cold */
+#define WEIGHT_IMBALANCE_LEAST (1 / 3.0) /* measured: bench/constants.py, cold */
+#define WEIGHT_STAGNATION 30.0 /* measured: bench/constants.py, cold */
+#define WEIGHT_SCALE_POWER 0.3 /* measured: bench/constants.py, cold */
+#define WEIGHT_SCALE_STEP 4.0 /* measured: bench/constants.py, cold */
+#define WEIGHT_SCALE_LEAST 0.1 /* measured: bench/constants.py, cold */
+#define WEIGHT_SCALE_MOST 5.0 /* measured: bench/constants.py, cold */
 
 /* Less than this is rounding, m/s. */
 #define WEIGHT_SCALE_ROUNDING 1e-12
@@ -131,10 +131,10 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
  * B is raised by that, up to WEIGHT_STIFFEST. Where it is not enough, separations must be closed slowly: closed in one
  * step they act on the springs as an integral controller, which excites slow swaying. A step closes the share lack^-3
  * of them, lack = need / WEIGHT_STIFFEST. Few iterations alone are no reason to: lack is at most d^2. */
-#define WEIGHT_SPRING_ITERATIONS 60
-#define WEIGHT_SPRING_DEPTH 20.0
-#define WEIGHT_STIFFEST 6.0
-#define WEIGHT_SEPARATION_LEAST 0.001
+#define WEIGHT_SPRING_ITERATIONS 60 /* measured: bench/constants.py, heaps standing */
+#define WEIGHT_SPRING_DEPTH 20.0 /* measured: bench/constants.py, heaps standing */
+#define WEIGHT_STIFFEST 6.0 /* measured: bench/constants.py, heaps standing */
+#define WEIGHT_SEPARATION_LEAST 0.001 /* measured: bench/constants.py, heaps standing */
 
 /* K of a step whose contacts are springs, 0: they are none. A problem that is solved in short batches is no row of
  * steps: this is for worlds (`rigid`). */
@@ -256,7 +256,7 @@ struct weight_law {
     double gain, compliance, lo, hi, floor;
 };
 
-#define WEIGHT_SOFT_MOST 3.0
+#define WEIGHT_SOFT_MOST 3.0 /* measured: bench/constants.py, mechanisms */
 
 SADMM_INLINE double weight_share(const struct weight_island *island, double load2)
 {

@@ -26,10 +26,10 @@ enum { ARTICULATION_BLOCK = SADMM_MAX_ROWS * SADMM_MAX_ROWS };
  * would move the heavier of its bodies by, alone. Rows of an overconstrained loop contradict each other by the errors
  * of its joints, along multipliers without a response; unregularised these grow from step to step (scene bricard: to
  * 1e6 N instead of 30) until they lock the loop. */
-#define ARTICULATION_REGULARISATION 1e-9
+#define ARTICULATION_REGULARISATION 1e-9 /* measured: bench/constants.py, mechanisms motion */
 /* Where the regularisation leaves more than this of a row, m/s or rad/s, all rows are solved once more with the same
  * factor (iterative refinement): rows that can be met are, to rounding. */
-#define ARTICULATION_REFINE_ABOVE 1e-5
+#define ARTICULATION_REFINE_ABOVE 1e-5 /* measured: bench/constants.py, mechanisms motion */
 /* Where rows are to be exact: their largest residual, m/s or rad/s, and the most refinements. */
 #define ARTICULATION_EXACT 1e-11
 enum { ARTICULATION_REFINEMENTS = 8 };
@@ -40,7 +40,7 @@ enum { ARTICULATION_PASSES = 16 };
 /* In trees a pass costs little, and after 8 one row changes at a time: of the 3,000 random trees of
  * tests/test_articulation_tree.c 87 need more than 16, 39 more than these. */
 enum { ARTICULATION_TOGETHER = 8, ARTICULATION_TREE_PASSES = 64 };
-#define ARTICULATION_SLACK 1e-9
+#define ARTICULATION_SLACK 1e-9 /* measured: bench/constants.py, mechanisms motion */
 
 /* Where a row is: between its bounds, at one of them, or fixed: it does not depend on the motion. Or it is absent: its
  * constraint has fewer. */

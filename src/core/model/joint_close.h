@@ -8,7 +8,7 @@
 #include "joint_law.h"
 
 /* A joint is closed once it is off by more than this share of its bodies' arms and radii of gyration, or rad. */
-#define JOINT_CLOSE_FROM 5e-4
+#define JOINT_CLOSE_FROM 5e-4 /* measured: bench/constants.py, mechanisms motion */
 /* Where a loop folds: what is off by e there lets its bodies turn by the root of e. */
 #define JOINT_CLOSE_FOLDING 1e-8
 /* By so many Newton steps at most. */
