@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Add up meson's test logs, and pytest's, and print "N passed, N failed, N skipped".
+"""Add up meson's test logs, and pytest's, and print "N passed, N failed, N skipped", and what took the most time.
 
 usage: sum_tests.py [--broken "STEP STEP"] [--left-out "STEP STEP"] [--passed "STEP STEP"] [TESTLOG.json | JUNIT.xml]...
 
@@ -36,16 +36,17 @@ def count(test):
 
 
 def results(log):
-    """Of each test of a log: its name, its result, (passed, failed, skipped)."""
+    """Of each test of a log: its name, its result, (passed, failed, skipped), seconds."""
     if log.suffix == ".xml":
         for case in xml.etree.ElementTree.parse(log).iter("testcase"):
             of = {child.tag for child in case}
             result = "FAIL" if of & {"failure", "error"} else "SKIP" if "skipped" in of else "OK"
-            yield case.get("name"), result, (int(result == "OK"), int(result == "FAIL"), int(result == "SKIP"))
+            yield (case.get("name"), result, (int(result == "OK"), int(result == "FAIL"), int(result == "SKIP")),
+                   float(case.get("time", 0)))
         return
     for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
         test = json.loads(line)
-        yield test["name"], test["result"], count(test)
+        yield test["name"].split(" / ")[-1], test["result"], count(test), test.get("duration", 0)
 
 
 def main():
@@ -72,10 +73,15 @@ def main():
             counts[1] = 1
             print(f"{step}: no test ran")
         else:
-            for name, result, of in results(log):
+            seconds = {}
+            for name, result, of, took in results(log):
                 counts = [a + b for a, b in zip(counts, of)]
+                seconds[name] = seconds.get(name, 0) + took
                 if result not in ("OK", "EXPECTEDFAIL", "SKIP"):
                     print(f"{step}: {name}: {result}")
+            longest = sorted(seconds, key=seconds.get, reverse=True)[:5]
+            print(f"{step}: programs took {sum(seconds.values()):.0f} s, of it " +
+                  ", ".join(f"{name} {seconds[name]:.0f}" for name in longest))
         print(f"{step}: {counts[0]} passed, {counts[1]} failed, {counts[2]} skipped")
         total = [a + b for a, b in zip(total, counts)]
     print(f"{total[0]} passed, {total[1]} failed, {total[2]} skipped")

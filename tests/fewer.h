@@ -14,4 +14,14 @@ static inline bool is_its_turn(int subject, int way)
     return !getenv("SADMM_TEST_SHORT") || (subject + way) % 2 == 0;
 }
 
+/* Is this a run for the thread sanitizer? What takes long and works on one thread shows it nothing. */
+static inline bool races_are_looked_for(void)
+{
+#ifdef __SANITIZE_THREAD__
+    return true;
+#else
+    return false;
+#endif
+}
+
 #endif

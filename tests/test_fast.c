@@ -10,6 +10,7 @@
 #include "core/model/system_math.h"
 #include "core/solve/certificate.h"
 #include "core/solve/schedule.h"
+#include "fewer.h"
 #include "fixed_work.h"
 #include "scene_tools.h"
 #include "table_runner.h"
@@ -796,8 +797,10 @@ int main(void)
     tcase_add_test(solutions, masses_do_not_matter);
     tcase_add_loop_test(solutions, solutions_are_certified, 0, 4);
     tcase_add_loop_test(solutions, momentum_residuals_do_not_drift, 0, single_count);
-    tcase_add_loop_test(motion, too_few_iterations_are_safe, 0, 4 * (int)(sizeof moving / sizeof *moving));
-    tcase_add_loop_test(motion, few_iterations_come_to_rest, 0, 2 * RESTING);
+    if (!races_are_looked_for()) {
+        tcase_add_loop_test(motion, too_few_iterations_are_safe, 0, 4 * (int)(sizeof moving / sizeof *moving));
+        tcase_add_loop_test(motion, few_iterations_come_to_rest, 0, 2 * RESTING);
+    }
     tcase_add_loop_test(motion, single_precision_rests, 0, 2);
     TCase *const cases[] = {tables_case, weights, solutions, motion};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
