@@ -7,7 +7,7 @@ jobs=${JOBS:-$(nproc)}
 
 # Debian's and Ubuntu's names. "package=command": having the command is enough.
 packages_to_run=(gcc=cc 'g++=c++' meson=meson ninja-build=ninja pkgconf=pkg-config libfcl-dev libqhull-dev libjansson-dev)
-packages_to_test=("${packages_to_run[@]}" git=git libhdf5-dev check clang=clang libclang-rt-dev util-linux=setarch
+packages_to_test=("${packages_to_run[@]}" git=git libhdf5-dev check clang=clang libclang-rt-dev libomp-dev util-linux=setarch
                   python3-dev python3-venv)
 # Used where the release offers it.
 packages_to_test_if_offered=(libsiconos-numerics-dev python3-jsonschema chromium-headless-shell)

@@ -4,7 +4,7 @@ set -euo pipefail
 # shellcheck source=scripts/lib.sh
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
-steps=(plain python docs asan tsan minimal cuda)
+steps=(plain python docs asan tsan clang minimal cuda)
 slow_steps=(fuzz) # with --slow
 more_steps=(gpu)  # only when asked for
 
@@ -19,6 +19,7 @@ Installs what is missing (Debian and Ubuntu, as root or by sudo without a passwo
              where Doxygen or Sphinx cannot be installed
     asan     address and undefined-behaviour sanitizers, the whole suite, also on the emulated CUDA device (single precision)
     tsan     thread sanitizer, the tests of suite 'threads'
+    clang    by clang with LLVM's OpenMP, test_threads only
     minimal  by clang, no optional feature, no instruction set beyond the compiler's default, the whole suite without the
              emulated CUDA device, with a quarter of the random cases. clang writes a lane of a vector by storing the whole
              vector, which makes a race where threads share one
@@ -61,7 +62,7 @@ install_packages "${packages_to_test[@]}"
 install_packages_if_offered "${packages_to_test_if_offered[@]}"
 
 # Features are demanded, not hoped for: a missing package must not pass for a shorter suite.
-features=(-Dwerror=true -Dfcl=enabled -Dqhull=enabled -Dhdf5=enabled -Dcli=enabled -Dbench=enabled -Dtests=enabled)
+features=(-Dwerror=true -Dfcl=enabled -Dqhull=enabled -Dopenmp=enabled -Dhdf5=enabled -Dcli=enabled -Dbench=enabled -Dtests=enabled)
 package_installed libsiconos-numerics-dev && features+=(-Dsiconos=enabled)
 
 logs=()        # testlog.json of each step that ran
@@ -159,10 +160,19 @@ step_tsan() {
     run_tests tsan --suite threads
 }
 
+step_clang() {
+    say "clang: by clang with LLVM's OpenMP"
+    # Only what this test needs is built.
+    CC=clang CXX=clang++ configure "$project/build-clang" -Dwerror=true -Dtests=enabled -Dopenmp=enabled -Dcpu_isas=avx2 -Dcli=disabled \
+        -Dbench=disabled -Dfcl=disabled -Dcuda=disabled -Dhdf5=disabled -Dsiconos=disabled -Demulated_cuda=disabled || return 1
+    local rebuild=()
+    run_tests clang threads
+}
+
 step_minimal() {
-    say "minimal: by clang, no FCL, qhull, CUDA or HDF5, no instruction set beyond the compiler's default"
+    say "minimal: by clang, no FCL, qhull, CUDA, HDF5 or OpenMP, no instruction set beyond the compiler's default"
     CC=clang CXX=clang++ build minimal -Dwerror=true -Dtests=enabled -Dcli=enabled -Dbench=enabled -Dfcl=disabled -Dqhull=disabled \
-        -Dcuda=disabled -Dhdf5=disabled -Dsiconos=disabled -Dcpu_isas=baseline -Demulated_cuda=disabled || return 1
+        -Dcuda=disabled -Dhdf5=disabled -Dopenmp=disabled -Dsiconos=disabled -Dcpu_isas=baseline -Demulated_cuda=disabled || return 1
     # All random cases are those of step plain.
     SADMM_TEST_SHORT=1 run_tests minimal --no-suite slow
 }

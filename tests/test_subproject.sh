@@ -21,7 +21,7 @@ grep -q default_options "$folder/meson.build" || { echo "docs/guide/install.md h
 meson setup "$folder/build" "$folder" > "$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
 config=$folder/build/subprojects/subadmm/src/config.h
 [ -s "$config" ] || { echo "$config was not made"; exit 1; }
-if grep -E 'define SADMM_HAVE_(FCL|CUDA|HDF5)' "$config"; then
+if grep -E 'define SADMM_HAVE_(FCL|CUDA|HDF5|OPENMP)' "$config"; then
     echo "is there, although it was disabled"
     exit 1
 fi

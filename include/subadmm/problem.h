@@ -116,7 +116,7 @@ SADMM_API sadmm_status sadmm_problem_get_block(sadmm_problem *problem, int32_t i
  * (negative; sadmm_problem_solve refuses an index that the machine lacks). */
 SADMM_API sadmm_status sadmm_problem_set_device(sadmm_problem *problem, int device);
 
-/* Threads of the host to work on solves (tasks.h); NULL or all zero: its own, the default. Errors: INVALID_ARGUMENT
+/* Threads of the host to work on solves (tasks.h); NULL or all zero: OpenMP's, the default. Errors: INVALID_ARGUMENT
  * (nothing changes), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_problem_set_tasks(sadmm_problem *problem, const sadmm_tasks *tasks);
 

@@ -19,7 +19,7 @@ typedef enum sadmm_precision { SADMM_F32 = 0, SADMM_F64 = 1 } sadmm_precision;
 typedef enum sadmm_backend {
     SADMM_BACKEND_AUTO = 0,
     SADMM_BACKEND_REF,  /* the paper's Steps 1-4 with x, z, u, naive, double only: the oracle */
-    SADMM_BACKEND_CPU,  /* threads and vectors, reduced form */
+    SADMM_BACKEND_CPU,  /* OpenMP, reduced form */
     SADMM_BACKEND_CUDA, /* NVIDIA GPUs */
     SADMM_BACKEND_COUNT
 } sadmm_backend;
@@ -131,10 +131,11 @@ typedef struct sadmm_settings {
                                     (docs/internals/algorithm.md, "Hits"), and on CUDA some more where there are very
                                     many. In [0, SADMM_MOST_HITS = 64]; 0: none; default 16 */
 
-    int threads;                 /* largest number of CPU threads, in [0, 1024]; 0 = no bound; default 0. The number
-                                    used also depends on the size of the work, the processors that the affinity of the
-                                    process and the quota of its container allow, the host's thread pool (tasks.h), and
-                                    which threads come in time; reports have it. Results do not depend on it */
+    int threads;                 /* largest number of CPU threads, in [0, 1024]; 0: OpenMP's default
+                                    (OMP_NUM_THREADS); default 0. The number used also depends on the size of the work,
+                                    the processors that the affinity of the process and the quota of its container
+                                    allow, the host's thread pool (tasks.h), and which threads come in time; reports
+                                    have it. Results do not depend on it */
 } sadmm_settings;
 
 /* The defaults named above. Thread-safe. */

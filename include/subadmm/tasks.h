@@ -1,9 +1,8 @@
 /* Threads of the host for the work of the library.
  *
- * By default the library creates threads. A program with its own thread pool can provide that instead: to a world in
- * its definition, to a problem by sadmm_problem_set_tasks. The library then creates none. Results do not depend on the
- * pool or the number of threads, bit for bit.
- */
+ * By default the library uses OpenMP's threads (builds without OpenMP: plain ones). A program with its own thread pool
+ * can provide that instead: to a world in its definition, to a problem by sadmm_problem_set_tasks. The library then
+ * creates no threads. Results do not depend on the pool or the number of threads, bit for bit. */
 #ifndef SUBADMM_TASKS_H
 #define SUBADMM_TASKS_H
 

@@ -25,7 +25,7 @@ typedef struct sadmm_world_def {
                                    default 0.02. Contacts are made up to a distance of the margin (or of acceleration x
                                    dt^2 by gravity and external wrenches, if larger) plus what the velocities can close
                                    in one step */
-    sadmm_tasks tasks;          /* threads of the host to work on steps; default all zero: its own (tasks.h) */
+    sadmm_tasks tasks;          /* threads of the host to work on steps; default all zero: OpenMP's (tasks.h) */
     sadmm_settings settings;
 } sadmm_world_def;
 

@@ -14,7 +14,7 @@
  * names another object.
  *
  * A process may fork while no call is running: parent and child then have a copy of the world each. CUDA devices do not
- * survive a fork, and neither do threads: if the parent has used the library's, the child steps and solves on one
+ * survive a fork, and neither do threads: if the parent has used OpenMP's, the child steps and solves on one
  * thread, with the same results; so do worlds and problems with the parent's `tasks`.
  */
 #ifndef SUBADMM_WORLD_H

@@ -29,7 +29,7 @@ def _arguments():
         command.add_argument("--precision", choices=_names["precision"], help="default: the scene's")
         command.add_argument("--method", choices=_names["method"], help="default: the scene's")
         command.add_argument("--iterations", type=int, help="a step; default: the scene's")
-        command.add_argument("--threads", type=int, help="at most so many; 0: no bound; default: the scene's")
+        command.add_argument("--threads", type=int, help="at most so many; 0: OpenMP's default; default: the scene's")
     for command in (record, picture):
         command.add_argument("-o", "--output", required=True, help="the file to write")
         length = command.add_mutually_exclusive_group()

@@ -21,26 +21,32 @@ DECLARE(sse2);
 DECLARE(generic);
 #endif
 
+#ifdef SADMM_HAVE_OPENMP
+#define THREADS "OpenMP"
+#else
+#define THREADS "plain threads (built without OpenMP)"
+#endif
+
 const struct sadmm_kernels *sadmm_cpu_find(sadmm_precision precision, const char **reason)
 {
 #ifdef SADMM_HAVE_ISA_AVX512
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
         __builtin_cpu_supports("avx512bw")) {
-        *reason = "AVX-512";
+        *reason = THREADS ", AVX-512";
         RETURN_TABLE(avx512);
     }
 #endif
 #ifdef SADMM_HAVE_ISA_AVX2
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        *reason = "AVX2";
+        *reason = THREADS ", AVX2";
         RETURN_TABLE(avx2);
     }
 #endif
 #ifdef SADMM_HAVE_ISA_SSE2
-    *reason = "SSE2";
+    *reason = THREADS ", SSE2";
     RETURN_TABLE(sse2);
 #else
-    *reason = "generic vectors";
+    *reason = THREADS ", generic vectors";
     RETURN_TABLE(generic);
 #endif
 }

@@ -19,7 +19,7 @@ struct sadmm_collision_input {
     int substeps_left;                /* so many more finds follow within the step: the list of pairs should last */
     double margin;                    /* share of the thinner shape's smallest extent (world def contact_margin) */
     int threads;                      /* at most; less than 1 counts as 1 */
-    struct sadmm_team *team;          /* whose threads (parallel.h); NULL: the library's */
+    struct sadmm_team *team;          /* whose threads (parallel.h); NULL: OpenMP's */
     /* Pair overrides, both sorted by key = (low slot << 32) | high slot. */
     const uint64_t *disabled_body_pairs; size_t disabled_body_pair_count;      /* body slots */
     const uint64_t *friction_pairs; const double *friction_values; size_t friction_pair_count; /* shape slots */

@@ -4,7 +4,6 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-#include "processors.h"
 #include "wait.h"
 
 static _Thread_local bool forced;
@@ -50,7 +49,7 @@ int sadmm_team_threads(const struct sadmm_team *team, int wanted, size_t deserve
     int threads = deserved < SADMM_MOST_THREADS ? (int)deserved : SADMM_MOST_THREADS;
     if (wanted > 0 && wanted < threads) threads = wanted;
     if (threads <= 1) return 1;
-    int offered = tasks ? team->tasks.threads : sadmm_processors();
+    int offered = tasks ? team->tasks.threads : sadmm_workers_offered(wanted);
     return offered < threads ? offered : threads;
 }
 
@@ -126,10 +125,12 @@ int sadmm_parallel(struct sadmm_team *team, int threads, sadmm_parallel_function
 {
     const bool hosts = team && team->tasks.enqueue;
     int ran = 1;
-    if (threads > 1 && are_here(team))
+    if (threads > 1 && are_here(team)) {
+        if (!hosts) sadmm_workers_gather(threads - 1);
         ran = run_region(hosts ? &team->tasks : &own, threads, forced && !hosts, function, argument);
-    else
+    } else {
         function(argument, 0, 1);
+    }
     if (team && ran > team->ran) team->ran = ran;
     return ran;
 }

@@ -1,6 +1,6 @@
 /* Work by several threads: every parallel region of the library is one call of sadmm_parallel.
  *
- * The threads are the library's own (workers.h), or come as tasks from the host's pool (subadmm/tasks.h). The calling
+ * The threads are OpenMP's (workers.h), or come as tasks from the host's pool (subadmm/tasks.h). The calling
  * thread waits for them some microseconds. From then on the number of members is known, and those that come late go
  * home: on a busy machine a region is done by those that are there. A region is therefore written for any number of
  * members, and gives the same result, bit for bit, for all of them.
@@ -20,14 +20,14 @@
 extern "C" {
 #endif
 
-/* Whose threads work for a world or a problem. All 0: the library's. */
+/* Whose threads work for a world or a problem. All 0: OpenMP's. */
 struct sadmm_team {
     sadmm_tasks tasks;
     unsigned forks; /* of the process when the tasks were given */
     int ran;        /* the most members a region has had since somebody set this to 0 */
 };
 
-/* `tasks` may be NULL, for the library's threads. `name` is the argument's in messages. Errors: INVALID_ARGUMENT
+/* `tasks` may be NULL, for OpenMP's threads. `name` is the argument's in messages. Errors: INVALID_ARGUMENT
  * (`team` is left alone), OUT_OF_MEMORY. */
 sadmm_status sadmm_team_init(struct sadmm_team *team, const sadmm_tasks *tasks, const char *name,
                              struct sadmm_error *error);
@@ -40,7 +40,7 @@ int sadmm_team_threads(const struct sadmm_team *team, int wanted, size_t deserve
 typedef void sadmm_parallel_function(void *argument, int thread, int threads);
 
 /* Have the function called by up to `threads` threads at a time, once by each; return when all are done. Returns how
- * many they were. The function may wait at barriers (barrier.h); it begins no region. `team`: NULL for the library's
+ * many they were. The function may wait at barriers (barrier.h); it begins no region. `team`: NULL for OpenMP's
  * threads. */
 int sadmm_parallel(struct sadmm_team *team, int threads, sadmm_parallel_function *function, void *argument);
 

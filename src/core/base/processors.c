@@ -9,6 +9,10 @@
 #include <string.h>
 #include <unistd.h>
 
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
 enum { MOST_PATH = 4096 };
 
 /* The first line of a file of a control group; false: there is no such file. */
@@ -94,11 +98,17 @@ static int processors = 1;
 
 static void look_up(void)
 {
+#ifdef _OPENMP
+    processors = omp_get_num_procs(); /* also where OpenMP has bound the calling thread to one of its places */
+#else
     const long online = sysconf(_SC_NPROCESSORS_ONLN);
     processors = online > 1 && online < 1 << 20 ? (int)online : 1;
 #ifdef __linux__
     cpu_set_t allowed; /* of up to 1,024 processors; larger machines answer with an error */
     if (sched_getaffinity(0, sizeof allowed, &allowed) == 0) processors = CPU_COUNT(&allowed);
+#endif
+#endif
+#ifdef __linux__
     const int quota = sadmm_processor_quota("/proc/self/cgroup", "/sys/fs/cgroup");
     if (quota > 0 && quota < processors) processors = quota;
 #endif

@@ -36,7 +36,8 @@
       "Approach speed under which restitution is ignored, m/s.")                                                       \
     F(X, WHOLE, PLAN, hits, 16, 0, 64, CLOSED,                                                                         \
       "Hits of a body in flight that are taken at their moments, at most, a (sub-)step; 0: the solve has all.")        \
-    F(X, WHOLE, PLAN, threads, 0, 0, 1024, CLOSED, "CPU threads at most; 0: no bound. Results do not depend on it.")
+    F(X, WHOLE, PLAN, threads, 0, 0, 1024, CLOSED,                                                                     \
+      "CPU threads at most; 0: OpenMP's default. Results do not depend on it.")
 
 /* A number of iterations a step, 20, and nothing else: no tolerance, no dense contact solve. */
 static inline void sadmm_settings_fix_work(sadmm_settings *settings)

@@ -56,7 +56,7 @@ struct sadmm_team;
 struct spin_system; /* spin.h */
 
 struct sadmm_system {
-    struct sadmm_team *team;         /* whose threads work on it (parallel.h); NULL: the library's */
+    struct sadmm_team *team;         /* whose threads work on it (parallel.h); NULL: OpenMP's */
     int32_t body_count;
     const struct sadmm_rigid *rigid; /* (body_count) or NULL */
     const struct spin_system *spins; /* (body_count) spin_of_system of `rigid`, or NULL: not known yet */
