@@ -4,6 +4,7 @@
 
 #include "core/base/parallel.h"
 #include "core/math/energy_limit.h"
+#include "fewer.h"
 #include "fixed_work.h"
 #include "momentum_worlds.h"
 #include "runner.h"
@@ -405,12 +406,14 @@ int main(void)
     tcase_add_test(formulas, points_with_friction_anchor);
     tcase_add_test(formulas, restored_motion_has_the_momentum);
     tcase_set_timeout(worlds, 120);
-    tcase_add_loop_test(worlds, clusters_in_flight, 0, ENGINES * BUDGETS);
-    tcase_add_loop_test(worlds, a_large_cluster, 0, BUDGETS);
-    tcase_add_loop_test(worlds, mechanisms, 0, 2 * ENGINES * BUDGETS);
-    tcase_add_loop_test(worlds, bodies_on_ice, 0, ENGINES * BUDGETS);
-    tcase_add_loop_test(worlds, overlapping_balls_fall_and_come_apart, 0, BUDGETS);
-    tcase_add_loop_test(worlds, clusters_gain_no_energy, 0, BUDGETS);
+    if (!races_are_looked_for()) {
+        tcase_add_loop_test(worlds, clusters_in_flight, 0, ENGINES * BUDGETS);
+        tcase_add_loop_test(worlds, a_large_cluster, 0, BUDGETS);
+        tcase_add_loop_test(worlds, mechanisms, 0, 2 * ENGINES * BUDGETS);
+        tcase_add_loop_test(worlds, bodies_on_ice, 0, ENGINES * BUDGETS);
+        tcase_add_loop_test(worlds, overlapping_balls_fall_and_come_apart, 0, BUDGETS);
+        tcase_add_loop_test(worlds, clusters_gain_no_energy, 0, BUDGETS);
+    }
     tcase_add_loop_test(worlds, threads_do_not_show, 0, 4);
     tcase_add_test(worlds, anchored_islands_are_left_alone);
     suite_add_tcase(suite, formulas);
