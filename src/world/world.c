@@ -102,6 +102,7 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->shape_links, world->filtered_pairs, world->joints, world->couplings, world->gears,
                       world->joint_sources, world->joint_load, world->stiffening, world->stiffened,
                       world->opened, world->folding, world->row_left, world->closing_costs, world->closing_slots,
+                      world->openings,
                       world->trapezoids, world->touch, world->acting_joints, world->joint_sides,
                       world->spins, world->joint_trapezoids,
                       world->joint_labels, world->joint_touch, world->joint_number,

@@ -37,7 +37,7 @@ static __device__ __noinline__ bool closing_of(const cuda_view &v, int32_t j, bo
         may_open = may_open || (moves[s] && joint_island_may_open(bits_of(v, body.system_body)));
         start[s] = joint_end_on(&joint->frame[s], body.rigid);
         end[s] = joint_end_after(v, j, s, moves[s] ? v.joints.closed[body.system_body].place : nullptr);
-        scale += joint_closing_scale(&end[s], moves[s] ? body.rigid : nullptr);
+        scale += joint_closing_scale(end[s].arm, moves[s] ? body.rigid : nullptr);
     }
     *out = joint_closing_of(&joint->def, start, end, scale, &settings);
     if (folds) return out->share > JOINT_CLOSE_FOLDING;

@@ -50,14 +50,18 @@ SADMM_INLINE quat q_conjugate(quat q)
 
 SADMM_INLINE vec3 q_turn(quat q, vec3 v) { return m3_mul(q_matrix(q), v); }
 
-/* Rotation vector of a unit quaternion, of at most half a turn. */
+/* The rotation vector of a unit quaternion, of at most half a turn, is its vector part times this. sine: its size. */
+SADMM_INLINE real q_log_scale(real w, real sine)
+{
+    const real sign = w < 0 ? (real)-1 : (real)1;
+    /* 2 atan(s / w) / s, whose next term is under 1e-16 there */
+    const double scale = sine < (real)1e-8 ? 2 : 2 * atan2((double)sine, (double)(sign * w)) / (double)sine;
+    return sign * (real)scale;
+}
 SADMM_INLINE vec3 q_log(quat q)
 {
     const vec3 v = v3(q.x, q.y, q.z);
-    const real sign = q.w < 0 ? (real)-1 : (real)1, sine = v3_norm(v);
-    /* 2 atan(s / w) / s, whose next term is under 1e-16 there */
-    const double scale = sine < (real)1e-8 ? 2 : 2 * atan2((double)sine, (double)(sign * q.w)) / (double)sine;
-    return v3_scale(v, sign * (real)scale);
+    return v3_scale(v, q_log_scale(q.w, v3_norm(v)));
 }
 
 SADMM_INLINE real v3_part(vec3 v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
@@ -87,20 +91,29 @@ SADMM_INLINE int joint_odd_rotation(uint32_t locks)
     return odd == 1 ? 0 : odd == 2 ? 1 : odd == 4 ? 2 : -1;
 }
 
-/* Two rotations are locked, `free` is not. */
-SADMM_INLINE void joint_swing(quat relative, int free, real value[3])
+/* Two rotations are locked, `free` is not: relative = swing twist, of which the twist is about its axis. Values of the
+ * locked ones; returns the scalar part of the twist, and its part along the axis. */
+SADMM_INLINE real joint_swing_off(quat relative, int free, real *twist, real value[3])
 {
     const vec3 part = v3(relative.x, relative.y, relative.z);
-    const real along = v3_part(part, free), size = real_sqrt(relative.w * relative.w + along * along);
-    quat twist;
-    vec3 swing;
-    twist.w = size > 0 ? relative.w / size : 1;
-    twist.x = free == 0 && size > 0 ? along / size : 0;
-    twist.y = free == 1 && size > 0 ? along / size : 0;
-    twist.z = free == 2 && size > 0 ? along / size : 0;
-    swing = q_log(q_mul(relative, q_conjugate(twist)));
-    value[0] = swing.x, value[1] = swing.y, value[2] = swing.z;
-    value[free] = v3_part(q_log(twist), free);
+    const int i = (free + 1) % 3, j = (free + 2) % 3;
+    const real along = v3_part(part, free), at_i = v3_part(part, i), at_j = v3_part(part, j),
+               size = real_sqrt(relative.w * relative.w + along * along), w = size > 0 ? relative.w / size : 1,
+               turn = size > 0 ? along / size : 0;
+    const real left = along * w - relative.w * turn, to_i = at_i * w - at_j * turn, to_j = at_j * w + at_i * turn;
+    const quat swing = {relative.w * w + along * turn, free == 0 ? left : free == 1 ? to_j : to_i,
+                        free == 1 ? left : free == 2 ? to_j : to_i, free == 2 ? left : free == 0 ? to_j : to_i};
+    const vec3 off = q_log(swing);
+    value[0] = off.x, value[1] = off.y, value[2] = off.z;
+    *twist = turn;
+    return w;
+}
+/* And of the free one. */
+SADMM_INLINE void joint_swing(quat relative, int free, real value[3])
+{
+    real turn;
+    const real w = joint_swing_off(relative, free, &turn, value);
+    value[free] = turn * q_log_scale(w, real_abs(turn));
 }
 
 /* Rotation `locked` is, the other two are free: axes of `axis` that are not a's; values. */
@@ -120,6 +133,21 @@ SADMM_INLINE void joint_cross_values(mat3 a, mat3 b, int locked, real value[3])
     value[j] = (real)atan2((double)v3_dot(a_i, m3_column(b, locked)), (double)v3_dot(a_i, m3_column(b, i)));
 }
 
+/* Rotations of b's frame past a's where not one of them alone is locked; free: of free ones, too. */
+SADMM_ALWAYS_INLINE void joint_rotation_values(quat a, quat b, uint32_t locks, bool free, real value[3])
+{
+    const quat relative = q_mul(q_conjugate(a), b);
+    vec3 turn;
+    real twist;
+    if (joint_locked_rotations(locks) == 2) {
+        if (free) joint_swing(relative, joint_odd_rotation(locks), value);
+        else joint_swing_off(relative, joint_odd_rotation(locks), &twist, value);
+        return;
+    }
+    turn = q_log(relative);
+    value[0] = turn.x, value[1] = turn.y, value[2] = turn.z;
+}
+
 /* A length below this has no direction: a's x axis stands for it. */
 #define JOINT_LEAST_LENGTH 1e-12
 
@@ -131,7 +159,6 @@ SADMM_ALWAYS_INLINE struct joint_geometry joint_geometry_with(const struct joint
     const mat3 frame = q_matrix(a->orientation);
     const vec3 way = v3_sub(b->point, a->point);
     const int locked = joint_locked_rotations(locks), odd = joint_odd_rotation(locks);
-    quat relative;
     int k;
     g.arm_a = v3_add(a->arm, way);
     g.arm_b = b->arm;
@@ -151,14 +178,7 @@ SADMM_ALWAYS_INLINE struct joint_geometry joint_geometry_with(const struct joint
         if (values) joint_cross_values(frame, other, odd, g.value + 3);
         return g;
     }
-    if (!values) return g;
-    relative = q_mul(q_conjugate(a->orientation), b->orientation);
-    if (locked == 2) {
-        joint_swing(relative, odd, g.value + 3);
-    } else {
-        const vec3 turn = q_log(relative);
-        g.value[3] = turn.x, g.value[4] = turn.y, g.value[5] = turn.z;
-    }
+    if (values) joint_rotation_values(a->orientation, b->orientation, locks, true, g.value + 3);
     return g;
 }
 SADMM_INLINE struct joint_geometry joint_geometry_of(const struct joint_end *a, const struct joint_end *b,

@@ -81,12 +81,34 @@ SADMM_INLINE double joint_closing_left(double error, double dt, double most)
 }
 
 /* Of a body, to the scale of its joint's errors; NULL: it does not move. */
-SADMM_INLINE double joint_closing_scale(const struct joint_end *end, const struct sadmm_rigid *body)
+SADMM_INLINE double joint_closing_scale(vec3 arm, const struct sadmm_rigid *body)
 {
-    return body ? v3_norm(end->arm) + sqrt(v3_max_abs(v3_load(body->inertia)) / body->mass) : 0;
+    return body ? v3_norm(arm) + sqrt(v3_max_abs(v3_load(body->inertia)) / body->mass) : 0;
 }
 
-/* start: as the step began; scale: of both bodies. A distance is an arm, too. */
+/* Its errors: c->geometry as the poses have it; before: values as the step began; scale: of both bodies. A distance is
+ * an arm, too. */
+SADMM_INLINE void joint_closing_errors(const sadmm_joint_def *def, const double before[JOINT_COORDINATES], double scale,
+                                       const struct sadmm_settings *settings, struct joint_closing *c)
+{
+    const int radial = joint_is_radial(def->kind);
+    int k;
+    c->count = 0;
+    c->share = 0;
+    if (radial) scale += def->length;
+    for (k = 0; k < JOINT_COORDINATES; ++k) {
+        const double rest = k == 0 && radial ? def->length : 0;
+        double error;
+        if (!(def->locks >> k & 1)) continue;
+        error = c->geometry.value[k] - rest -
+                joint_closing_left(before[k] - rest, settings->dt, settings->correction_speed);
+        c->share = max_of(c->share, fabs(error) / (k < 3 ? scale : 1));
+        c->coordinate[c->count] = k;
+        c->error[c->count++] = error;
+    }
+}
+
+/* start: as the step began. */
 SADMM_INLINE struct joint_closing joint_closing_of(const sadmm_joint_def *def, const struct joint_end start[2],
                                                    const struct joint_end end[2], double scale,
                                                    const struct sadmm_settings *settings)
@@ -94,21 +116,8 @@ SADMM_INLINE struct joint_closing joint_closing_of(const sadmm_joint_def *def, c
     const int radial = joint_is_radial(def->kind);
     const struct joint_geometry before = joint_geometry_of(&start[0], &start[1], def->locks, radial);
     struct joint_closing c;
-    int k;
     c.geometry = joint_geometry_of(&end[0], &end[1], def->locks, radial);
-    c.count = 0;
-    c.share = 0;
-    if (radial) scale += def->length;
-    for (k = 0; k < JOINT_COORDINATES; ++k) {
-        const double rest = k == 0 && radial ? def->length : 0;
-        double error;
-        if (!(def->locks >> k & 1)) continue;
-        error = c.geometry.value[k] - rest -
-                joint_closing_left(before.value[k] - rest, settings->dt, settings->correction_speed);
-        c.share = max_of(c.share, fabs(error) / (k < 3 ? scale : 1));
-        c.coordinate[c.count] = k;
-        c.error[c.count++] = error;
-    }
+    joint_closing_errors(def, before.value, scale, settings, &c);
     return c;
 }
 

@@ -88,19 +88,30 @@ SADMM_INLINE bool joint_contacts_hold(const struct trapezoid_touch *touch, const
     return holds;
 }
 
+SADMM_INLINE bool joint_row_has_table(const struct sadmm_joint_source *source)
+{
+    return source->role == SADMM_ROLE_SPRING && source->separation < INFINITY;
+}
+
+/* Is the row a limit that presses, or a spring's table? */
+SADMM_INLINE bool joint_row_limits(const struct sadmm_joint_source *source, double lambda)
+{
+    const bool limit = source->role == SADMM_ROLE_LOWER || source->role == SADMM_ROLE_UPPER;
+    return (limit && lambda > 0) || joint_row_has_table(source);
+}
+
 /* Would the trapezoid correction move the joint beyond a limit that it has just reached, or beyond where a spring's
  * table stops it? (A limit that presses all the time, a stone on a string, is met by the mean of both velocities, too.)
- * row_a, row_b: the row's Jacobians. */
+ * row_a, row_b: the row's Jacobians. Bodies are read where joint_row_limits. */
 SADMM_INLINE bool joint_limit_penetrates(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
                                          const double row_b[6], const struct joint_trapezoid bodies[2],
                                          const struct sadmm_settings *settings)
 {
-    const bool table = source->role == SADMM_ROLE_SPRING && source->separation < INFINITY;
+    const bool table = joint_row_has_table(source);
     const double margin = source->slack + TRAPEZOID_SLOP * settings->slop;
     double correction = 0, speed = source->prescribed, way;
     int s, j;
-    if (!table && ((source->role != SADMM_ROLE_LOWER && source->role != SADMM_ROLE_UPPER) || !(lambda > 0)))
-        return false;
+    if (!joint_row_limits(source, lambda)) return false;
     for (s = 0; s < 2; ++s) {
         const double *row = s ? row_b : row_a;
         for (j = 0; j < 6; ++j) {

@@ -87,14 +87,19 @@ void sadmm_articulation_part_load_at(struct articulation_part *part, const struc
                                      const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots)
 {
     const struct articulation_view *v = &part->view;
-    load_rows(v, system->rows, slots);
     for (int32_t e = 0; e < v->s.bodies; ++e)
         sadmm_system_body(system, settings, v->s.body[e], v->factor + 36 * (size_t)e, part->without + 6 * (size_t)e);
-    if (part->gives) let_rows_give(v);
+    if (part->gives) {
+        load_rows(v, system->rows, slots);
+        let_rows_give(v);
+    }
     part->loaded = false;
     part->by_tree = settings->ncp_points > 0 && part->tree.nodes > 0 &&
-                    part->kernels->load(&part->tree, v, slots, part->impulse, part->without);
+                    part->kernels->load(&part->tree, v, slots, part->gives ? NULL : system->rows, part->impulse,
+                                        part->without);
     if (part->by_tree) return;
+    load_rows(v, system->rows, slots);
+    if (part->gives) let_rows_give(v);
     clear_absent_rows(v);
     for (int32_t e = 0; e < v->s.bodies; ++e) add_row_loads(part, e);
 }
@@ -285,11 +290,17 @@ static void begin_tree_rows(struct articulation_part *part, const uint8_t *earli
     for (int32_t at = 0; at < part->tree.rows; ++at) {
         struct articulation_tree_row *row = &part->tree.row[at];
         const struct articulation_row *from = &v->rows[row->r];
-        const double change = articulation_clamp(from->lambda, from->lo, from->hi) - from->lambda;
+        const double lo = from->lo, hi = from->hi;
         const uint8_t before = earlier ? earlier[row->r] : ROW_ABSENT;
-        row->lo = from->lo, row->hi = from->hi;
+        row->lo = lo, row->hi = hi;
+        if (row->role == ARTICULATION_LOCK && lo == -HUGE_VAL && hi == HUGE_VAL) {
+            v->change[row->r] = 0;
+            v->state[row->r] = ROW_INSIDE;
+            continue;
+        }
+        const double change = articulation_clamp(row->lambda, lo, hi) - row->lambda;
         v->change[row->r] = change;
-        if (row->gain != 0 && before == ROW_INSIDE && row->hi > row->lo) {
+        if (row->gain != 0 && before == ROW_INSIDE && hi > lo) {
             v->state[row->r] = ROW_INSIDE;
             continue;
         }

@@ -85,11 +85,12 @@ void sadmm_articulation_tree_make(const struct articulation_structure *s, int32_
                                   struct articulation_tree *tree);
 
 /* This call's rows and loads: v->residual = b - A v + J^T lambda + impulse. slots: as of sadmm_articulations_solve.
- * impulse (bodies x 6): of contacts, then J^T lambda besides. without (bodies x 6): b, then the residual without
- * contacts. False, and both are what they were: the tree cannot solve them. Rows are no wrenches at points of space
- * (gears), or locks are not those of one joint. */
+ * rows: of the system, to v->rows; NULL: they are there. impulse (bodies x 6): of contacts, then J^T lambda besides.
+ * without (bodies x 6): b, then the residual without contacts. False, and both are what they were: the tree cannot
+ * solve them. Rows are no wrenches at points of space (gears), or locks are not those of one joint. */
 typedef bool sadmm_articulation_tree_load(struct articulation_tree *tree, const struct articulation_view *v,
-                                          const struct sadmm_row_constraint *slots, double *impulse, double *without);
+                                          const struct sadmm_row_constraint *slots, const struct sadmm_rows *rows,
+                                          double *impulse, double *without);
 
 /* With rows in their states, inertias in v->factor; nothing where it is known for these. */
 typedef void sadmm_articulation_tree_factorize(struct articulation_tree *tree, const struct articulation_view *v);

@@ -6,24 +6,24 @@
 #include "core/math/six.h"
 
 /* How far the axes of locks may be off being unit and perpendicular: their multipliers, by projection, are off by as
- * much, and refined. */
+ * much, and refined. Those of one joint are not off by more than rounding. */
 static const double PERPENDICULAR = 1e-9;
 
-/* Is the axis of a lock unit, and perpendicular to those before it? */
-static bool add_lock(struct articulation_tree *tree, struct articulation_node *node, int32_t at)
+/* A lock of a translation, or of a rotation. Is there room for it, and is its axis perpendicular to those of earlier
+ * joints, the first `others` of either kind? */
+static bool add_lock(struct articulation_tree *tree, struct articulation_node *node, int32_t at, const int others[2])
 {
     const six row = six_at(tree->row[at].own);
-    const double linear = three_dot(row.linear, row.linear);
-    const int kind = linear > 0.5 ? 0 : 1; /* of a translation, of a rotation */
-    const three axis = kind == 0 ? row.linear : row.angular;
-    if (node->locks[kind] == 3 || !(fabs(three_dot(axis, axis) - 1) < PERPENDICULAR) || (kind == 1 && linear != 0))
-        return false;
-    for (int i = 0; i < node->locks[kind]; ++i) {
-        const three other = *(const three *)(tree->row[node->lock[3 * kind + i]].own + SIX_HALF * kind);
+    const int kind = three_dot(row.linear, row.linear) > 0.5 ? 0 : 1;
+    if (node->locks[kind] == 3) return false;
+    for (int i = 0; i < others[kind]; ++i) {
+        const three axis = kind == 0 ? row.linear : row.angular,
+                    other = *(const three *)(tree->row[node->lock[3 * kind + i]].own + SIX_HALF * kind);
         if (!(fabs(three_dot(axis, other)) < PERPENDICULAR)) return false;
     }
     node->lock[3 * kind + node->locks[kind]++] = at;
     tree->row[at].role = ARTICULATION_LOCK;
+    memset(tree->row[at].along, 0, sizeof tree->row[at].along);
     return true;
 }
 
@@ -80,19 +80,44 @@ static six start_past_parent(const struct articulation_tree *tree, const struct 
     return six_sub(own, six_carry(*(const three *)node->offset, parent));
 }
 
+/* Row `from` of the system. */
+static void load_row(const struct sadmm_rows *rows, size_t from, struct articulation_row *to)
+{
+    memcpy(to->jacobian[0], rows->jacobian_a + 6 * from, sizeof to->jacobian[0]);
+    memcpy(to->jacobian[1], rows->jacobian_b + 6 * from, sizeof to->jacobian[1]);
+    to->gain = rows->gain[from], to->bias = rows->bias[from], to->compliance = rows->compliance[from];
+    to->lo = rows->lo[from], to->hi = rows->hi[from], to->lambda = rows->lambda[from];
+}
+
+static void put_row(const struct articulation_row *from, int side, six past, int32_t r,
+                    struct articulation_tree_row *row)
+{
+    const six own = six_load(from->jacobian[side]);
+    const double start = from->gain * six_dot(own, past) + from->bias + from->compliance * from->lambda;
+    six_put(own, row->own);
+    row->r = r;
+    row->role = ARTICULATION_NONE;
+    row->gain = from->gain, row->compliance = from->compliance;
+    row->lo = from->lo, row->hi = from->hi, row->lambda = from->lambda;
+    row->start = start;
+    row->right = -start / from->gain;
+    row->found = 0;
+}
+
 /* Where it is from its parent, and its rows. False: they are no wrenches at points of space, or not locks of one joint:
  * those of two joints between the same bodies say the same, and share their loads by the regularisation of the sparse
  * factor. */
 static bool add_rows(struct articulation_tree *tree, struct articulation_node *node, const struct articulation_view *v,
-                     const struct sadmm_row_constraint *slots)
+                     const struct sadmm_row_constraint *slots, const struct sadmm_rows *rows)
 {
     node->bound = false;
     node->locks[0] = node->locks[1] = node->acting = 0;
     node->row = tree->rows;
     six past = six_zero();
     for (int32_t j = node->first; j < node->first + node->count; ++j) {
-        const int32_t column = tree->joint[j] / 2, side = tree->joint[j] % 2;
+        const int32_t column = tree->joint[j] / 2, side = tree->joint[j] % 2, first = SADMM_MAX_ROWS * column;
         const struct sadmm_row_constraint *slot = &slots[v->s.constraint[column]];
+        const int others[2] = {node->locks[0], node->locks[1]};
         if (slot->count == 0) continue;
         if (!slot->rigid) return false;
         if (!node->bound) {
@@ -100,23 +125,16 @@ static bool add_rows(struct articulation_tree *tree, struct articulation_node *n
             past = start_past_parent(tree, node, v);
         }
         node->bound = true;
-        for (int32_t r = SADMM_MAX_ROWS * column; r < SADMM_MAX_ROWS * column + slot->count; ++r) {
-            const struct articulation_row *from = &v->rows[r];
+        for (int32_t i = 0; i < slot->count; ++i) {
+            struct articulation_row *from = &v->rows[first + i];
             const int32_t at = tree->rows++;
-            struct articulation_tree_row *row = &tree->row[at];
-            const six own = six_load(from->jacobian[side]);
-            six_put(own, row->own);
-            row->r = r;
-            row->role = ARTICULATION_NONE;
-            row->gain = from->gain, row->compliance = from->compliance;
-            row->lo = from->lo, row->hi = from->hi, row->lambda = from->lambda;
-            row->start = from->gain * six_dot(own, past) + from->bias + from->compliance * from->lambda;
-            row->right = -row->start / row->gain;
-            row->found = 0;
-            tree->row_of[r] = at;
+            if (rows) load_row(rows, (size_t)(slot->first + i), from);
+            v->state[first + i] = ROW_INSIDE;
+            tree->row_of[first + i] = at;
+            put_row(from, side, past, first + i, &tree->row[at]);
             if (!sadmm_law_is_coupled(from->compliance, from->lo, from->hi))
                 tree->acting[node->row + node->acting++] = at;
-            else if (!add_lock(tree, node, at)) return false;
+            else if (!add_lock(tree, node, at, others)) return false;
         }
     }
     node->row_end = tree->rows;
@@ -125,11 +143,6 @@ static bool add_rows(struct articulation_tree *tree, struct articulation_node *n
 
 static void find_along(const struct articulation_tree *tree, const struct articulation_node *node)
 {
-    for (int kind = 0; kind < 2; ++kind)
-        for (int i = 0; i < node->locks[kind]; ++i) {
-            struct articulation_tree_row *row = &tree->row[node->lock[3 * kind + i]];
-            memset(row->along, 0, sizeof row->along);
-        }
     for (int32_t k = node->row; k < node->row + node->acting; ++k) {
         struct articulation_tree_row *row = &tree->row[tree->acting[k]];
         for (int i = 0; i < node->free; ++i) row->along[i] = six_dot(six_at(row->own), six_at(node->S[i]));
@@ -137,13 +150,12 @@ static void find_along(const struct articulation_tree *tree, const struct articu
 }
 
 /* J^T lambda of its rows, on its body and on its parent's. */
-static void add_row_loads(const struct articulation_tree *tree, struct articulation_node *node,
-                          const struct articulation_view *v)
+static void add_row_loads(const struct articulation_tree *tree, struct articulation_node *node)
 {
     six load = six_zero();
     if (!node->bound) return;
     for (int32_t at = node->row; at < node->row_end; ++at)
-        load = six_madd(load, v->rows[tree->row[at].r].lambda, six_at(tree->row[at].own));
+        load = six_madd(load, tree->row[at].lambda, six_at(tree->row[at].own));
     six_put(six_add(six_at(node->load), load), node->load);
     if (node->parent < 0) return;
     double *parent = tree->node[node->parent].load;
@@ -165,19 +177,22 @@ static void add_loads(const struct articulation_node *node, const struct articul
 
 bool SADMM_KERNEL(articulation_tree_load)(struct articulation_tree *tree,
                                           const struct articulation_view *v,
-                                          const struct sadmm_row_constraint *slots, double *impulse,
-                                          double *without)
+                                          const struct sadmm_row_constraint *slots, const struct sadmm_rows *rows,
+                                          double *impulse, double *without)
 {
+    const size_t count = (size_t)(SADMM_MAX_ROWS * v->s.columns);
     tree->known = tree->refined = false;
     tree->rows = 0;
+    memset(v->state, ROW_ABSENT, count);
+    memset(v->change, 0, count * sizeof *v->change);
     for (int32_t n = 0; n < tree->nodes; ++n) {
         struct articulation_node *node = &tree->node[n];
-        if (!add_rows(tree, node, v, slots)) return false;
+        if (!add_rows(tree, node, v, slots, rows)) return false;
         find_directions(tree, node);
         find_along(tree, node);
         six_put(six_zero(), node->load);
     }
-    for (int32_t n = 0; n < tree->nodes; ++n) add_row_loads(tree, &tree->node[n], v);
+    for (int32_t n = 0; n < tree->nodes; ++n) add_row_loads(tree, &tree->node[n]);
     for (int32_t n = 0; n < tree->nodes; ++n) add_loads(&tree->node[n], v, impulse, without);
     return true;
 }

@@ -22,6 +22,7 @@ struct sadmm_world_joint {
     struct sadmm_link on_body[2];         /* their names: 2 x slot + side + 1; of a coupling, on b: slot + 1 */
     uint32_t first_gear;
     int32_t number;               /* in world->step_joints */
+    int32_t first_row, end_row;   /* in the (sub-)step at hand, if a host makes it */
     int32_t resident_constraints; /* that its rows may take in the backend that keeps the world */
     uint32_t dirty;               /* bits of enum sadmm_joint_update, as in a body */
     int64_t set_at[SADMM_JOINT_UPDATES];

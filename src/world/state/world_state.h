@@ -66,6 +66,8 @@ struct sadmm_world {
     uint8_t *stiffened;                       /* it is another one than before it was found last */
     struct sadmm_rows closing;                /* locks, where the step has moved bodies to; their places in it; */
     struct sadmm_row_constraint *closing_slots;
+    struct joint_opened *openings;            /* joints that are to stay closed, as the step ends; */
+    size_t opening_count;
     uint8_t *opened;                          /* dynamic bodies: of parts with joints that are to be closed */
     uint8_t *folding;                         /* dynamic bodies: of joints that fold; */
     double *row_left;                         /* rows: what is left of them */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "joint_variants.h"
 
 struct joint_body sadmm_world_joint_body(const sadmm_world *world, int32_t slot)
 {
@@ -23,15 +24,18 @@ struct joint_body sadmm_world_joint_body(const sadmm_world *world, int32_t slot)
 static bool has_room(const sadmm_world *world) { return (size_t)world->dynamic_count <= 4 * world->step_joint_count; }
 
 /* Of a dynamic body once a (sub-)step, however many joints it has; there is no room where few bodies have any. */
-static struct joint_side side_of(sadmm_world *world, struct joint_body body, const sadmm_settings *settings)
+static void put_side(sadmm_world *world, struct joint_body body, const sadmm_settings *settings, struct joint_side *to)
 {
-    if (body.system_body < 0 || !has_room(world)) return joint_side_of(body, settings);
+    if (body.system_body < 0 || !has_room(world)) {
+        *to = joint_side_of(body, settings);
+        return;
+    }
     struct sadmm_world_joint_side *kept = &world->joint_sides[body.system_body];
     if (kept->of != world->joint_sides_made) {
         kept->side = joint_side_by(body, &world->spins[body.system_body], settings);
         kept->of = world->joint_sides_made;
     }
-    return kept->side;
+    *to = kept->side;
 }
 
 bool sadmm_world_begin_acting(sadmm_world *world, const sadmm_settings *settings)
@@ -43,7 +47,7 @@ bool sadmm_world_begin_acting(sadmm_world *world, const sadmm_settings *settings
     if (SADMM_ROOM(world->joint_sides) != before)
         memset(world->joint_sides, 0, SADMM_ROOM(world->joint_sides) * sizeof *world->joint_sides);
     ++world->joint_sides_made;
-    for (size_t i = 0; i < n; ++i) world->spins[i] = spin_of_system(&world->start.rigid[i], settings->dt);
+    sadmm_joint_kernels_best()->spins(world->start.rigid, n, settings->dt, world->spins);
     world->spins_known = n > 0;
     return true;
 }
@@ -56,7 +60,7 @@ const struct acting_joint *sadmm_world_act_joint(sadmm_world *world, const struc
                                    sadmm_world_joint_body(world, joint->body[1])};
     if (joint->coupling)
         bodies[0] = (struct joint_body){-1, &world->couplings[joint->coupling - 1].next.target, true, true};
-    for (int s = 0; s < 2; ++s) acting->side[s] = side_of(world, bodies[s], settings);
-    joint_act_between(&joint->def, joint->frame, bodies[0].target, settings, acting);
+    for (int s = 0; s < 2; ++s) put_side(world, bodies[s], settings, &acting->side[s]);
+    sadmm_joint_kernels_best()->act(&joint->def, joint->frame, bodies[0].target, settings, acting);
     return acting;
 }

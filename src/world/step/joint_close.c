@@ -11,45 +11,64 @@
 #include "joint_act.h"
 #include "joint_close.h"
 #include "joint_rows.h"
+#include "joint_variants.h"
 
-/* A joint's ends as the step began, and where it has left its bodies; what moves there is of account for its scale. */
-struct ends {
-    struct joint_end start[2], end[2];
-    double scale;
-};
-
-static struct joint_end end_of(const sadmm_world *world, const struct sadmm_world_joint *joint, int s)
+static struct joint_pose pose_of(const struct sadmm_rigid *rigid)
 {
-    const struct joint_frame *frame = &joint->frame[s];
-    if (s == 0 && joint->coupling) return joint_end_on(frame, &world->couplings[joint->coupling - 1].next.target);
-    const struct joint_body body = sadmm_world_joint_body(world, joint->body[s]);
-    if (body.system_body >= 0) return joint_end_on(frame, &world->next[body.system_body]);
-    if (body.prescribed)
-        return joint_end_on(frame, &world->kinematic[sadmm_kinematic(world->bodies[joint->body[s]].system_body)].next);
-    return joint_end_on(frame, body.rigid);
+    return rigid ? (struct joint_pose){rigid->position, rigid->orientation} : (struct joint_pose){NULL, NULL};
 }
 
-/* Targets of couplings have no start of their own left: their ends are where the step has left them. */
-static struct ends ends_of(const sadmm_world *world, const struct sadmm_world_joint *joint)
+/* Targets of couplings have no start of their own left: they are where the step has left them. */
+static const struct sadmm_rigid *target_of(const sadmm_world *world, const struct sadmm_world_joint *joint, int s)
 {
-    struct ends e;
-    e.scale = 0;
-    for (int s = 0; s < 2; ++s) {
-        const struct joint_body body = sadmm_world_joint_body(world, joint->body[s]);
-        e.end[s] = end_of(world, joint, s);
-        e.start[s] = s == 0 && joint->coupling ? e.end[s] : joint_end_on(&joint->frame[s], body.rigid);
-        e.scale += joint_closing_scale(&e.end[s], body.system_body >= 0 ? body.rigid : NULL);
-    }
-    return e;
+    return s == 0 && joint->coupling ? &world->couplings[joint->coupling - 1].next.target : NULL;
+}
+
+/* Where the step has left a body of the joint. */
+static const struct sadmm_rigid *moved_to(const sadmm_world *world, const struct sadmm_world_joint *joint, int s)
+{
+    const struct sadmm_rigid *target = target_of(world, joint, s);
+    if (target) return target;
+    const struct joint_body body = sadmm_world_joint_body(world, joint->body[s]);
+    if (body.system_body >= 0) return &world->next[body.system_body];
+    if (body.prescribed)
+        return &world->kinematic[sadmm_kinematic(world->bodies[joint->body[s]].system_body)].next;
+    return body.rigid;
 }
 
 static bool closes(const struct sadmm_world_joint *joint) { return joint->def.enabled && joint->def.locks; }
 
-static struct joint_closing closing_of(const sadmm_world *world, const struct sadmm_world_joint *joint,
-                                       const sadmm_settings *settings)
+static struct joint_opened opened_of(const sadmm_world *world, const struct sadmm_world_joint *joint)
 {
-    const struct ends e = ends_of(world, joint);
-    return joint_closing_of(&joint->def, e.start, e.end, e.scale, settings);
+    struct joint_opened out = {.joint = joint};
+    for (int s = 0; s < 2; ++s) {
+        const struct joint_body body = sadmm_world_joint_body(world, joint->body[s]);
+        out.pose[s] = pose_of(moved_to(world, joint, s));
+        out.moves[s] = body.system_body >= 0 ? body.rigid : NULL;
+    }
+    return out;
+}
+
+/* The joints that are to stay closed. */
+static bool list_joints(sadmm_world *world)
+{
+    world->opening_count = 0;
+    if (!SADMM_GROW(world->openings, 0, world->step_joint_count)) return false;
+    for (size_t j = 0; j < world->step_joint_count; ++j)
+        if (closes(world->step_joints[j]))
+            world->openings[world->opening_count++] = opened_of(world, world->step_joints[j]);
+    return true;
+}
+
+static void find_closing(const sadmm_world *world, const struct joint_opened *opened, const sadmm_settings *settings,
+                         struct joint_closing *out)
+{
+    struct joint_pose start[2];
+    for (int s = 0; s < 2; ++s) {
+        const struct sadmm_rigid *target = target_of(world, opened->joint, s);
+        start[s] = pose_of(target ? target : sadmm_world_joint_body(world, opened->joint->body[s]).rigid);
+    }
+    sadmm_joint_kernels_best()->close(opened, start, settings, out);
 }
 
 /* Is it of a part that folds? */
@@ -79,29 +98,21 @@ static bool may_open(const sadmm_world *world, const struct sadmm_world_joint *j
     return false;
 }
 
-/* Is it off by more than a little? off: of its translations. */
-static bool opens(const sadmm_world *world, const struct sadmm_world_joint *joint, const struct joint_end end[2],
-                  double off)
-{
-    const bool moves[2] = {sadmm_world_joint_body(world, joint->body[0]).system_body >= 0,
-                           sadmm_world_joint_body(world, joint->body[1]).system_body >= 0};
-    return !joint_opens_little(&joint->def, end, moves, off);
-}
-
 /* Which bodies have joints that are to be closed; the largest error, m. Are there any? */
 static bool find_open(sadmm_world *world, const sadmm_settings *settings, double *off)
 {
     bool any = false;
     *off = 0;
-    for (size_t j = 0; j < world->step_joint_count; ++j) {
-        const struct sadmm_world_joint *joint = world->step_joints[j];
-        if (!closes(joint)) continue;
-        const struct joint_end end[2] = {end_of(world, joint, 0), end_of(world, joint, 1)};
-        const double own = joint_opening(&joint->def, end);
+    sadmm_joint_kernels_best()->openings(world->openings, world->opening_count);
+    for (size_t j = 0; j < world->opening_count; ++j) {
+        const struct joint_opened *opened = &world->openings[j];
+        const struct sadmm_world_joint *joint = opened->joint;
         const bool folding = folds(world, joint);
-        *off = own > *off ? own : *off;
-        if (!folding && (!opens(world, joint, end, own) || !may_open(world, joint))) continue;
-        if (!(closing_of(world, joint, settings).share > (folding ? JOINT_CLOSE_FOLDING : JOINT_CLOSE_FROM))) continue;
+        struct joint_closing closing;
+        *off = opened->off > *off ? opened->off : *off;
+        if (!folding && (opened->little || !may_open(world, joint))) continue;
+        find_closing(world, opened, settings, &closing);
+        if (!(closing.share > (folding ? JOINT_CLOSE_FOLDING : JOINT_CLOSE_FROM))) continue;
         if (!any) memset(world->opened, 0, (size_t)world->dynamic_count);
         mark_bodies(world, joint, world->opened);
         any = true;
@@ -147,10 +158,11 @@ static sadmm_status find_folding(sadmm_world *world, bool *any)
 
 /* Rows of locks, a constraint each, in the places of the step's own. */
 static bool add_rows(sadmm_world *world, const struct sadmm_row_constraint *place,
-                     const struct sadmm_world_joint *joint, const sadmm_settings *settings)
+                     const struct joint_opened *opened, const sadmm_settings *settings)
 {
     struct sadmm_rows *rows = &world->closing;
-    const struct joint_closing c = closing_of(world, joint, settings);
+    struct joint_closing c;
+    find_closing(world, opened, settings, &c);
     const int32_t first = sadmm_rows_add(rows, c.count, place->body_a, place->body_b);
     if (first < 0) return false;
     double offset[3];
@@ -167,6 +179,7 @@ static bool add_rows(sadmm_world *world, const struct sadmm_row_constraint *plac
 
 static bool make_rows(sadmm_world *world, const sadmm_settings *settings)
 {
+    const struct joint_opened *opened = world->openings;
     size_t at = 0;
     sadmm_rows_clear(&world->closing);
     if (!SADMM_GROW(world->closing_slots, 0, world->joint_constraint_count)) return false;
@@ -177,7 +190,7 @@ static bool make_rows(sadmm_world *world, const sadmm_settings *settings)
     for (size_t j = 0; j < world->step_joint_count; ++j) {
         const struct sadmm_world_joint *joint = world->step_joints[j];
         const size_t before = world->closing.constraint_count, places = (size_t)sadmm_joint_constraints(joint);
-        if (places > 0 && closes(joint) && !add_rows(world, &world->closing_slots[at], joint, settings)) return false;
+        if (closes(joint) && !add_rows(world, &world->closing_slots[at], opened++, settings)) return false;
         if (world->closing.constraint_count > before) world->closing_slots[at] = world->closing.constraints[before];
         at += places;
     }
@@ -242,7 +255,7 @@ sadmm_status sadmm_world_close_joints(sadmm_world *world, const sadmm_settings *
     struct sadmm_system system = sadmm_world_system(world);
     if (world->spins_known) system.spins = world->spins;
     const size_t n = (size_t)world->dynamic_count;
-    if (!SADMM_GROW(world->opened, 0, n) || !SADMM_GROW(world->closing_costs, 0, n))
+    if (!SADMM_GROW(world->opened, 0, n) || !SADMM_GROW(world->closing_costs, 0, n) || !list_joints(world))
         return sadmm_fail_memory(&world->error, "joints that close");
     bool any = false, folding = false;
     TRY(find_folding(world, &folding));

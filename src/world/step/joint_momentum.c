@@ -98,7 +98,7 @@ sadmm_status sadmm_world_restore_articulated(sadmm_world *world, const sadmm_set
     const size_t count = number_bodies(world);
     if (count == 0) return SADMM_OK;
     if (!SADMM_GROW(world->joint_momentum, 0, count)) return sadmm_fail_memory(&world->error, "islands of joints");
-    memset(world->joint_momentum, 0, count * sizeof *world->joint_momentum);
+    for (size_t k = 0; k < count; ++k) memset(&world->joint_momentum[k], 0, sizeof *world->joint_momentum);
     for (size_t k = 0; k < world->contacts.pair_count; ++k) add_pair(world, &world->contacts.pairs[k], settings->dt);
     for (size_t k = 0; k < world->start.rows.constraint_count; ++k)
         add_rows(world, &world->start.rows.constraints[k], settings->dt);

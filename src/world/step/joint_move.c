@@ -10,6 +10,7 @@
 #include "joint_close.h"
 #include "joint_momentum.h"
 #include "joint_move.h"
+#include "joint_variants.h"
 
 static const struct joint_trapezoid *trapezoid_of(const sadmm_world *world, int32_t body, double dt)
 {
@@ -30,18 +31,22 @@ static void add_constraint(const sadmm_world *world, const struct sadmm_row_cons
                            const sadmm_settings *settings)
 {
     const struct sadmm_rows *rows = &world->start.rows;
-    const struct joint_trapezoid bodies[2] = {*trapezoid_of(world, constraint->body_a, settings->dt),
-                                              *trapezoid_of(world, constraint->body_b, settings->dt)};
+    const int32_t body[2] = {constraint->body_a, constraint->body_b};
     uint16_t *island = island_of(world, constraint->body_a, constraint->body_b);
-    int moorings = 0;
-    *island |= ISLAND_ARTICULATED;
+    struct joint_trapezoid bodies[2];
+    int moorings = 0, bits = ISLAND_ARTICULATED;
+    bool known = false;
+    for (int s = 0; s < 2; ++s) bodies[s].rigid = body[s] >= 0 ? &world->start.rigid[body[s]] : NULL;
     for (int32_t k = 0; k < constraint->count; ++k) {
         const size_t r = (size_t)(constraint->first + k);
-        moorings |= joint_mooring(&world->joint_sources[r], rows->lambda[r], bodies);
-        *island |= (uint16_t)joint_row_touches(&world->joint_sources[r], rows->lambda[r], rows->jacobian_a + 6 * r,
-                                              rows->jacobian_b + 6 * r, bodies, settings);
+        const struct sadmm_joint_source *source = &world->joint_sources[r];
+        for (int s = 0; !known && joint_row_limits(source, rows->lambda[r]) && s < 2; ++s)
+            bodies[s] = *trapezoid_of(world, body[s], settings->dt), known = s;
+        moorings |= joint_mooring(source, rows->lambda[r], bodies);
+        bits |= joint_row_touches(source, rows->lambda[r], rows->jacobian_a + 6 * r, rows->jacobian_b + 6 * r, bodies,
+                                  settings);
     }
-    if (moorings == JOINT_MOORED_WHOLLY) *island |= ISLAND_ANCHORED;
+    *island |= (uint16_t)(bits | (moorings == JOINT_MOORED_WHOLLY ? ISLAND_ANCHORED : 0));
 }
 
 /* A static pair that leaves its island no motion. */
@@ -80,6 +85,36 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
     }
 }
 
+static void move_bodies(sadmm_world *world, double dt)
+{
+    const struct sadmm_joint_kernels *kernels = sadmm_joint_kernels_best();
+    struct joint_movement several[16];
+    const size_t most = sizeof several / sizeof *several;
+    size_t count = 0;
+    for (size_t i = 0; i < (size_t)world->dynamic_count; ++i) {
+        const struct sadmm_rigid *from = &world->start.rigid[i];
+        struct sadmm_rigid *next = &world->next[i];
+        const double *velocity = world->velocity + 6 * i;
+        const uint16_t island = world->joint_touch[world->joint_labels[i]];
+        const bool off = island & ISLAND_TRAPEZOID_OFF;
+        if (from->rolls & ROLLING_IS_STIFFENED) world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
+        if (!(island & ISLAND_ARTICULATED)) continue;
+        next->mean = !off;
+        if (world->spins_known && !off) {
+            several[count++] =
+                (struct joint_movement){from, &world->spins[i].orientation.w, velocity, next};
+            if (count < most) continue;
+            kernels->moves(several, count, dt);
+            count = 0;
+            continue;
+        }
+        double halfway[4];
+        q_store(world->spins_known ? world->spins[i].orientation : spin_turned_halfway(from, dt), halfway);
+        joint_move(from, halfway, velocity, off, dt, next->position, next->orientation, next->velocity);
+    }
+    kernels->moves(several, count, dt);
+}
+
 sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settings *settings, const int32_t *islands,
                                           double *off)
 {
@@ -90,20 +125,7 @@ sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settin
         !SADMM_GROW(world->joint_trapezoids, 0, n))
         return sadmm_fail_memory(&world->error, "islands of joints");
     find_islands(world, &system, settings);
-    for (size_t i = 0; i < n; ++i) {
-        const uint16_t island = world->joint_touch[world->joint_labels[i]];
-        struct sadmm_rigid *next = &world->next[i];
-        if (world->start.rigid[i].rolls & ROLLING_IS_STIFFENED)
-            world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
-        if (!(island & ISLAND_ARTICULATED)) continue;
-        next->mean = !(island & ISLAND_TRAPEZOID_OFF);
-        double halfway[4];
-        q_store(world->spins_known ? world->spins[i].orientation
-                                   : spin_turned_halfway(&world->start.rigid[i], settings->dt),
-                halfway);
-        joint_move(&world->start.rigid[i], halfway, world->velocity + 6 * i, island & ISLAND_TRAPEZOID_OFF,
-                   settings->dt, next->position, next->orientation, next->velocity);
-    }
+    move_bodies(world, settings->dt);
     for (size_t k = 0; k < system.rows->constraint_count; ++k) {
         const struct sadmm_row_constraint *constraint = &system.rows->constraints[k];
         world->step_joints[world->joint_sources[constraint->first].joint]->next.trapezoid_off =

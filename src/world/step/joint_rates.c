@@ -1,14 +1,6 @@
-#include "joint_rates.h"
-
-#include "core/base/variant.h"
-
-/* A number of three coordinates, which the fourth lane is none of. */
-typedef double lanes __attribute__((vector_size(32), aligned(8), may_alias));
-struct lanes3 {
-    lanes x, y, z;
-};
-
-static inline lanes fill(double x) { return (lanes){x, x, x, x}; }
+/* How fast a joint's coordinates change (joint_kernels.h), three at a time. */
+#include "joint_kernels.h"
+#include "joint_lanes.h"
 
 static inline struct lanes3 axes_of(const vec3 axis[3])
 {
@@ -18,25 +10,25 @@ static inline struct lanes3 axes_of(const vec3 axis[3])
 }
 static inline struct lanes3 scale(struct lanes3 a, double s)
 {
-    return (struct lanes3){a.x * fill(s), a.y * fill(s), a.z * fill(s)};
+    return (struct lanes3){a.x * lanes_fill(s), a.y * lanes_fill(s), a.z * lanes_fill(s)};
 }
 /* arm x a */
 static inline struct lanes3 turn(vec3 arm, struct lanes3 a)
 {
-    const lanes x = fill(arm.x), y = fill(arm.y), z = fill(arm.z);
+    const lanes x = lanes_fill(arm.x), y = lanes_fill(arm.y), z = lanes_fill(arm.z);
     return (struct lanes3){y * a.z - z * a.y, z * a.x - x * a.z, x * a.y - y * a.x};
 }
 /* v3_dot */
 static inline lanes dot(struct lanes3 a, const double v[3])
 {
-    return a.x * fill(v[0]) + a.y * fill(v[1]) + a.z * fill(v[2]);
+    return a.x * lanes_fill(v[0]) + a.y * lanes_fill(v[1]) + a.z * lanes_fill(v[2]);
 }
 /* joint_row_product from `sum` on */
 static inline lanes add_product(lanes sum, struct lanes3 a, const double v[3])
 {
-    sum = sum + a.x * fill(v[0]);
-    sum = sum + a.y * fill(v[1]);
-    return sum + a.z * fill(v[2]);
+    sum = sum + a.x * lanes_fill(v[0]);
+    sum = sum + a.y * lanes_fill(v[1]);
+    return sum + a.z * lanes_fill(v[2]);
 }
 
 /* Of translations or rotations, whose linear parts are 0: a sum that begins with 0 is none the other for them. */

@@ -2,106 +2,53 @@
  * step's rows, multipliers from the forces of the last step, and the solution's back into what joints keep. */
 #include <string.h>
 
-#include "config.h"
 #include "core/base/memory.h"
 #include "gear_rows.h"
 #include "joint_act.h"
-#include "joint_rates.h"
 #include "joint_rows.h"
 #include "joint_stiffen.h"
-
-/* Six locks, or what acts along six free coordinates. */
-struct all_laws {
-    struct joint_laws of[JOINT_COORDINATES];
-    const struct joint_law *law[JOINT_COORDINATES * JOINT_COORDINATE_LAWS]; /* in the order of rows */
-    int count;
-};
-
-/* joint_moving_of. */
-static struct joint_moving moving_of(const struct sadmm_world_joint *joint, const struct acting_joint *acting,
-                                     const struct joint_rates *rates, const struct joint_turn_bounds *bounds, int k,
-                                     const sadmm_settings *settings)
-{
-    const bool radial = joint_is_radial(joint->def.kind);
-    struct joint_coordinate_rates r = {.before = rates->before[k], .start = rates->start[k],
-                                       .middle = rates->middle[k], .prescribed = rates->prescribed[k]};
-    const double turning = r.start + r.prescribed - r.before;
-    const bool turns = !((k > 0 || !radial) && joint_turns_within(bounds, k, turning, settings->dt)) &&
-                       joint_turns(acting, k, radial, turning, settings->dt);
-    for (int s = 0; !(joint->def.locks >> k & 1) && s < 2; ++s) {
-        if (acting->side[s].system_body < 0) continue;
-        r.free += joint_row_product(rates->row[s][k], acting->side[s].free);
-        r.response += joint_response(&acting->side[s], rates->row[s][k]);
-    }
-    return joint_moving_by(&joint->def, &joint->next, acting, k, &r, turns, settings);
-}
-
-/* Locked coordinates first: they are held together. */
-static void find_laws(struct sadmm_world_joint *joint, const struct acting_joint *acting,
-                      const struct joint_rates *rates, const sadmm_settings *settings, struct all_laws *all)
-{
-    const struct joint_turn_bounds bounds = joint_turn_bounds_of(acting);
-    all->count = 0;
-    for (int locked = 1; locked >= 0; --locked)
-        for (uint32_t left = JOINT_ALL_LOCKED & (locked ? joint->def.locks : ~joint->def.locks); left;
-             left &= left - 1) {
-            const int k = __builtin_ctz(left);
-            struct joint_laws *laws = &all->of[k];
-            if (!joint_has_coordinate(&joint->def, k)) continue;
-            const struct joint_moving m = moving_of(joint, acting, rates, &bounds, k, settings);
-            if (joint_winds(joint->def.locks, k)) joint->next.angle[k] = m.value;
-            const struct joint_table table = {joint->table[k],
-                                              joint->table[k] ? joint->table[k] + joint->table_count[k] : NULL,
-                                              joint->table_count[k]};
-            joint_coordinate_laws(&joint->def, k, &m, joint->table[k] ? &table : NULL, laws);
-            for (int i = 0; i < laws->count; ++i) all->law[all->count++] = &laws->law[i];
-        }
-}
-
-static sadmm_joint_rates *best_rates(void)
-{
-#ifdef SADMM_HAVE_ISA_AVX2
-    if (__builtin_cpu_supports("avx2")) return sadmm_joint_rates_avx2;
-#endif
-    return sadmm_joint_rates_baseline;
-}
+#include "joint_variants.h"
 
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 
-static bool add_constraints(sadmm_world *world, const struct sadmm_world_joint *joint,
-                            const struct acting_joint *acting, const struct joint_rates *rates,
-                            const struct all_laws *laws, double dt)
+/* Room for the most rows that a joint may have. */
+static bool make_room(sadmm_world *world)
 {
     struct sadmm_rows *rows = &world->start.rows;
-    const size_t all = rows->row_count + (size_t)laws->count;
-    if (!SADMM_GROW(world->joint_sources, rows->row_count, all) ||
-        !SADMM_GROW(world->start.multiplier, rows->row_count, all))
-        return false;
-    double offset[3];
-    v3_store(v3_sub(acting->middle.arm_a, acting->middle.arm_b), offset);
-    for (int i = 0; i < laws->count; ++i) {
-        const struct joint_law *law = laws->law[i];
-        if (i % SADMM_MAX_ROWS == 0) {
-            const int left = laws->count - i, count = left < SADMM_MAX_ROWS ? left : SADMM_MAX_ROWS;
-            if (sadmm_rows_add(rows, count, acting->side[0].system_body, acting->side[1].system_body) < 0)
-                return false;
-            sadmm_rows_set_rigid(rows, offset);
-        }
-        const size_t r = all - (size_t)laws->count + (size_t)i;
-        for (int s = 0; s < 2; ++s) {
-            double *row = (s ? rows->jacobian_b : rows->jacobian_a) + 6 * r;
-            if (acting->side[s].system_body < 0) continue;
-            memcpy(row, rates->row[s][law->coordinate], 6 * sizeof *row);
-            for (int j = 0; law->sign < 0 && j < 6; ++j) row[j] = -row[j];
-        }
-        sadmm_row_set(rows, (int32_t)r, law->gain, law->bias, law->compliance, law->lo, law->hi);
-        rows->lambda[r] = world->start.multiplier[r] =
-            law->sign * joint->next.force[law->role][law->coordinate] * dt;
-        world->joint_sources[r] =
-            (struct sadmm_joint_source){joint->number,   (int8_t)law->role, (int8_t)law->coordinate, (int8_t)law->sign,
-                                        law->separation, law->slack,        law->prescribed};
+    const size_t most = rows->row_count + JOINT_MOST_ROWS;
+    return SADMM_GROW(world->joint_sources, rows->row_count, most) &&
+           SADMM_GROW(world->start.multiplier, rows->row_count, most) &&
+           sadmm_rows_reserve(rows, rows->constraint_count + JOINT_MOST_ROWS / SADMM_MAX_ROWS, most);
+}
+
+static struct joint_row_lists lists_at(const sadmm_world *world, size_t r)
+{
+    const struct sadmm_rows *rows = &world->start.rows;
+    return (struct joint_row_lists){.jacobian = {rows->jacobian_a + 6 * r, rows->jacobian_b + 6 * r},
+                                    .gain = rows->gain + r,
+                                    .bias = rows->bias + r,
+                                    .compliance = rows->compliance + r,
+                                    .lo = rows->lo + r,
+                                    .hi = rows->hi + r,
+                                    .lambda = rows->lambda + r,
+                                    .multiplier = world->start.multiplier + r,
+                                    .source = world->joint_sources + r};
+}
+
+/* Constraints of the rows that the joint has written. */
+static void add_constraints(struct sadmm_rows *rows, int count, const struct acting_joint *acting)
+{
+    for (int done = 0; done < count; done += SADMM_MAX_ROWS) {
+        const int left = count - done;
+        struct sadmm_row_constraint *constraint = &rows->constraints[rows->constraint_count++];
+        *constraint = (struct sadmm_row_constraint){.body_a = acting->side[0].system_body,
+                                                    .body_b = acting->side[1].system_body,
+                                                    .first = (int32_t)rows->row_count,
+                                                    .count = left < SADMM_MAX_ROWS ? left : SADMM_MAX_ROWS,
+                                                    .rigid = true};
+        v3_store(v3_sub(acting->middle.arm_a, acting->middle.arm_b), constraint->offset);
+        rows->row_count += (size_t)constraint->count;
     }
-    return true;
 }
 
 int32_t sadmm_joint_constraints(const struct sadmm_world_joint *joint)
@@ -132,8 +79,9 @@ static bool add_slots(sadmm_world *world, const struct sadmm_world_joint *joint,
 
 sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings)
 {
-    sadmm_joint_rates *const find_rates = best_rates();
-    sadmm_rows_clear(&world->start.rows);
+    const struct sadmm_joint_kernels *kernels = sadmm_joint_kernels_best();
+    struct sadmm_rows *rows = &world->start.rows;
+    sadmm_rows_clear(rows);
     world->joints_acting = world->couplings_acting = 0;
     world->joint_constraint_count = 0;
     world->spins_known = false;
@@ -141,20 +89,22 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
         return sadmm_fail_memory(&world->error, "the joints' rows");
     for (size_t j = 0; j < world->step_joint_count; ++j) {
         struct sadmm_world_joint *joint = world->step_joints[j];
-        struct all_laws laws;
         struct joint_rates rates;
-        const size_t before = world->start.rows.constraint_count;
+        const size_t before = rows->constraint_count;
+        joint->first_row = joint->end_row = (int32_t)rows->row_count;
         if (!joint->def.enabled) {
             if (!add_slots(world, joint, before)) return sadmm_fail_memory(&world->error, "the joints' rows");
             continue;
         }
+        if (!make_room(world)) return sadmm_fail_memory(&world->error, "the joints' rows");
         const struct acting_joint *acting = sadmm_world_act_joint(world, joint, settings);
-        find_rates(acting, &rates);
-        find_laws(joint, acting, &rates, settings, &laws);
-        if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
-        if (!add_constraints(world, joint, acting, &rates, &laws, settings->dt) ||
-            !add_slots(world, joint, before))
-            return sadmm_fail_memory(&world->error, "the joints' rows");
+        const struct joint_row_lists lists = lists_at(world, rows->row_count);
+        kernels->rates(acting, &rates);
+        const int count = kernels->laws(joint, acting, &rates, settings, &lists);
+        if (count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
+        add_constraints(rows, count, acting);
+        joint->end_row = (int32_t)rows->row_count;
+        if (!add_slots(world, joint, before)) return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution says */
     }
     bool any;

@@ -9,28 +9,27 @@
 /* What is done with the force of a joint on a dynamic body of it. */
 typedef void on_force(sadmm_world *world, int32_t body, vec3 place, vec3 force);
 
-static vec3 force_of(const double *jacobian, const double *lambda, const struct sadmm_joint_source *source,
-                     size_t count, double dt)
+/* Of a joint, on side s. */
+static vec3 force_of(const sadmm_world *world, const struct sadmm_world_joint *joint, int s, double dt)
 {
+    const struct sadmm_rows *rows = &world->start.rows;
+    const double *jacobian = s ? rows->jacobian_b : rows->jacobian_a;
+    const bool held = (joint->def.locks & 7) == 7; /* its first three rows are all that has a force */
     vec3 force = v3(0, 0, 0);
-    for (size_t r = 0; r < count; ++r)
-        force = stiffening_add_row(force, source[r].coordinate, jacobian + 6 * r, lambda[r], dt);
+    for (int32_t r = joint->first_row; r < (held ? joint->first_row + 3 : joint->end_row); ++r)
+        force = stiffening_add_row(force, world->joint_sources[r].coordinate, jacobian + 6 * r, rows->lambda[r], dt);
     return force;
 }
 
-static void each_force(sadmm_world *world, double dt, on_force *f)
+static inline void each_force(sadmm_world *world, double dt, on_force *f)
 {
-    const struct sadmm_rows *rows = &world->start.rows;
-    size_t end;
-    for (size_t r = 0; r < world->joint_rows; r = end) {
-        const struct sadmm_joint_source *source = &world->joint_sources[r];
-        const struct sadmm_world_joint *joint = world->step_joints[source->joint];
-        for (end = r + 1; end < world->joint_rows && world->joint_sources[end].joint == source->joint;) ++end;
+    for (size_t j = 0; j < world->step_joint_count; ++j) {
+        const struct sadmm_world_joint *joint = world->step_joints[j];
+        if (joint->first_row == joint->end_row) continue;
         /* On a it is that on b but for its sign. */
-        const struct joint_side *side = world->acting_joints[source->joint].side;
+        const struct joint_side *side = world->acting_joints[joint->number].side;
         const int of = side[1].system_body >= 0;
-        const vec3 force = force_of((of ? rows->jacobian_b : rows->jacobian_a) + 6 * r, rows->lambda + r, source,
-                                    end - r, dt);
+        const vec3 force = force_of(world, joint, of, dt);
         for (int s = 0; s < 2; ++s) {
             const int32_t body = side[s].system_body;
             if (body < 0 || (s == 0 && joint->coupling)) continue;
