@@ -112,7 +112,7 @@ static __device__ __noinline__ void store_body(const cuda_view &v, const struct 
     if (island.bits & ISLAND_CLOSED)
         for (int k = 0; k < PLACE; ++k) place[k] = v.joints.closed[i].place[k];
     else joint_place(v, i, island.bits, place);
-    joint_add_momentum(&sums, body, halfway_of(v, i), place, place + 3, place + 7, origin, &settings);
+    joint_add_momentum(&sums, body, halfway_of(v, i), place, place + 3, place + 7, origin, island.bits, &settings);
     v.joints.momentum[i] = sums;
 }
 

@@ -161,17 +161,21 @@ static bool merge_found(struct sadmm_candidates *c)
     return true;
 }
 
-/* What a broad phase reports (broad_phase.h). */
-static bool pairs_of_few(struct sadmm_candidates *c)
+/* What a broad phase reports (broad_phase.h): all pairs, or those of slots that have changed. */
+static bool pairs_of_few(struct sadmm_candidates *c, bool only_changed)
 {
     uint32_t slots[FEW_SHAPES];
+    bool changed[FEW_SHAPES] = {false};
     size_t count = 0;
+    for (size_t i = 0; only_changed && i < c->changed_count; ++i) changed[c->changed[i]] = true;
     for (size_t slot = 0; slot < c->slot_count; ++slot)
         if (c->entries[slot].present) slots[count++] = (uint32_t)slot;
     for (size_t i = 0; i < count; ++i) {
         const struct sadmm_broad_entry *a = &c->entries[slots[i]];
-        for (size_t j = i + 1; j < count; ++j) {
+        const bool own = !only_changed || changed[slots[i]];
+        for (size_t j = own ? 0 : count; j < count; ++j) {
             const struct sadmm_broad_entry *b = &c->entries[slots[j]];
+            if (j <= i && (j == i || !only_changed || changed[slots[j]])) continue; /* once */
             if (!boxes_overlap(&a->box, &b->box) || !(a->moves || b->moves)) continue;
             if (a->group != b->group && a->group >= 0 && b->group >= 0) continue;
             if (!sadmm_pair_list_add(&c->found, slots[i], slots[j])) return false;
@@ -186,9 +190,9 @@ static sadmm_status update_list(struct sadmm_candidates *c, const struct sadmm_c
     sadmm_status status;
     c->found.count = 0;
     if (c->few) {
-        c->list.count = 0;
-        if (!pairs_of_few(c)) return sadmm_fail_memory(error, "candidate pairs");
-        if (c->plane_count > 0) list_movers(c);
+        if (!one_by_one) c->list.count = 0;
+        if (!pairs_of_few(c, one_by_one)) return sadmm_fail_memory(error, "candidate pairs");
+        if (c->plane_count > 0 && !one_by_one) list_movers(c);
         status = SADMM_OK;
     } else if (one_by_one) {
         status = c->kind->pairs_of(c->broad_phase, c->entries, c->slot_count, c->changed, c->changed_count, &c->found,
@@ -250,9 +254,8 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     c->seams_valid = true;
     if (c->changed_count == 0 && c->list_valid && !renew) return SADMM_OK;
 
-    one_by_one =
-        !few && c->list_valid && !renew && !plane_changed && c->kind->pairs_of &&
-        c->changed_count * ONE_BY_ONE < present;
+    one_by_one = c->list_valid && !renew && !plane_changed &&
+                 (few || (c->kind->pairs_of && c->changed_count * ONE_BY_ONE < present));
     c->broad_phase_valid = c->list_valid = false;
     c->few = few;
     c->margin = input->margin;

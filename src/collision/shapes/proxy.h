@@ -69,29 +69,42 @@ SADMM_INLINE void proxy_box(const struct sadmm_proxy *p, double dt, double margi
     shape_box(p->x, extent, shape_reach(margin, p->thin, p->fall, fall_of(gravity, dt)), p->velocity, p->spin, dt, box);
 }
 
-/* turn: proxy_turn_of. `box` is left alone for a plane. gravity: its size, m/s^2. */
-SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadmm_geometry *geometry,
-                              const struct sadmm_collision_body *body, const struct proxy_turn *turn, double dt,
-                              double margin, double gravity, struct sadmm_proxy *p, struct sadmm_box3 *box)
+/* A shape that is turned there: to the world, and its centre relative to the body's. */
+struct proxy_pose {
+    mat3 R;
+    vec3 arm;
+    double rate, time_offset; /* of its turn */
+};
+SADMM_INLINE struct proxy_pose proxy_pose_of(const struct sadmm_shape *shape, const struct proxy_turn *turn)
+{
+    struct proxy_pose pose;
+    pose.R = q_matrix(turn->shape);
+    pose.arm = m3_mul(q_matrix(turn->body), v3_load(shape->position));
+    pose.rate = turn->rate, pose.time_offset = turn->time_offset;
+    return pose;
+}
+
+/* `box` is left alone for a plane. gravity: its size, m/s^2. */
+SADMM_INLINE void proxy_put(const struct sadmm_shape *shape, const struct sadmm_geometry *geometry,
+                            const struct sadmm_collision_body *body, const struct proxy_pose *pose, double dt,
+                            double margin, double gravity, struct sadmm_proxy *p, struct sadmm_box3 *box)
 {
     const bool moves = sadmm_body_moves(body->system_body);
-    mat3 R = q_matrix(turn->shape);
-    vec3 arm = m3_mul(q_matrix(turn->body), v3_load(shape->position));
     double reach;
     int i;
 
-    p->time_offset = turn->time_offset;
+    p->time_offset = pose->time_offset;
     p->geometry = *geometry;
-    for (i = 0; i < 3; ++i) v3_store(R.r[i], p->R + 3 * i);
-    v3_store(arm, p->arm);
+    for (i = 0; i < 3; ++i) v3_store(pose->R.r[i], p->R + 3 * i);
+    v3_store(pose->arm, p->arm);
     for (i = 0; i < 3; ++i) {
         p->com[i] = body->position[i];
         p->x[i] = body->position[i] + p->arm[i];
         p->velocity[i] = moves ? body->velocity[i] : 0;
         p->angular[i] = moves ? body->velocity[3 + i] : 0;
     }
-    reach = v3_norm(arm) + geometry_radius(geometry);
-    p->spin = moves ? rotation_sweep(turn->rate, reach, dt) : 0;
+    reach = v3_norm(pose->arm) + geometry_radius(geometry);
+    p->spin = moves ? rotation_sweep(pose->rate, reach, dt) : 0;
     p->fall = moves ? own_fall(body->acceleration, reach, dt) : 0;
     p->thin = geometry_thickness(geometry);
     p->inertia = body->inertia;
@@ -104,6 +117,15 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     p->mean = body->mean;
     for (i = 0; i < 3; ++i) p->reserved[i] = 0;
     if (geometry->type != SADMM_SHAPE_PLANE) proxy_box(p, dt, margin, gravity, box);
+}
+
+/* turn: proxy_turn_of. */
+SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadmm_geometry *geometry,
+                              const struct sadmm_collision_body *body, const struct proxy_turn *turn, double dt,
+                              double margin, double gravity, struct sadmm_proxy *p, struct sadmm_box3 *box)
+{
+    const struct proxy_pose pose = proxy_pose_of(shape, turn);
+    proxy_put(shape, geometry, body, &pose, dt, margin, gravity, p, box);
 }
 
 /* Is a pair that was found there to be turned to it? Halfway is where shapes are placed. */

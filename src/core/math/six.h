@@ -44,6 +44,32 @@ static inline double three_sum(three a)
     const two_numbers pair = __builtin_shufflevector(a, a, 0, 1) + __builtin_shufflevector(a, a, 2, 3);
     return pair[0] + pair[1];
 }
+/* a b + c and a b - c, fused where c is no product that the compiler might fuse instead. */
+static inline three three_fma(three a, three b, three c)
+{
+#ifdef __FMA__
+    return _mm256_fmadd_pd(a, b, c);
+#else
+    return a * b + c;
+#endif
+}
+static inline three three_fms(three a, three b, three c)
+{
+#ifdef __FMA__
+    return _mm256_fmsub_pd(a, b, c);
+#else
+    return a * b - c;
+#endif
+}
+/* A product that is rounded, whatever it is added to. */
+static inline three three_product(three a, three b)
+{
+    three p = a * b;
+#ifdef __FMA__
+    __asm__("" : "+x"(p));
+#endif
+    return p;
+}
 static inline double three_dot(three a, three b) { return three_sum(a * b); }
 
 static inline six six_zero(void) { return (six){{0, 0, 0, 0}, {0, 0, 0, 0}}; }

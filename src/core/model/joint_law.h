@@ -564,9 +564,11 @@ SADMM_INLINE void joint_forget_forces(struct sadmm_joint_memory *memory)
 SADMM_INLINE void joint_keep_row(struct sadmm_joint_memory *memory, const vec3 axis[JOINT_COORDINATES], int role,
                                  int coordinate, double force)
 {
-    int j;
+    double *part = memory->wrench + (coordinate < 3 ? 0 : 3);
     memory->force[role][coordinate] = force;
-    for (j = 0; j < 3; ++j) memory->wrench[(coordinate < 3 ? 0 : 3) + j] += force * v3_part(axis[coordinate], j);
+    part[0] += force * axis[coordinate].x;
+    part[1] += force * axis[coordinate].y;
+    part[2] += force * axis[coordinate].z;
 }
 
 /* All rows of the joint are in its wrench. */

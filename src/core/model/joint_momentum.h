@@ -52,24 +52,30 @@ SADMM_INLINE double joint_free_energy(double mass, sym3 inertia, const double b[
     return dot3(b, b) / mass + v3_dot(angular, m3_solve(rows, angular));
 }
 
-/* A body that the step moves to this pose and velocity. spin: halfway. */
+/* A body that the step moves to this pose and velocity. spin: halfway; bits: of its island, whose energies are read
+ * where rows of it turn by more than a step resolves. */
 SADMM_INLINE void joint_add_momentum_by(struct joint_momentum *to, const struct sadmm_rigid *from,
                                         const struct spin_system *spin, const double position[3],
                                         const double orientation[4], const double velocity[6], const double origin[3],
-                                        const struct sadmm_settings *settings)
+                                        int bits, const struct sadmm_settings *settings)
 {
+    const bool energies = (bits & ISLAND_TURNS) != 0;
     const double none[6] = {0, 0, 0, 0, 0, 0};
     double mass, b[6], halfway[3], end[3], A[PACKED6];
     /* stiffness of joints moves no momentum to anything */
-    sym3 inertia = sadmm_rigid_body_by(from, spin, rolling_is_stiff(from), settings, &mass, b);
+    sym3 inertia;
     int k;
-    to->free_energy += joint_free_energy(mass, inertia, b);
+    if (energies || rolling_turns_on(from) || rolling_is_stiff(from))
+        inertia = sadmm_rigid_body_by(from, spin, rolling_is_stiff(from), settings, &mass, b);
+    else mass = sadmm_rigid_load(from, spin, settings, b);
+    if (energies) to->free_energy += joint_free_energy(mass, inertia, b);
     joint_halfway(from, origin, settings->dt, halfway);
     inertia = rigid_world_inertia(q_matrix(q_load(orientation)),
                                   v3_scale(v3_load(from->inertia), forces_damping_of(from, 1, settings->dt).mass));
     if (rolling_is_stiff(from)) inertia = s3_add(inertia, sadmm_stiffness(from, settings->dt)); /* as in b */
-    to->energy += mass * dot3(velocity, velocity) +
-                  v3_dot(v3_load(velocity + 3), s3_mul(inertia, v3_load(velocity + 3)));
+    if (energies)
+        to->energy += mass * dot3(velocity, velocity) +
+                      v3_dot(v3_load(velocity + 3), s3_mul(inertia, v3_load(velocity + 3)));
     for (k = 0; k < PACKED6; ++k) A[k] = 0;
     A[0] = A[2] = A[5] = mass;
     A[9] = inertia.xx, A[14] = inertia.yy, A[20] = inertia.zz;
@@ -85,10 +91,10 @@ SADMM_INLINE void joint_add_momentum_by(struct joint_momentum *to, const struct 
 SADMM_INLINE void joint_add_momentum(struct joint_momentum *to, const struct sadmm_rigid *from,
                                      const double turned[4], const double position[3],
                                      const double orientation[4], const double velocity[6], const double origin[3],
-                                     const struct sadmm_settings *settings)
+                                     int bits, const struct sadmm_settings *settings)
 {
     const struct spin_system spin = spin_system_at(from, turned, settings->dt);
-    joint_add_momentum_by(to, from, &spin, position, orientation, velocity, origin, settings);
+    joint_add_momentum_by(to, from, &spin, position, orientation, velocity, origin, bits, settings);
 }
 
 /* The points of a static contact pair of its body; */

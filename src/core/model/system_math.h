@@ -33,11 +33,9 @@ SADMM_INLINE sym3 sadmm_stiffened(const struct sadmm_rigid *body, vec3 angular, 
     return s3_add(I, more);
 }
 
-/* Eq. (1) of a rigid body: A = diag(m I, world inertia) halfway through the step (spin: spin_of_system) and b = A v +
- * dt (m g + f, tau), with damping (forces.h), and what contacts that roll owe it. stiffens: its stiffness counts.
- * Returns the inertia; *mass: of A. */
-SADMM_INLINE sym3 sadmm_rigid_body_by(const struct sadmm_rigid *body, const struct spin_system *spin, bool stiffens,
-                                      const struct sadmm_settings *settings, double *mass, double b[6])
+/* b, but for what needs A besides (below); returns the mass of A. */
+SADMM_INLINE double sadmm_rigid_load(const struct sadmm_rigid *body, const struct spin_system *spin,
+                                     const struct sadmm_settings *settings, double b[6])
 {
     const double dt = settings->dt;
     const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
@@ -47,10 +45,20 @@ SADMM_INLINE sym3 sadmm_rigid_body_by(const struct sadmm_rigid *body, const stru
     }
     v3_store(v3_madd(v3_scale(spin->momentum, angular.keep), dt, v3_load(body->wrench + 3)), b + 3);
     rolling_pay(body, b);
-    *mass = linear.mass * body->mass;
-    const sym3 I = rigid_world_inertia(spin->R, v3_scale(v3_load(body->inertia), angular.mass));
+    return linear.mass * body->mass;
+}
+
+/* Eq. (1) of a rigid body: A = diag(m I, world inertia) halfway through the step (spin: spin_of_system) and b = A v +
+ * dt (m g + f, tau), with damping (forces.h), and what contacts that roll owe it. stiffens: its stiffness counts.
+ * Returns the inertia; *mass: of A. */
+SADMM_INLINE sym3 sadmm_rigid_body_by(const struct sadmm_rigid *body, const struct spin_system *spin, bool stiffens,
+                                      const struct sadmm_settings *settings, double *mass, double b[6])
+{
+    const double share = forces_damping_of(body, 1, settings->dt).mass;
+    *mass = sadmm_rigid_load(body, spin, settings, b);
+    const sym3 I = rigid_world_inertia(spin->R, v3_scale(v3_load(body->inertia), share));
     if (rolling_turns_on(body)) v3_store(v3_add(v3_load(b + 3), s3_mul(I, spin->ahead)), b + 3);
-    return stiffens ? sadmm_stiffened(body, spin->angular, dt, I, b) : I;
+    return stiffens ? sadmm_stiffened(body, spin->angular, settings->dt, I, b) : I;
 }
 
 SADMM_INLINE sym3 sadmm_rigid_body_at(const struct sadmm_rigid *body, const struct spin_system *spin,

@@ -150,7 +150,7 @@ static void each_contact(const struct solving *s, on_side *f)
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
         for (int side = 0; side < 2; ++side) {
             const int32_t body = side ? pair->body_b : pair->body_a;
-            if (body < 0 || j->part[body] < 0) continue;
+            if (body < 0 || j->part[body] < 0 || j->parts[j->part[body]].renewed) continue;
             f(&j->parts[j->part[body]], &contacts->points[pair->first], pair->count, side, (size_t)j->entry[body]);
         }
     }
@@ -194,6 +194,7 @@ static void find_impulses(const struct solving *s)
     struct sadmm_articulations *j = s->j;
     for (int32_t k = 0; k < j->order.parts; ++k) {
         struct articulation_part *part = &j->parts[k];
+        if (part->renewed) continue;
         part->touched = false;
         part->points = 0;
         memset(part->impulse, 0, 6 * (size_t)part->view.s.bodies * sizeof *part->impulse);
@@ -227,6 +228,13 @@ static void take_kept(const struct solving *s, const struct articulation_part *p
     for (int32_t e = 0; e < v->s.bodies; ++e)
         memcpy(s->system->velocity + 6 * v->s.body[e], part->kept_velocity + 6 * e, 6 * sizeof(double));
     EACH_ARTICULATION_ROW(s->slots, v, r, from) s->system->rows->lambda[from] = s->j->kept_lambda[from];
+}
+
+/* Has its tree solved it in this step, for the velocities and impulses that it was loaded with, and with no C? */
+static bool can_be_renewed(const struct articulation_part *part, const struct sadmm_settings *settings)
+{
+    return part->kept && part->by_tree && part->for_ncp && !part->gave &&
+           !(part->touched && settings->method == SADMM_METHOD_PAPER);
 }
 
 /* Is it as it was solved before the iterations? No contact touches it. */
@@ -296,6 +304,7 @@ static bool has_too_much_energy(const struct solving *s, const struct articulati
 static bool solve_giving(const struct solving *s, struct articulation_part *part, bool exact)
 {
     part->gives = true;
+    memset(part->impulse, 0, 6 * (size_t)part->view.s.bodies * sizeof *part->impulse); /* no contact touches it */
     sadmm_articulation_part_load(part, s->system, s->settings, s->slots);
     part->gave = sadmm_articulation_part_solve(part, NULL, exact);
     part->gives = false;
@@ -311,19 +320,25 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
     if (!find_order(&s) || !SADMM_GROW(articulations->kept_lambda, 0, system->rows->row_count))
         return sadmm_fail_memory(error, "articulations");
     const bool kept = after && articulations->kept; /* by the same contacts */
-    bool solves = !kept;
+    bool solves = false;
     for (int32_t k = 0; k < articulations->order.parts; ++k) {
         struct articulation_part *part = &articulations->parts[k];
         part->speed = 0;
         part->left = stiffened && !has_any(part, stiffened);
-        if (part->left) continue;
+        part->renewed = stiffened && !part->left && can_be_renewed(part, settings);
+        if (part->left || part->renewed) continue;
         part->kept = kept && part->kept;
         solves = solves || !is_solved(part);
     }
     if (solves) find_impulses(&s);
     for (int32_t k = 0; k < articulations->order.parts; ++k) {
         struct articulation_part *part = &articulations->parts[k];
-        if (part->left || is_solved(part)) continue;
+        if (part->left) continue;
+        if (part->renewed) {
+            sadmm_articulation_part_renew(part, system, settings, stiffened);
+            continue;
+        }
+        if (is_solved(part)) continue;
         sadmm_articulation_part_load(part, system, settings, slots);
         part->for_ncp = !after && part->by_tree && part->points <= settings->ncp_points;
         if (part->points > 0 && !part->for_ncp) sadmm_articulation_part_find_speed(part);
@@ -332,7 +347,7 @@ sadmm_status sadmm_articulations_solve(struct sadmm_articulations *articulations
     for (int32_t k = 0; k < articulations->order.parts; ++k) {
         struct articulation_part *part = &articulations->parts[k];
         if (part->left) continue;
-        if (is_solved(part)) {
+        if (!part->renewed && is_solved(part)) {
             take_kept(&s, part);
             continue;
         }

@@ -104,6 +104,24 @@ void sadmm_articulation_part_load_at(struct articulation_part *part, const struc
     for (int32_t e = 0; e < v->s.bodies; ++e) add_row_loads(part, e);
 }
 
+void sadmm_articulation_part_renew(struct articulation_part *part, const struct sadmm_system *system,
+                                   const struct sadmm_settings *settings, const uint8_t *changed)
+{
+    const struct articulation_view *v = &part->view;
+    for (int32_t e = 0; e < v->s.bodies; ++e) {
+        double *A = v->factor + 36 * (size_t)e, *residual = v->residual + 6 * (size_t)e,
+               *without = part->without + 6 * (size_t)e, b[6];
+        if (!changed[v->s.body[e]]) continue;
+        sadmm_system_body(system, settings, v->s.body[e], A, b);
+        for (int k = 0; k < 6; ++k) {
+            const double contacts = residual[k] - without[k];
+            residual[k] = articulation_body_residual(v, e, k, b[k], part->impulse[6 * e + k]);
+            without[k] = residual[k] - contacts;
+        }
+    }
+    part->tree.known = false;
+}
+
 void sadmm_articulation_part_find_speed(struct articulation_part *part)
 {
     const struct articulation_view *v = &part->view;

@@ -23,7 +23,8 @@ struct articulation_part {
     bool by_tree;            /* this call's rows are solved by it; else by the sparse factor */
     bool loop;               /* its joints are more than hang it together */
     double speed;            /* that its impulses change it by; 0: it is not solved */
-    bool left;               /* it is not this call's */
+    bool left;               /* it is not this call's; */
+    bool renewed;            /* it is, but for inertias what the last call has loaded */
     bool gives;              /* rows with bounds do, by a share of their response, while it is loaded; */
     bool gave;               /* ... did in the last solve */
     bool touched;            /* by a contact; */
@@ -66,6 +67,10 @@ void sadmm_articulation_part_load(struct articulation_part *part, const struct s
 /* Velocities are there already. */
 void sadmm_articulation_part_load_at(struct articulation_part *part, const struct sadmm_system *system,
                                      const struct sadmm_settings *settings, const struct sadmm_row_constraint *slots);
+
+/* A part that its tree has solved, with no C: the inertias of `changed` bodies (of the system) are others now. */
+void sadmm_articulation_part_renew(struct articulation_part *part, const struct sadmm_system *system,
+                                   const struct sadmm_settings *settings, const uint8_t *changed);
 
 /* The speed that its impulses change it by, once it is loaded. */
 void sadmm_articulation_part_find_speed(struct articulation_part *part);

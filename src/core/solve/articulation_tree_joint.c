@@ -11,19 +11,20 @@ static const double PERPENDICULAR = 1e-9;
 
 /* A lock of a translation, or of a rotation. Is there room for it, and is its axis perpendicular to those of earlier
  * joints, the first `others` of either kind? */
-static bool add_lock(struct articulation_tree *tree, struct articulation_node *node, int32_t at, const int others[2])
+static bool add_lock(struct articulation_tree_row *rows, struct articulation_node *node, int32_t at,
+                     const int others[2])
 {
-    const six row = six_at(tree->row[at].own);
+    const six row = six_at(rows[at].own);
     const int kind = three_dot(row.linear, row.linear) > 0.5 ? 0 : 1;
     if (node->locks[kind] == 3) return false;
     for (int i = 0; i < others[kind]; ++i) {
         const three axis = kind == 0 ? row.linear : row.angular,
-                    other = *(const three *)(tree->row[node->lock[3 * kind + i]].own + SIX_HALF * kind);
+                    other = *(const three *)(rows[node->lock[3 * kind + i]].own + SIX_HALF * kind);
         if (!(fabs(three_dot(axis, other)) < PERPENDICULAR)) return false;
     }
     node->lock[3 * kind + node->locks[kind]++] = at;
-    tree->row[at].role = ARTICULATION_LOCK;
-    memset(tree->row[at].along, 0, sizeof tree->row[at].along);
+    rows[at].role = ARTICULATION_LOCK;
+    memset(rows[at].along, 0, sizeof rows[at].along);
     return true;
 }
 
@@ -110,9 +111,14 @@ static void put_row(const struct articulation_row *from, int side, six past, int
 static bool add_rows(struct articulation_tree *tree, struct articulation_node *node, const struct articulation_view *v,
                      const struct sadmm_row_constraint *slots, const struct sadmm_rows *rows)
 {
+    /* bytes are written below, which may be anything to a compiler: it would fetch these again */
+    struct articulation_row *const given = v->rows;
+    struct articulation_tree_row *const all = tree->row;
+    int32_t *const acting = tree->acting + tree->rows, *const row_of = tree->row_of;
+    int32_t at = tree->rows, act = 0;
     node->bound = false;
-    node->locks[0] = node->locks[1] = node->acting = 0;
-    node->row = tree->rows;
+    node->locks[0] = node->locks[1] = 0;
+    node->row = at;
     six past = six_zero();
     for (int32_t j = node->first; j < node->first + node->count; ++j) {
         const int32_t column = tree->joint[j] / 2, side = tree->joint[j] % 2, first = SADMM_MAX_ROWS * column;
@@ -125,19 +131,19 @@ static bool add_rows(struct articulation_tree *tree, struct articulation_node *n
             past = start_past_parent(tree, node, v);
         }
         node->bound = true;
-        for (int32_t i = 0; i < slot->count; ++i) {
-            struct articulation_row *from = &v->rows[first + i];
-            const int32_t at = tree->rows++;
-            if (rows) load_row(rows, (size_t)(slot->first + i), from);
-            v->state[first + i] = ROW_INSIDE;
-            tree->row_of[first + i] = at;
-            put_row(from, side, past, first + i, &tree->row[at]);
-            if (!sadmm_law_is_coupled(from->compliance, from->lo, from->hi))
-                tree->acting[node->row + node->acting++] = at;
-            else if (!add_lock(tree, node, at, others)) return false;
+        const int32_t count = slot->count, from_row = slot->first;
+        memset(v->state + first, ROW_INSIDE, (size_t)count);
+        for (int32_t i = 0; i < count; ++i, ++at) {
+            struct articulation_row *from = &given[first + i];
+            if (rows) load_row(rows, (size_t)(from_row + i), from);
+            row_of[first + i] = at;
+            put_row(from, side, past, first + i, &all[at]);
+            if (!sadmm_law_is_coupled(from->compliance, from->lo, from->hi)) acting[act++] = at;
+            else if (!add_lock(all, node, at, others)) return false;
         }
     }
-    node->row_end = tree->rows;
+    tree->rows = node->row_end = at;
+    node->acting = act;
     return true;
 }
 

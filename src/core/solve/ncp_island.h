@@ -44,8 +44,8 @@ struct sadmm_ncp {
     double *numbers;           /* lambda, u, G, Newton's work; the best */
     double *rows;              /* multipliers of the system's rows, the best */
     int32_t *first_node;       /* (parts + 1) of trees (below); the last: of bodies without joints */
-    struct ncp_passed *passed; /* of each number (ncp_response.c) */
-    const struct ncp_passed **passed_at; /* by node: of one number */
+    struct ncp_passed *passed; /* of each law (ncp_tree_response.c) */
+    const struct ncp_passed **passed_at; /* by node: of one law */
     int32_t *passed_counts;
     bool known;                /* the lists are of this (sub-)step, from before its iterations; then */
     double *kept;              /* velocities, multipliers of rows, impulses at that time */
@@ -85,11 +85,11 @@ static inline struct articulation_part *part_of(const struct island *s, int32_t 
  *
  *     G_rc = sum z_r H z_c over the nodes that both have passed
  *
- * Nodes have numbers of their own in the island: those of its parts' trees one after the other, then bodies without
- * joints, which are roots. */
+ * The columns of a law go together, a lane each. Nodes have numbers of their own in the island: those of its parts'
+ * trees one after the other, then bodies without joints, which are roots. */
 struct ncp_passed {
-    int32_t node;
-    double along[8], response[8]; /* behind the free directions: 0 */
+    int32_t node, free; /* directions */
+    double along[6][4], response[6][4];
 };
 
 /* ncp_response.c: numbers of nodes, once the island's bodies are there; G, with rows in the states that they have. */

@@ -1,7 +1,7 @@
 /* Where the ends of a joint are (core/model/joint_law.h, joint_close.h): both ends in two poses, or those of two
  * joints, in a lane each. */
+#include "core/math/lanes.h"
 #include "joint_kernels.h"
-#include "joint_lanes.h"
 
 /* Ends of a and b in a first pose, and in a second one. */
 enum lane { FIRST_A, FIRST_B, SECOND_A, SECOND_B, LANES };
@@ -42,7 +42,7 @@ static inline struct ends find_ends(struct poses *at, const struct joint_frame *
     const struct lanes3 v = {place[0], place[1], place[2]};
     const struct lanes_matrix R = lanes_matrix_of(q);
     struct ends out;
-    out.arm = (struct lanes3){lanes3_dot(R.r[0], v), lanes3_dot(R.r[1], v), lanes3_dot(R.r[2], v)};
+    out.arm = lanes_turn(&R, v);
     out.point = lanes3_add((struct lanes3){x[0], x[1], x[2]}, out.arm);
     out.orientation = lanes_quat_mul(q, (struct lanes_quat){own[0], own[1], own[2], own[3]});
     return out;

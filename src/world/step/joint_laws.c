@@ -1,8 +1,8 @@
 /* The rows of a joint (core/model/joint_law.h): what is locked for all coordinates at once, what is free one by one. */
 #include <string.h>
 
+#include "core/math/lanes.h"
 #include "joint_kernels.h"
-#include "joint_lanes.h"
 
 /* joint_moving_of. */
 static struct joint_moving moving_of(const struct sadmm_world_joint *joint, const struct acting_joint *acting,
@@ -71,13 +71,11 @@ struct locks {
     bool beyond[SIX_RATES]; /* not joint_turns_within */
 };
 
-typedef int64_t places __attribute__((vector_size(32)));
-
 static inline lanes clamped(lanes a, double most)
 {
     const lanes hi = lanes_fill(most), lo = lanes_fill(-most);
-    const places above = a > hi, below = a < lo;
-    return (lanes)((above & (places)hi) | (below & (places)lo) | (~(above | below) & (places)a));
+    const lanes_mask above = a > hi, below = a < lo;
+    return lanes_choose(above, hi, lanes_choose(below, lo, a));
 }
 
 /* Three translations or rotations. The fourth lane is another coordinate's, or of no account. */
@@ -90,7 +88,7 @@ static inline void find_locks(const struct acting_joint *acting, const struct jo
                 turning = lanes_at(rates->middle + first) + prescribed - before,
                 row_turning = lanes_at(rates->start + first) + prescribed - before,
                 half = lanes_fill(dt / 2) * row_turning, bound = lanes_fill(bounds->rotation);
-    const places within = first ? (row_turning <= bound) & (-row_turning <= bound)
+    const lanes_mask within = first ? (row_turning <= bound) & (-row_turning <= bound)
                                 : half * half * lanes_fill(bounds->turn2) <= lanes_fill(most * most * bounds->around2);
     lanes_put((late ? lanes_fill(0) : turning) + prescribed, out->turned + first);
     lanes_put(clamped(lanes_fill(JOINT_FEEDBACK) * lanes_at(acting->start.value + first) / lanes_fill(dt),

@@ -54,16 +54,17 @@ static void add_body(const sadmm_world *world, int32_t i, const sadmm_settings *
 {
     const struct sadmm_rigid *next = &world->next[i];
     const struct sadmm_rigid *start = &world->start.rigid[i];
+    const int bits = world->joint_touch[world->joint_labels[i]];
     double halfway[4];
-    if (!is_floating(world, i)) return;
+    if (!joint_island_is_floating(bits)) return;
     if (world->spins_known && !rolling_is_stiff(start)) {
         joint_add_momentum_by(sums_of(world, i), start, &world->spins[i], next->position, next->orientation,
-                              next->velocity, origin_of(world, i), settings);
+                              next->velocity, origin_of(world, i), bits, settings);
         return;
     }
     q_store(spin_turned_halfway(start, settings->dt), halfway);
     joint_add_momentum(sums_of(world, i), start, halfway, next->position, next->orientation, next->velocity,
-                       origin_of(world, i), settings);
+                       origin_of(world, i), bits, settings);
 }
 
 /* To its island's first body, which names it. */
@@ -73,7 +74,9 @@ static void add_to_island(const sadmm_world *world, int32_t i)
     if (!is_floating(world, i) || label == i) return;
     double *to = (double *)sums_of(world, label);
     const double *from = (const double *)sums_of(world, i);
-    for (int k = 0; k < JOINT_MOMENTUM_SUMS; ++k) to[k] += from[k];
+    const int gram = sums_of(world, i)->sums.gram[MOMENTUM_CONTACTS] > 0 ? 0 : PACKED6 + 1; /* most have none */
+    for (int k = 0; k < MOMENTUM_SUMS - gram; ++k) to[k] += from[k];
+    for (int k = MOMENTUM_SUMS; k < JOINT_MOMENTUM_SUMS; ++k) to[k] += from[k];
 }
 
 static void restore(const sadmm_world *world, int32_t i)

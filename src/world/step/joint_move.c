@@ -35,11 +35,13 @@ static void add_constraint(const sadmm_world *world, const struct sadmm_row_cons
     uint16_t *island = island_of(world, constraint->body_a, constraint->body_b);
     struct joint_trapezoid bodies[2];
     int moorings = 0, bits = ISLAND_ARTICULATED;
+    const bool between = body[0] >= 0 && body[1] >= 0;
     bool known = false;
     for (int s = 0; s < 2; ++s) bodies[s].rigid = body[s] >= 0 ? &world->start.rigid[body[s]] : NULL;
     for (int32_t k = 0; k < constraint->count; ++k) {
         const size_t r = (size_t)(constraint->first + k);
         const struct sadmm_joint_source *source = &world->joint_sources[r];
+        if (between && source->role == SADMM_ROLE_LOCK && source->slack < INFINITY) continue; /* as most: nothing */
         for (int s = 0; !known && joint_row_limits(source, rows->lambda[r]) && s < 2; ++s)
             bodies[s] = *trapezoid_of(world, body[s], settings->dt), known = s;
         moorings |= joint_mooring(source, rows->lambda[r], bodies);

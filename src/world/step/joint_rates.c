@@ -1,6 +1,6 @@
 /* How fast a joint's coordinates change (joint_kernels.h), three at a time. */
+#include "core/math/lanes.h"
 #include "joint_kernels.h"
-#include "joint_lanes.h"
 
 static inline struct lanes3 axes_of(const vec3 axis[3])
 {

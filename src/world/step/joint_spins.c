@@ -1,41 +1,19 @@
 /* How bodies turn in a step (core/model/spin.h), four at once. */
-#ifdef __AVX__
-#include <immintrin.h>
-#endif
-
+#include "core/math/lanes.h"
 #include "joint_kernels.h"
-#include "joint_lanes.h"
 
 enum { LANES = 4 };
-typedef int64_t places __attribute__((vector_size(32)));
-
-static inline lanes root(lanes a)
-{
-#ifdef __AVX__
-    return _mm256_sqrt_pd(a);
-#else
-    return (lanes){sqrt(a[0]), sqrt(a[1]), sqrt(a[2]), sqrt(a[3])};
-#endif
-}
-static inline lanes choose(places which, lanes a, lanes b)
-{
-    return (lanes)((which & (places)a) | (~which & (places)b));
-}
-static inline lanes least(lanes a, lanes b) { return choose(a < b, a, b); }
-static inline lanes most(lanes a, lanes b) { return choose(a > b, a, b); }
-static inline lanes size(lanes a) { return choose(a < 0, -a, a); }
+static inline lanes least(lanes a, lanes b) { return lanes_choose(a < b, a, b); }
+static inline lanes most(lanes a, lanes b) { return lanes_choose(a > b, a, b); }
+static inline lanes size(lanes a) { return lanes_choose(a < 0, -a, a); }
 static inline lanes largest(struct lanes3 a) { return most(size(a.x), most(size(a.y), size(a.z))); }
-static inline bool any(places which) { return (which[0] | which[1]) | (which[2] | which[3]); }
+static inline bool any(lanes_mask which) { return (which[0] | which[1]) | (which[2] | which[3]); }
 
 static inline struct lanes3 turned_back(const struct lanes_matrix *R, struct lanes3 v) /* m3_tmul */
 {
     const struct lanes3 *r = R->r;
     return (struct lanes3){r[0].x * v.x + v.y * r[1].x + v.z * r[2].x, r[0].y * v.x + v.y * r[1].y + v.z * r[2].y,
                            r[0].z * v.x + v.y * r[1].z + v.z * r[2].z};
-}
-static inline struct lanes3 turned(const struct lanes_matrix *R, struct lanes3 v) /* m3_mul */
-{
-    return (struct lanes3){lanes3_dot(R->r[0], v), lanes3_dot(R->r[1], v), lanes3_dot(R->r[2], v)};
 }
 static inline struct lanes3 each(struct lanes3 a, struct lanes3 b)
 {
@@ -46,10 +24,10 @@ static inline struct lanes3 each(struct lanes3 a, struct lanes3 b)
 static inline struct lanes3 mean_spin(struct lanes3 w, struct lanes3 c)
 {
     const lanes rate = largest(c) * largest(w), faster = rate * rate * rate;
-    const places slow = rate < (real)0.5;
+    const lanes_mask slow = rate < (real)0.5;
     lanes error = lanes_fill(1);
     struct lanes3 m = w;
-    places on = {-1, -1, -1, -1};
+    lanes_mask on = {-1, -1, -1, -1};
     do {
         struct lanes3 next = m;
         for (int k = 0; k < 2; ++k) {
@@ -57,7 +35,7 @@ static inline struct lanes3 mean_spin(struct lanes3 w, struct lanes3 c)
             next.y = w.y - c.y * (next.z * next.x);
             next.z = w.z - c.z * (next.x * next.y);
         }
-        m.x = choose(on, next.x, m.x), m.y = choose(on, next.y, m.y), m.z = choose(on, next.z, m.z);
+        m.x = lanes_choose(on, next.x, m.x), m.y = lanes_choose(on, next.y, m.y), m.z = lanes_choose(on, next.z, m.z);
         error *= faster;
         on &= (error > SADMM_EPSILON) & slow;
     } while (any(on));
@@ -71,13 +49,13 @@ struct turning {
 };
 
 /* rigid_tumble_on. Returns where it is not that: of bodies whose moments are equal, that do not turn or turn far. */
-static inline places tumble(struct turning *t, struct lanes3 inertia, double dt)
+static inline lanes_mask tumble(struct turning *t, struct lanes3 inertia, double dt)
 {
     const struct lanes3 p = each(inertia, t->own);
     const lanes energy2 = lanes3_dot(p, t->own), momentum2 = lanes3_dot(p, p), half = lanes_fill(dt / 2),
                 lo = least(inertia.x, least(inertia.y, inertia.z)), hi = most(inertia.x, most(inertia.y, inertia.z)),
                 square = lanes_fill(dt * dt) * ((lo + hi) * energy2 - momentum2);
-    const places other = (hi - lo <= lanes_fill(4 * SADMM_EPSILON) * hi) | ~(largest(t->own) > 0) |
+    const lanes_mask other = (hi - lo <= lanes_fill(4 * SADMM_EPSILON) * hi) | ~(largest(t->own) > 0) |
                          ~(lanes_fill(4) * square <= lo * hi);
     const lanes rate2 = energy2 / momentum2 * energy2, y = half * half * rate2, z = least(y, lanes_fill(0.0625)),
                 tangent = (lanes_fill(10395) - z * (lanes_fill(1260) - lanes_fill(21) * z)) /
@@ -89,36 +67,23 @@ static inline places tumble(struct turning *t, struct lanes3 inertia, double dt)
                         m = mean_spin(t->own, c);
     const struct lanes_quat q = lanes_quat_mul(
         t->q, (struct lanes_quat){lanes_fill(1), stretched * m.x, stretched * m.y, stretched * m.z});
-    const lanes scale = lanes_fill(1) / root(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z), two = lanes_fill(2);
-    t->q = (struct lanes_quat){q.w * scale, q.x * scale, q.y * scale, q.z * scale};
+    const lanes two = lanes_fill(2);
+    t->q = lanes_quat_normalize(q);
     t->own = (struct lanes3){m.x * two - t->own.x, m.y * two - t->own.y, m.z * two - t->own.z};
     t->R = lanes_matrix_of(t->q);
     return other;
-}
-
-/* Four numbers each of four bodies, as lanes; and back. */
-static inline void gather(const double *const from[LANES], lanes to[4])
-{
-    for (int k = 0; k < LANES; ++k) to[k] = lanes_at(from[k]);
-    lanes_transpose(to);
-}
-static inline void scatter(lanes a, lanes b, lanes c, lanes d, double *const to[LANES], int at)
-{
-    lanes rows[4] = {a, b, c, d};
-    lanes_transpose(rows);
-    for (int k = 0; k < LANES; ++k) lanes_put(rows[k], to[k] + at);
 }
 
 static inline struct lanes3 inertia_of(const struct sadmm_rigid *const body[LANES])
 {
     const double *const from[LANES] = {body[0]->inertia, body[1]->inertia, body[2]->inertia, body[3]->inertia};
     lanes to[4];
-    gather(from, to);
+    lanes_gather(from, to);
     return (struct lanes3){to[0], to[1], to[2]};
 }
 
 /* Of four bodies; others than these four numbers: `ahead`, which is 0. */
-static inline places find_four(const struct sadmm_rigid *const body[LANES], double dt, double *const out[LANES])
+static inline lanes_mask find_four(const struct sadmm_rigid *const body[LANES], double dt, double *const out[LANES])
 {
     const double *const at[LANES] = {body[0]->orientation, body[1]->orientation, body[2]->orientation,
                                      body[3]->orientation},
@@ -127,20 +92,20 @@ static inline places find_four(const struct sadmm_rigid *const body[LANES], doub
     const struct lanes3 inertia = inertia_of(body);
     lanes q[4], w[4];
     struct turning t;
-    gather(at, q);
-    gather(spin, w);
+    lanes_gather(at, q);
+    lanes_gather(spin, w);
     t.q = (struct lanes_quat){q[0], q[1], q[2], q[3]};
     t.R = lanes_matrix_of(t.q);
     t.own = turned_back(&t.R, (struct lanes3){w[0], w[1], w[2]});
-    const struct lanes3 momentum = turned(&t.R, each(inertia, t.own));
-    const places other = tumble(&t, inertia, dt / 2);
-    const struct lanes3 angular = turned(&t.R, t.own), *r = t.R.r;
+    const struct lanes3 momentum = lanes_turn(&t.R, each(inertia, t.own));
+    const lanes_mask other = tumble(&t, inertia, dt / 2);
+    const struct lanes3 angular = lanes_turn(&t.R, t.own), *r = t.R.r;
     const lanes zero = lanes_fill(0);
-    scatter(t.q.w, t.q.x, t.q.y, t.q.z, out, 0);
-    scatter(r[0].x, r[0].y, r[0].z, r[1].x, out, 4);
-    scatter(r[1].y, r[1].z, r[2].x, r[2].y, out, 8);
-    scatter(r[2].z, angular.x, angular.y, angular.z, out, 12);
-    scatter(momentum.x, momentum.y, momentum.z, zero, out, 16);
+    lanes_scatter(t.q.w, t.q.x, t.q.y, t.q.z, out, 0);
+    lanes_scatter(r[0].x, r[0].y, r[0].z, r[1].x, out, 4);
+    lanes_scatter(r[1].y, r[1].z, r[2].x, r[2].y, out, 8);
+    lanes_scatter(r[2].z, angular.x, angular.y, angular.z, out, 12);
+    lanes_scatter(momentum.x, momentum.y, momentum.z, zero, out, 16);
     for (int k = 0; k < LANES; ++k) out[k][20] = out[k][21] = 0;
     return other;
 }
@@ -158,7 +123,7 @@ void SADMM_KERNEL(joint_spins)(const struct sadmm_rigid *bodies, size_t count, d
             body[k] = &bodies[there ? first + k : first];
             to[k] = (double *)(there ? &out[first + k] : &rest[k]);
         }
-        const places other = find_four(body, dt, to);
+        const lanes_mask other = find_four(body, dt, to);
         for (size_t k = 0; k < LANES && first + k < count; ++k)
             if (other[k] || rolling_turns_on(body[k])) out[first + k] = spin_of_system(body[k], dt);
     }
@@ -175,13 +140,13 @@ void SADMM_KERNEL(joint_moves)(const struct joint_movement *bodies, size_t count
                                            all[3].velocity + 2};
         lanes q[4], w[4], orientation[4];
         struct turning t;
-        gather(at, q);
-        gather(spin, w);
+        lanes_gather(at, q);
+        lanes_gather(spin, w);
         t.q = (struct lanes_quat){q[0], q[1], q[2], q[3]};
         t.R = lanes_matrix_of(t.q);
         t.own = turned_back(&t.R, (struct lanes3){w[1], w[2], w[3]});
-        const places other = tumble(&t, inertia_of(body), dt / 2);
-        const struct lanes3 angular = turned(&t.R, t.own);
+        const lanes_mask other = tumble(&t, inertia_of(body), dt / 2);
+        const struct lanes3 angular = lanes_turn(&t.R, t.own);
         orientation[0] = t.q.w, orientation[1] = t.q.x, orientation[2] = t.q.y, orientation[3] = t.q.z;
         lanes_transpose(orientation);
         for (size_t k = 0; k < LANES && first + k < count; ++k) {

@@ -1,9 +1,14 @@
-/* Vectors of four doubles for the kernels of joints: a number of three coordinates, or of both ends of a joint as the
- * step starts and halfway. Each lane goes through the sums and products of core/math in their order. */
-#ifndef SADMM_WORLD_STEP_JOINT_LANES_H
-#define SADMM_WORLD_STEP_JOINT_LANES_H
+/* Vectors of four doubles for kernels of the host that are compiled once per instruction set: a number of three
+ * coordinates, or of four bodies, shapes or ends of joints. Each lane goes through the sums and products of vec3.h and
+ * quat.h in their order, for the same bits. */
+#ifndef SADMM_CORE_MATH_LANES_H
+#define SADMM_CORE_MATH_LANES_H
 
-#include "core/math/quat.h"
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
+
+#include "quat.h"
 
 typedef double lanes __attribute__((vector_size(32), aligned(8), may_alias));
 struct lanes3 {
@@ -16,9 +21,25 @@ struct lanes_matrix {
     struct lanes3 r[3];
 };
 
+/* Of comparisons: all bits of a lane or none. */
+typedef int64_t lanes_mask __attribute__((vector_size(32)));
+
 static inline lanes lanes_fill(double x) { return (lanes){x, x, x, x}; }
 static inline lanes lanes_at(const double *x) { return *(const lanes *)x; }
 static inline void lanes_put(lanes a, double *x) { *(lanes *)x = a; }
+
+static inline lanes lanes_root(lanes a)
+{
+#ifdef __AVX__
+    return _mm256_sqrt_pd(a);
+#else
+    return (lanes){sqrt(a[0]), sqrt(a[1]), sqrt(a[2]), sqrt(a[3])};
+#endif
+}
+static inline lanes lanes_choose(lanes_mask which, lanes a, lanes b)
+{
+    return (lanes)((which & (lanes_mask)a) | (~which & (lanes_mask)b));
+}
 
 /* Columns of four rows, and back. */
 static inline void lanes_transpose(lanes a[4])
@@ -32,11 +53,17 @@ static inline void lanes_transpose(lanes a[4])
     a[2] = __builtin_shufflevector(even, more, 2, 3, 6, 7);
     a[3] = __builtin_shufflevector(odd, other, 2, 3, 6, 7);
 }
-static inline struct lanes3 lanes_columns3(lanes a, lanes b, lanes c, lanes d)
+/* Four numbers each of four places, as lanes; and back. */
+static inline void lanes_gather(const double *const from[4], lanes to[4])
+{
+    for (int k = 0; k < 4; ++k) to[k] = lanes_at(from[k]);
+    lanes_transpose(to);
+}
+static inline void lanes_scatter(lanes a, lanes b, lanes c, lanes d, double *const to[4], int at)
 {
     lanes rows[4] = {a, b, c, d};
     lanes_transpose(rows);
-    return (struct lanes3){rows[0], rows[1], rows[2]};
+    for (int k = 0; k < 4; ++k) lanes_put(rows[k], to[k] + at);
 }
 
 static inline struct lanes3 lanes3_add(struct lanes3 a, struct lanes3 b)
@@ -55,6 +82,11 @@ static inline struct lanes_matrix lanes_matrix_of(struct lanes_quat q)
                                   {two * (xy + wz), one - two * (xx + zz), two * (yz - wx)},
                                   {two * (xz - wy), two * (yz + wx), one - two * (xx + yy)}}};
 }
+/* m3_mul */
+static inline struct lanes3 lanes_turn(const struct lanes_matrix *R, struct lanes3 v)
+{
+    return (struct lanes3){lanes3_dot(R->r[0], v), lanes3_dot(R->r[1], v), lanes3_dot(R->r[2], v)};
+}
 /* q_mul */
 static inline struct lanes_quat lanes_quat_mul(struct lanes_quat a, struct lanes_quat b)
 {
@@ -62,6 +94,13 @@ static inline struct lanes_quat lanes_quat_mul(struct lanes_quat a, struct lanes
                                a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
                                a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
                                a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
+}
+
+/* q_normalize */
+static inline struct lanes_quat lanes_quat_normalize(struct lanes_quat q)
+{
+    const lanes s = lanes_fill(1) / lanes_root(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+    return (struct lanes_quat){q.w * s, q.x * s, q.y * s, q.z * s};
 }
 
 #endif
