@@ -286,30 +286,38 @@ sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel,
 }
 
 static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
-                                  int threads, bool pdl, const cuda_args *args, struct sadmm_error *error)
+                                  int threads, size_t shared, bool pdl, const cuda_args *args,
+                                  struct sadmm_error *error)
 {
     struct cuda_partition plain = {};
     if (blocks <= 0) return SADMM_OK;
     plain.parts = (int32_t)blocks;
     plain.cluster = 1;
     plain.threads = threads;
+    plain.shared = shared;
     return launch_configured(c, kernel, name, &plain, pdl, args, error);
 }
 
 sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
                              const cuda_args *args, struct sadmm_error *error)
 {
-    return launch_blocks(c, kernel, name, blocks, threads, all_use_pdl(c), args, error);
+    return launch_blocks(c, kernel, name, blocks, threads, 0, all_use_pdl(c), args, error);
+}
+
+sadmm_status CUDA(launch_shared)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                 int threads, size_t shared, const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, threads, shared, all_use_pdl(c), args, error);
 }
 
 sadmm_status CUDA(launch_pdl)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
                               int threads, const cuda_args *args, struct sadmm_error *error)
 {
-    return launch_blocks(c, kernel, name, blocks, threads, uses_pdl(c), args, error);
+    return launch_blocks(c, kernel, name, blocks, threads, 0, uses_pdl(c), args, error);
 }
 
 sadmm_status CUDA(launch_without_pdl)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
                                       int threads, const cuda_args *args, struct sadmm_error *error)
 {
-    return launch_blocks(c, kernel, name, blocks, threads, false, args, error);
+    return launch_blocks(c, kernel, name, blocks, threads, 0, false, args, error);
 }

@@ -108,6 +108,9 @@ sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char
 /* The same with blocks of so many threads. */
 sadmm_status CUDA(launch_of)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
                              const cuda_args *args, struct sadmm_error *error);
+/* The same with `shared` bytes of a block's own memory. */
+sadmm_status CUDA(launch_shared)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
+                                 int threads, size_t shared, const cuda_args *args, struct sadmm_error *error);
 /* The same, with PDL in large worlds, too; and never with PDL, for what reads before it waits, whatever came before. */
 sadmm_status CUDA(launch_pdl)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
                               int threads, const cuda_args *args, struct sadmm_error *error);

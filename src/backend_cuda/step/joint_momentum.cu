@@ -10,11 +10,14 @@
 #include "core/model/articulation.h"
 #include "core/model/joint_close.h"
 #include "core/model/joint_momentum.h"
+#include "anchors.h"
 #include "joint_bodies.h"
 #include "joint_place.h"
 #include "world.h"
 
-enum { ISLAND_THREADS = 128, ISLAND_BLOCKS = 1024, FETCHED = 8 /* at once, of a sum */ };
+/* Threads of an island's block: many where islands are few, a warp where a thousand of them fill the device anyhow. */
+enum { ISLAND_THREADS = 128, ISLAND_BLOCKS = 1024, MANY_THREADS = 32, MANY_BLOCKS = 16384 };
+enum { FETCHED = 8 /* at once, of a sum */ };
 
 /* Its bodies, ascending. part: where joints are apart (device/step.h), else NULL. */
 struct joint_island {
@@ -23,27 +26,6 @@ struct joint_island {
     const struct articulation_structure *part;
     int32_t bits; /* core/model/joint_trapezoid.h */
 };
-
-static __device__ __forceinline__ bool is_static(const struct sadmm_contact_pair *pair)
-{
-    return pair->body_a < 0 || pair->body_b < 0;
-}
-
-static __device__ __forceinline__ bool anchors(const cuda_view &v, int32_t body)
-{
-    const int32_t slot = v.graph.slot_of[body];
-    for (int32_t at = v.graph.offsets[slot]; at < v.graph.offsets[slot + 1]; ++at) {
-        const int32_t code = v.graph.incident[at];
-        if (code / 2 >= v.contacts.pair_capacity) break; /* rows come last */
-        const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];
-        struct arm_sums arms = {};
-        if (!is_static(pair)) continue;
-        for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
-            add_arm(&arms, code & 1 ? v.raw.points[k].arm_b : v.raw.points[k].arm_a, 1);
-        if (momentum_is_anchored(pair->friction, &arms)) return true;
-    }
-    return false;
-}
 
 static __device__ __forceinline__ void add_static_rows(const cuda_view &v, int32_t constraint, int side,
                                                        const struct sadmm_rigid *body, const double origin[3],
@@ -130,9 +112,9 @@ static __device__ __noinline__ void count_cost(const cuda_view &v, const struct 
 /* What closing has lifted, its velocities pay. Every thread of the block comes here. */
 static __device__ __forceinline__ void pay_island(const cuda_view &v, const struct joint_island &island)
 {
-    const int32_t t = (int32_t)threadIdx.x;
+    const int32_t t = (int32_t)threadIdx.x, threads = (int32_t)blockDim.x;
     struct cuda_closed_body *closed = v.joints.closed;
-    for (int32_t k = t; k < island.count; k += ISLAND_THREADS) count_cost(v, island, island.body[k]);
+    for (int32_t k = t; k < island.count; k += threads) count_cost(v, island, island.body[k]);
     __syncthreads();
     if (t == 0) { /* in the order of the host */
         double gained = 0, moving = 0;
@@ -145,7 +127,7 @@ static __device__ __forceinline__ void pay_island(const cuda_view &v, const stru
     }
     __syncthreads();
     const double keep = closed[island.label].keep;
-    for (int32_t k = t; k < island.count; k += ISLAND_THREADS)
+    for (int32_t k = t; k < island.count; k += threads)
         for (int j = 7; j < PLACE; ++j) closed[island.body[k]].place[j] *= keep;
     __syncthreads();
 }
@@ -155,16 +137,16 @@ static __device__ __forceinline__ void restore_island(const cuda_view &v, const 
 {
     static_assert(offsetof(struct joint_momentum, factor) == JOINT_MOMENTUM_SUMS * sizeof(double),
                   "numbers are added one by one");
-    const int32_t t = (int32_t)threadIdx.x;
+    const int32_t t = (int32_t)threadIdx.x, threads = (int32_t)blockDim.x;
     double *to = (double *)&v.joints.momentum[island.label];
     __syncthreads(); /* all have seen its bits */
-    for (int32_t k = t; k < island.count && !island.part; k += ISLAND_THREADS)
+    for (int32_t k = t; k < island.count && !island.part; k += threads)
         if (anchors(v, island.body[k])) atomicOr(&v.joints.touch[island.label], ISLAND_ANCHORED);
     __syncthreads();
     if (__ldcg(&v.joints.touch[island.label]) & ISLAND_ANCHORED) return;
-    for (int32_t k = t; k < island.count; k += ISLAND_THREADS) store_body(v, island, island.body[k]);
+    for (int32_t k = t; k < island.count; k += threads) store_body(v, island, island.body[k]);
     __syncthreads();
-    for (int32_t n = t; n < JOINT_MOMENTUM_SUMS; n += ISLAND_THREADS) {
+    for (int32_t n = t; n < JOINT_MOMENTUM_SUMS; n += threads) {
         double sum = to[n];
         for (int32_t first = 1; first < island.count; first += FETCHED) {
             double next[FETCHED];
@@ -215,7 +197,7 @@ static __global__ void __launch_bounds__(ISLAND_THREADS)
     if (v.model.live->abort_code) return;
     const int32_t count = v.joints.apart ? args.count : v.model.bodies, blocks = args.most_bodies;
     if ((int32_t)blockIdx.x >= blocks)
-        return find_drift(v, ((int32_t)blockIdx.x - blocks) * ISLAND_THREADS + (int32_t)threadIdx.x);
+        return find_drift(v, ((int32_t)blockIdx.x - blocks) * (int32_t)blockDim.x + (int32_t)threadIdx.x);
     for (int32_t k = (int32_t)blockIdx.x; k < count; k += blocks) {
         struct joint_island island = {k, 0, nullptr, nullptr, 0};
         struct articulation_structure structure = {};
@@ -241,8 +223,9 @@ sadmm_status CUDA(launch_joint_momentum)(struct sadmm_context *c, struct sadmm_e
     cuda_args args = {};
     args.count = c->step->articulations;
     const int64_t islands = c->view.joints.apart ? args.count : c->view.model.bodies;
-    args.most_bodies = (int32_t)std::min<int64_t>(islands, ISLAND_BLOCKS);
+    const bool many = args.count >= ISLAND_BLOCKS;
+    const int threads = many ? MANY_THREADS : ISLAND_THREADS;
+    args.most_bodies = (int32_t)std::min<int64_t>(islands, many ? MANY_BLOCKS : ISLAND_BLOCKS);
     return CUDA(launch_of)(c, joint_momentum_kernel, "momentum of joints",
-                           args.most_bodies + (c->view.joints.count + ISLAND_THREADS - 1) / ISLAND_THREADS,
-                           ISLAND_THREADS, &args, error);
+                           args.most_bodies + (c->view.joints.count + threads - 1) / threads, threads, &args, error);
 }

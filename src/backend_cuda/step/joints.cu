@@ -1,8 +1,9 @@
 /* Joints of a world on the device (docs/internals/algorithm.md, "Joints"): the host's formulas (core/model/joint_law.h,
  * joint_trapezoid.h), in double.
  *
- *   rows      eight lanes a joint, one a coordinate: its laws as raw rows, as the host would make them. A joint has a
- *             fixed number of constraints; its rows fill the first ones, the rest join no bodies
+ *   rows      a lane a side of a joint: how its body acts; a lane a joint: its geometry; then eight lanes a joint, one
+ *             a coordinate: its laws as raw rows, as the host would make them. A joint has a fixed number of
+ *             constraints; its rows fill the first ones, the rest join no bodies
  *   solution  a thread a joint: multipliers into what it keeps; lanes of a pair: may the bodies of its island move by
  *             the means of their velocities? Commit, or turn, moves them then (kernels.cu); or
  *   move      those that are apart (device/step.h)
@@ -29,6 +30,7 @@ struct cuda_joint_middle {
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 
 enum { ROWS_THREADS = 64 }; /* a block: long work, many multiprocessors */
+enum { ROWS_JOINTS = 16 };  /* of a block that makes rows: a warp of sides */
 
 static __device__ __forceinline__ int or_lanes(int bits)
 {
@@ -131,29 +133,50 @@ static __device__ __forceinline__ const struct joint_table *table_of(const joint
     return table;
 }
 
+static __device__ __forceinline__ bool is_enabled(const cuda_view &v, int32_t j)
+{
+    return j < v.joints.count && v.joints.joints[j].def.enabled && !v.joints.begin[j].broken;
+}
+
+/* How the joints of the block, from `first` on, act (joint_act), those that are enabled. */
+static __device__ __forceinline__ void act_all(const cuda_view &v, const struct sadmm_settings &settings, int32_t first,
+                                               struct acting_joint *acting)
+{
+    const int32_t t = (int32_t)threadIdx.x, of_side = first + t / 2, of_joint = first + t;
+    if (t < 2 * ROWS_JOINTS && is_enabled(v, of_side)) {
+        const struct sadmm_resident_joint *joint = &v.joints.joints[of_side];
+        const struct joint_body body = t % 2 ? body_of(v, joint->body[1]) : body_a_of(v, joint);
+        acting[t / 2].side[t % 2] = joint_side_of(body, &settings);
+    }
+    __syncthreads();
+    if (t < ROWS_JOINTS && is_enabled(v, of_joint)) {
+        const struct sadmm_resident_joint *joint = &v.joints.joints[of_joint];
+        joint_act_between(&joint->def, joint->frame, joint->coupling >= 0, &settings, &acting[t]);
+    }
+    __syncthreads();
+}
+
 /* TABLES: there are springs with tables. By itself: they take registers. */
 template <bool TABLES>
-static __global__ void __launch_bounds__(ROWS_THREADS)
+static __global__ void __launch_bounds__(ROWS_JOINTS * LANES)
     joint_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
+    CUDA_DYNAMIC_SHARED(dynamic);
+    struct acting_joint *const acting_of = (struct acting_joint *)dynamic;
     pdl_wait_if(all_pdl(v.model.bodies));
-    const int32_t t = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x), j = t / LANES;
-    const int lane = t % LANES;
+    const int32_t first_joint = (int32_t)blockIdx.x * ROWS_JOINTS, j = first_joint + (int32_t)threadIdx.x / LANES;
+    const int lane = (int)threadIdx.x % LANES;
     if (v.model.live->abort_code) return;
-    const bool live = j < v.joints.count;
+    const bool live = j < v.joints.count, enabled = is_enabled(v, j);
     const struct sadmm_resident_joint *joint = &v.joints.joints[live ? j : 0];
     const sadmm_joint_def *def = &joint->def;
-    const bool enabled = live && def->enabled && !v.joints.begin[j].broken;
     const bool coordinate = enabled && lane < JOINT_COORDINATES && joint_has_coordinate(def, lane);
     const struct sadmm_settings settings = *v.model.settings;
-    struct acting_joint acting;
+    const struct acting_joint &acting = acting_of[threadIdx.x / LANES];
     struct joint_moving moving;
     struct joint_laws laws;
     laws.count = 0;
-    if (enabled) {
-        const struct joint_body bodies[2] = {body_a_of(v, joint), body_of(v, joint->body[1])};
-        acting = joint_act(def, joint->frame, bodies, &settings);
-    }
+    act_all(v, settings, first_joint, acting_of);
     if (coordinate) {
         moving = joint_moving_of(def, &v.joints.before[j], &acting, lane, &settings);
         struct joint_table table = {};
@@ -330,9 +353,9 @@ sadmm_status CUDA(launch_joint_move)(struct sadmm_context *c, struct sadmm_error
 sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    const int64_t threads = (int64_t)c->view.joints.count * LANES;
-    TRY(CUDA(launch_of)(c, c->step->tables ? joint_rows_kernel<true> : joint_rows_kernel<false>, "rows of joints",
-                        (threads + ROWS_THREADS - 1) / ROWS_THREADS, ROWS_THREADS, &args, error));
+    const int64_t blocks = ((int64_t)c->view.joints.count + ROWS_JOINTS - 1) / ROWS_JOINTS;
+    TRY(CUDA(launch_shared)(c, c->step->tables ? joint_rows_kernel<true> : joint_rows_kernel<false>, "rows of joints",
+                            blocks, ROWS_JOINTS * LANES, ROWS_JOINTS * sizeof(struct acting_joint), &args, error));
     return CUDA(launch_gear_rows)(c, error);
 }
 

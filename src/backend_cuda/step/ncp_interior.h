@@ -47,7 +47,7 @@ static __device__ bool take_interior(const ncp_island &s, ncp_memory *memory, nc
 }
 
 /* Tangents without friction are left out, and rows whose bounds are one. */
-static __device__ void list_cones(const ncp_island &s, ncp_interior *p, ncp_shared *shared)
+static __device__ __noinline__ void list_cones(const ncp_island &s, ncp_interior *p, ncp_shared *shared)
 {
     each(s.laws, [&](int32_t i) {
         const ncp_law &law = s.law[i];
@@ -86,11 +86,11 @@ static __device__ void list_cones(const ncp_island &s, ncp_interior *p, ncp_shar
     __syncthreads();
 }
 
-static __device__ void find_velocities(const ncp_island &s, const ncp_interior &p)
+static __device__ __noinline__ void find_velocities(const ncp_island &s, const ncp_interior &p)
 {
     each(s.numbers, [&](int32_t r) {
         double sum = p.free[r];
-        for (int32_t c = 0; c < s.numbers; ++c) sum += s.G[r * s.numbers + c] * s.lambda[c];
+        for (int32_t c = 0; c < s.numbers; ++c) sum += s.G[r * s.stride + c] * s.lambda[c];
         s.u[r] = sum;
     });
     __syncthreads();
@@ -116,7 +116,7 @@ static __device__ void begin_inside(const ncp_island &s, const ncp_interior &p, 
 }
 
 /* y, what it is off by from the duals, and the complementarity. */
-static __device__ void measure_interior(const ncp_island &s, ncp_interior *p, ncp_shared *shared)
+static __device__ __noinline__ void measure_interior(const ncp_island &s, ncp_interior *p, ncp_shared *shared)
 {
     each(p->count, [&](int32_t i) { s.lambda[p->number[i]] = p->scale[i] * p->x[i]; });
     __syncthreads();
@@ -146,59 +146,58 @@ static __device__ void measure_interior(const ncp_island &s, ncp_interior *p, nc
 }
 
 /* M^-1 in place, by Gauss and Jordan: entry (k, row[c]) of it is at (row[k], c). False: singular. */
-static __device__ bool invert_matrix(const ncp_island &s, const ncp_interior &p, ncp_shared *shared)
+static __device__ __noinline__ bool invert_matrix(const ncp_island &s, const ncp_interior &p, ncp_shared *shared)
 {
-    const int32_t n = p.count;
+    const int32_t n = p.count, stride = stride_of(n);
     each(n, [&](int32_t i) { s.pivot[i] = -1; });
     __syncthreads();
 #pragma unroll 1
     for (int32_t k = 0; k < n; ++k) {
-        choose_pivot(s, n, n, k, shared);
+        choose_pivot(s, n, stride, k, shared);
         __syncthreads();
         const int32_t row = shared->pivot;
         if (row < 0) return false;
-        const double inverse = 1 / s.M[row * n + k];
+        const double inverse = 1 / s.M[row * stride + k];
         if (threadIdx.x == 0) p.row[k] = row;
-        each(n * n, [&](int32_t t) {
-            const int32_t i = t / n, c = t % n;
-            if (i != row && c != k) s.M[t] -= s.M[i * n + k] * inverse * s.M[row * n + c];
+        each_entry(n, n, [&](int32_t i, int32_t c) {
+            if (i != row && c != k)
+                s.M[i * stride + c] -= s.M[i * stride + k] * inverse * s.M[row * stride + c];
         });
         __syncthreads();
         each(n, [&](int32_t i) {
-            if (i != row) s.M[i * n + k] *= -inverse;
-            if (i != k) s.M[row * n + i] *= inverse;
+            if (i != row) s.M[i * stride + k] *= -inverse;
+            if (i != k) s.M[row * stride + i] *= inverse;
         });
-        if (threadIdx.x == 0) s.M[row * n + k] = inverse;
+        if (threadIdx.x == 0) s.M[row * stride + k] = inverse;
         __syncthreads();
     }
     return true;
 }
 
 /* The inverse of G + the slip speeds' derivative + W^-2. */
-static __device__ bool make_inverse(const ncp_island &s, const ncp_interior &p, ncp_shared *shared)
+static __device__ __noinline__ bool make_inverse(const ncp_island &s, const ncp_interior &p, ncp_shared *shared)
 {
-    const int32_t n = p.count;
+    const int32_t n = p.count, stride = stride_of(n);
     bool inside = true;
-    each(n * n, [&](int32_t t) {
-        const int32_t r = t / n, c = t % n;
-        s.M[t] = p.scale[r] * p.scale[c] * s.G[p.number[r] * s.numbers + p.number[c]];
+    each_entry(n, n, [&](int32_t r, int32_t c) {
+        s.M[r * stride + c] = p.scale[r] * p.scale[c] * s.G[p.number[r] * s.stride + p.number[c]];
     });
     each(s.laws, [&](int32_t i) {
         ncp_cone *c = &p.cone[i];
         if (c->count == 3 && !cone_find_scaling(p.x + c->at, c->dual, &c->by, c->scaled)) inside = false;
     });
     if (any_of(!inside, shared)) return false;
-    each(s.laws * n, [&](int32_t t) { /* the normals' rows */
-        const ncp_cone *c = &p.cone[t / n];
+    each_entry(s.laws, n, [&](int32_t i, int32_t t) { /* the normals' rows */
+        const ncp_cone *c = &p.cone[i];
         if (c->count != 3) return;
-        double *M = s.M + c->at * n + t % n;
+        double *M = s.M + c->at * stride + t;
         const double *y = p.y + c->at, speed = hypot(y[1], y[2]);
-        if (speed > 0) M[0] += (y[1] * M[n] + y[2] * M[2 * n]) / speed;
+        if (speed > 0) M[0] += (y[1] * M[stride] + y[2] * M[2 * stride]) / speed;
     });
     __syncthreads();
     each(s.laws, [&](int32_t i) {
         const ncp_cone *c = &p.cone[i];
-        double *M = s.M + c->at * n + c->at;
+        double *M = s.M + c->at * stride + c->at;
         const double x = p.x[c->at];
         if (c->count == 1) {
             if (c->lo > -INFINITY) M[0] += c->dual[0] / (x - c->lo);
@@ -207,7 +206,8 @@ static __device__ bool make_inverse(const ncp_island &s, const ncp_interior &p, 
         for (int r = 0; c->count == 3 && r < 3; ++r)
             for (int k = 0; k < 3; ++k) {
                 const double sign = (r > 0) == (k > 0) ? 1 : -1, J = r != k ? 0 : r == 0 ? 1 : -1;
-                M[r * n + k] += (2 * sign * c->by.middle[r] * c->by.middle[k] - J) / (c->by.size * c->by.size);
+                M[r * stride + k] +=
+                    (2 * sign * c->by.middle[r] * c->by.middle[k] - J) / (c->by.size * c->by.size);
             }
     });
     __syncthreads();
@@ -216,10 +216,10 @@ static __device__ bool make_inverse(const ncp_island &s, const ncp_interior &p, 
 
 /* dx and the duals' steps towards products `aim`. Returns how much of them leads to the boundary; 0: they are no
  * numbers. */
-static __device__ double find_step(const ncp_island &s, const ncp_interior &p, double aim, bool second,
+static __device__ __noinline__ double find_step(const ncp_island &s, const ncp_interior &p, double aim, bool second,
                                    ncp_shared *shared)
 {
-    const int32_t n = p.count;
+    const int32_t n = p.count, stride = stride_of(n);
     each(s.laws, [&](int32_t i) {
         const ncp_cone *c = &p.cone[i];
         const double *off = p.off + c->at, x = p.x[c->at];
@@ -238,7 +238,7 @@ static __device__ double find_step(const ncp_island &s, const ncp_interior &p, d
     bool finite = true;
     each(n, [&](int32_t k) {
         double sum = 0;
-        for (int32_t c = 0; c < n; ++c) sum += s.M[p.row[k] * n + c] * p.right[p.row[c]];
+        for (int32_t c = 0; c < n; ++c) sum += s.M[p.row[k] * stride + c] * p.right[p.row[c]];
         p.dx[k] = sum;
         if (!(fabs(sum) < INFINITY)) finite = false;
     });
@@ -270,7 +270,7 @@ static __device__ double find_step(const ncp_island &s, const ncp_interior &p, d
 }
 
 /* What the whole step would leave of products. */
-static __device__ void find_second_order(const ncp_island &s, const ncp_interior &p)
+static __device__ __noinline__ void find_second_order(const ncp_island &s, const ncp_interior &p)
 {
     each(s.laws, [&](int32_t i) {
         ncp_cone *c = &p.cone[i];
@@ -286,7 +286,7 @@ static __device__ void find_second_order(const ncp_island &s, const ncp_interior
 }
 
 /* Returns the share of the step that was gone; 0: there is none. */
-static __device__ double step_inside(const ncp_island &s, const ncp_interior &p, ncp_shared *shared)
+static __device__ __noinline__ double step_inside(const ncp_island &s, const ncp_interior &p, ncp_shared *shared)
 {
     if (!make_inverse(s, p, shared)) return 0;
     const double left = 1 - fmin(1.0, find_step(s, p, 0, false, shared));
@@ -304,13 +304,14 @@ static __device__ double step_inside(const ncp_island &s, const ncp_interior &p,
 }
 
 /* From u alone. lambda and u are those that it ends with; returns their natural map. */
-static __device__ double go_inside(const ncp_island &s, ncp_memory memory, ncp_shared *shared)
+static __device__ __noinline__ double go_inside(ncp_island *island, ncp_memory memory, ncp_shared *shared)
 {
+    const ncp_island &s = *island;
     ncp_interior p;
     if (!take_interior(s, &memory, &p)) return INFINITY;
     each(s.numbers, [&](int32_t r) {
         double sum = s.u[r];
-        for (int32_t c = 0; c < s.numbers; ++c) sum -= s.G[r * s.numbers + c] * s.lambda[c];
+        for (int32_t c = 0; c < s.numbers; ++c) sum -= s.G[r * s.stride + c] * s.lambda[c];
         p.free[r] = sum;
     });
     __syncthreads();
@@ -323,10 +324,11 @@ static __device__ double go_inside(const ncp_island &s, ncp_memory memory, ncp_s
 #pragma unroll 1
     for (int step = 0, brief = 0;; ++step) {
         measure_interior(s, &p, shared);
-        const double map = natural_map(s, shared);
-        if (!(map > NCP_AIM && map < INFINITY) || step == affordable_steps(NCP_MOST_STEPS, p.count) ||
+        const double map = look_at_laws(s, shared);
+        if (!(map > NCP_AIM && map < INFINITY) || step == NCP_MOST_STEPS ||
             brief == NCP_MOST_SHORT || p.complementarity < NCP_LEAST_PRODUCT * size * size)
             return map;
+        if (!affords(island, 2 * elimination_of(p.count))) return map;
         const double way = step_inside(s, p, shared);
         if (way == 0) return map;
         brief = way < NCP_SHORT / 10 ? brief + 1 : 0;

@@ -6,7 +6,8 @@
  *     (ncp_response.h), and laws of theirs; semismooth Newton steps find them (ncp_newton.h)
  *
  * Rows with bounds have numbers once their law is not met without. Every sum is made by one thread, in one order:
- * results do not depend on how many threads a block has. */
+ * results do not depend on how many threads a block has. Few islands get large blocks; where there are thousands, a
+ * warp each does, and many of them run side by side. */
 #ifndef SADMM_CUDA_STEP_NCP_ISLAND_H
 #define SADMM_CUDA_STEP_NCP_ISLAND_H
 
@@ -21,23 +22,32 @@ enum {
     NCP_NUMBERS = 256   /* numbers of the dense problem */
 };
 
+/* A node while velocities are found: loads on the way to the root, what is handed on, and in between. */
+struct ncp_passing {
+    double load[6], up[6], q[6], p[6], t[6];
+};
+
 /* What its joint leaves of a body's motion past its parent's. In the island's `pool` are directions S, U = A S, H and
- * what it is the inverse of. */
+ * what it is the inverse of, and what rows with compliance add to t. */
 struct ncp_node {
     int32_t body, parent;      /* raw; node, -1: none */
     int32_t child, sibling;    /* nodes, -1: none */
     int32_t level;             /* joints to the root */
     int32_t bound;             /* its joint has rows */
-    int32_t free, pool;        /* directions; where they are in the pool: 6 free, 6 free, free^2, free^2 */
-    int32_t first_row, rows;
+    int32_t free, pool;        /* directions; where they are in the pool: 6 free, 6 free, free^2, free^2, free */
+    int32_t first_row, rows;   /* but for locks */
+    int32_t loads;             /* of its rows have multipliers that act as loads */
     int32_t first_joint, joints; /* of v.ncp.joints */
-    int32_t locks[2], lock[6]; /* translations, then rotations: rows */
+    int32_t locks[2], lock[6]; /* translations, then rotations; 2 slot + side of v.raw.rows */
+    int8_t place[6];           /* where they are in M and `held`, at first */
     double offset[3];          /* from the parent's centre of mass */
     struct cuda_articulation_body own;
-    double M[36];              /* A, then what it hands on to its parent */
     double met[6], held[6];    /* s, which meets the locks; A s */
-    double load[6], up[6];     /* on the way to the root; what is handed on */
-    double q[6], velocity[6];
+    double velocity[6];
+    union {
+        double M[36];          /* locks' Jacobians; then, while it is factorized, what it hands on to its parent */
+        struct ncp_passing now; /* then */
+    };
 };
 
 struct ncp_contact {
@@ -48,7 +58,7 @@ struct ncp_contact {
     double given[3];    /* velocity of what is not dynamic, and e */
 };
 
-enum ncp_role { NCP_LOCK, NCP_SOFT, NCP_BOUNDED, NCP_FIXED };
+enum ncp_role { NCP_LOCK, NCP_SOFT, NCP_BOUNDED, NCP_FIXED }; /* locks are no ncp_row */
 
 struct ncp_row {
     int32_t slot, side; /* in v.raw.rows; of the node's body */
@@ -92,18 +102,34 @@ template <class T> static __device__ __forceinline__ T *take(ncp_memory *memory,
     return (T *)out;
 }
 
+/* What is large and used little: a block's own memory is for the rest, if that would take most of it. */
+template <class T> static __device__ __forceinline__ T *take_large(ncp_memory *memory, size_t count)
+{
+    ncp_memory far = *memory;
+    if (2 * count * sizeof(T) <= (size_t)(memory->end - memory->at)) return take<T>(memory, count);
+    far.at = far.end;
+    T *out = take<T>(&far, count);
+    memory->far_at = far.far_at;
+    memory->full |= far.full;
+    return out;
+}
+
 struct ncp_island {
     int32_t label, first_slot, bodies, contacts, rows, first_gear, levels; /* rows of gears come last */
     ncp_node *node;
+    int32_t *of, *at;             /* of nodes, to be added up; the sums */
+    int32_t *order, *level_first; /* nodes by level; where levels begin among them, and where the last ends */
     ncp_contact *contact;
     ncp_row *row;
+    int32_t bounded, *bounded_row; /* rows that may have numbers */
     double *pool;
     /* of contacts x 3: impulses along their frames */
     double *impulse, *kept; /* kept: with multipliers of rows, a solution that is held against another one */
+    double budget; /* multiplications of a thread that are left */
     /* the dense problem */
-    int32_t laws, numbers;
+    int32_t laws, numbers, stride; /* stride: of G's rows; odd, as M's: columns are read without conflicts */
     ncp_law *law;
-    double *lambda, *u, *free, *step, *moved, *best_lambda, *best_u, *D;
+    double *lambda, *u, *step, *moved, *best_lambda, *best_u, *D;
     int32_t *list, *pivot;
     double *G, *M;
 };
@@ -112,7 +138,6 @@ struct ncp_island {
 struct ncp_shared {
     unsigned long long most;
     int32_t flag, count, pivot;
-    int32_t of[NCP_BODIES], at[NCP_BODIES]; /* by body of the island */
     int32_t parts, part[NCP_PARTS];         /* of the island */
 };
 
@@ -123,37 +148,57 @@ template <class F> static __device__ __forceinline__ void each(int32_t count, co
     for (int32_t k = (int32_t)threadIdx.x; k < count; k += (int32_t)blockDim.x) f(k);
 }
 
-/* Eight lanes a node of a level; f(node, lane), lanes below 6. */
-template <class F>
-static __device__ __forceinline__ void each_lane(const ncp_island &s, int32_t level, const F &f)
+/* Eight lanes for each of `count`: f(k, lane), k = -1 for those beyond. Every lane of a warp comes there. */
+template <class F> static __device__ __forceinline__ void each_eight(int32_t count, const F &f)
 {
-    each(s.bodies * LANES, [&](int32_t t) {
-        ncp_node *node = &s.node[t / LANES];
-        if (node->level == level && t % LANES < 6) f(node, t % LANES);
-    });
-    __syncthreads();
+#pragma unroll 1
+    for (int32_t first = (int32_t)threadIdx.x / WARP * (WARP / LANES); first < count;
+         first += (int32_t)blockDim.x / LANES) {
+        const int32_t k = first + (int32_t)threadIdx.x % WARP / LANES;
+        f(k < count ? k : -1, (int)threadIdx.x % LANES);
+    }
 }
-template <class F>
-static __device__ __forceinline__ void each_node(const ncp_island &s, int32_t level, const F &f)
+
+/* Nodes of a level: f(node, lane, live), six lanes of each live. Every lane of a warp comes there. */
+template <class F> static __device__ __forceinline__ void each_node(const ncp_island &s, int32_t level, const F &f)
 {
-    each(s.bodies, [&](int32_t n) {
-        if (s.node[n].level == level) f(&s.node[n]);
+    const int32_t first = s.level_first[level];
+    each_eight(s.level_first[level + 1] - first, [&](int32_t k, int lane) {
+        f(&s.node[k < 0 ? 0 : s.order[first + k]], lane, k >= 0 && lane < 6);
     });
     __syncthreads();
 }
 
+/* f(i, k) for i < rows and k < columns, by a thread each: columns side by side. */
+template <class F> static __device__ __forceinline__ void each_entry(int32_t rows, int32_t columns, const F &f)
+{
+    int32_t width = 1, bits = 0;
+    while (width < columns && width < (int32_t)blockDim.x) width *= 2, ++bits;
+    const int32_t t = (int32_t)threadIdx.x;
+#pragma unroll 1
+    for (int32_t k = t & (width - 1); k < columns; k += width)
+#pragma unroll 1
+        for (int32_t i = t >> bits; i < rows; i += (int32_t)blockDim.x >> bits) f(i, k);
+}
+
 /* *at = of[0] + ... before each of `count`; returns the sum. */
-static __device__ __forceinline__ int32_t add_up(int32_t count, const int32_t *of, int32_t *at, int32_t *sum)
+static __device__ __noinline__ int32_t add_up(int32_t count, const int32_t *of, int32_t *at, int32_t *sum)
 {
     __syncthreads();
-    if (threadIdx.x == 0) {
+    if (threadIdx.x < WARP) {
         int32_t total = 0;
-        for (int32_t k = 0; k < count; ++k) {
-            const int32_t own = of[k];
-            at[k] = total;
-            total += own;
+        for (int32_t first = 0; first < count; first += WARP) {
+            const int32_t k = first + (int32_t)threadIdx.x, own = k < count ? of[k] : 0;
+            int32_t up = own;
+#pragma unroll
+            for (int32_t o = 1; o < WARP; o *= 2) {
+                const int32_t before = __shfl_up_sync((unsigned)ALL_LANES, up, (unsigned)o);
+                if ((int32_t)threadIdx.x >= o) up += before;
+            }
+            if (k < count) at[k] = total + up - own;
+            total += __shfl_sync((unsigned)ALL_LANES, up, WARP - 1, WARP);
         }
-        *sum = total;
+        if (threadIdx.x == 0) *sum = total;
     }
     __syncthreads();
     const int32_t out = *sum;
@@ -161,22 +206,55 @@ static __device__ __forceinline__ int32_t add_up(int32_t count, const int32_t *o
     return out;
 }
 
-/* The largest of all threads' numbers, none of which is negative; what is not a number is the most. */
-static __device__ __forceinline__ double most_of(double own, ncp_shared *shared)
+/* Those k of `count` that f(k) says, ascending: to *list, by the first warp; returns how many. */
+template <class F>
+static __device__ __forceinline__ int32_t make_list(int32_t count, int32_t *list, int32_t *sum, const F &f)
 {
+    if (threadIdx.x < WARP) {
+        int32_t total = 0;
+        for (int32_t first = 0; first < count; first += WARP) {
+            const int32_t k = first + (int32_t)threadIdx.x;
+            const bool is = k < count && f(k);
+            const unsigned lanes = __ballot_sync((unsigned)ALL_LANES, is);
+            if (is) list[total + __popc(lanes & ((1u << threadIdx.x) - 1))] = k;
+            total += __popc(lanes);
+        }
+        if (threadIdx.x == 0) *sum = total;
+    }
     __syncthreads();
-    if (threadIdx.x == 0) shared->most = 0;
+    const int32_t out = *sum;
     __syncthreads();
-    if (!(own <= 0)) atomicMax(&shared->most, (unsigned long long)__double_as_longlong(fabs(own)));
-    __syncthreads();
-    return __longlong_as_double((long long)shared->most);
+    return out;
 }
-static __device__ __forceinline__ bool any_of(bool own, ncp_shared *shared)
+
+/* The largest of all threads' numbers, none of which is negative; what is not a number is the most. Every thread sees
+ * then what others have written. */
+static __device__ __noinline__ double most_of(double own, ncp_shared *shared)
+{
+    unsigned long long bits = own <= 0 ? 0 : (unsigned long long)__double_as_longlong(fabs(own));
+    __syncthreads();
+#pragma unroll
+    for (int o = WARP / 2; o > 0; o /= 2) {
+        const unsigned long long other = __shfl_xor_sync((unsigned)ALL_LANES, bits, o);
+        bits = other > bits ? other : bits;
+    }
+    if (blockDim.x > WARP) {
+        if (threadIdx.x == 0) shared->most = 0;
+        __syncthreads();
+        if (threadIdx.x % WARP == 0) atomicMax(&shared->most, bits);
+        __syncthreads();
+        bits = shared->most;
+    }
+    return __longlong_as_double((long long)bits);
+}
+static __device__ __noinline__ bool any_of(bool own, ncp_shared *shared)
 {
     __syncthreads();
+    const bool any = __ballot_sync((unsigned)ALL_LANES, own) != 0;
+    if (blockDim.x <= WARP) return any;
     if (threadIdx.x == 0) shared->flag = 0;
     __syncthreads();
-    if (own) shared->flag = 1;
+    if (any && threadIdx.x % WARP == 0) shared->flag = 1;
     __syncthreads();
     return shared->flag != 0;
 }
@@ -186,6 +264,7 @@ static __device__ __forceinline__ bool any_of(bool own, ncp_shared *shared)
 static __device__ __forceinline__ double along(int n, const double *a, const double *b)
 {
     double sum = 0;
+#pragma unroll 1
     for (int k = 0; k < n; ++k) sum += a[k] * b[k];
     return sum;
 }
@@ -217,6 +296,11 @@ static __device__ __forceinline__ double *inverse_of(const ncp_island &s, const 
 static __device__ __forceinline__ double *stiffness_of(const ncp_island &s, const ncp_node &node)
 {
     return s.pool + node.pool + node.free * (12 + node.free);
+}
+
+static __device__ __forceinline__ double *soft_of(const ncp_island &s, const ncp_node &node)
+{
+    return s.pool + node.pool + node.free * (12 + 2 * node.free);
 }
 
 /* Does it hand anything on? */

@@ -7,7 +7,8 @@
 #include "ncp_tree.h"
 
 /* Nodes of a part's trees. right: becomes false where they are not all of this island. */
-static __device__ void make_tree(const cuda_view &v, const ncp_island &s, int32_t part, int32_t base, bool *right)
+static __device__ __noinline__ void make_tree(const cuda_view &v, const ncp_island &s, int32_t part, int32_t base,
+                                              bool *right)
 {
     const struct cuda_ncp_part plan = v.ncp.parts[part];
     each(plan.nodes, [&](int32_t n) {
@@ -22,29 +23,57 @@ static __device__ void make_tree(const cuda_view &v, const ncp_island &s, int32_
     });
 }
 
+/* Nodes by level. False: there is no room. */
+static __device__ __noinline__ bool order_nodes(ncp_island *s, ncp_memory *memory)
+{
+    s->order = take<int32_t>(memory, (size_t)s->bodies);
+    s->level_first = take<int32_t>(memory, (size_t)s->levels + 1);
+    if (memory->full) return false;
+    each(s->bodies, [&](int32_t n) {
+        const int32_t level = s->node[n].level;
+        int32_t before = 0;
+        for (int32_t k = 0; k < s->bodies; ++k) {
+            const int32_t other = s->node[k].level;
+            before += other < level || (other == level && k < n);
+        }
+        s->order[before] = n;
+    });
+    each(s->levels + 1, [&](int32_t level) {
+        int32_t before = 0;
+        for (int32_t k = 0; k < s->bodies; ++k) before += s->node[k].level < level;
+        s->level_first[level] = before;
+    });
+    __syncthreads();
+    return true;
+}
+
 /* Nodes of its bodies, but for what joints say. False: a part is no tree. */
-static __device__ bool make_nodes(const cuda_view &v, ncp_island *s, ncp_memory *memory, ncp_shared *shared)
+static __device__ __noinline__ bool make_nodes(const cuda_view &v, ncp_island *s, ncp_memory *memory,
+                                               ncp_shared *shared)
 {
     bool right = true;
+    s->of = take<int32_t>(memory, (size_t)s->bodies);
+    s->at = take<int32_t>(memory, (size_t)s->bodies);
+    if (memory->full) return false;
     if (threadIdx.x == 0) shared->parts = 0;
     __syncthreads();
     each(s->bodies, [&](int32_t t) {
         const int32_t body = v.graph.body_of[s->first_slot + t], part = v.ncp.part_of[body];
         const bool is_first = part < 0 || v.joints.parts[part].label - 1 == body;
-        shared->of[t] = !is_first ? 0 : part < 0 ? 1 : v.ncp.parts[part].nodes;
+        s->of[t] = !is_first ? 0 : part < 0 ? 1 : v.ncp.parts[part].nodes;
         if (part >= 0 && v.ncp.parts[part].nodes == 0) right = false;
         if (part >= 0 && is_first) atomicAdd(&shared->parts, 1);
     });
     if (any_of(!right, shared) || shared->parts > NCP_PARTS) return false;
-    if (add_up(s->bodies, shared->of, shared->at, &shared->count) != s->bodies) return false;
+    if (add_up(s->bodies, s->of, s->at, &shared->count) != s->bodies) return false;
     s->node = take<ncp_node>(memory, (size_t)s->bodies);
     if (memory->full) return false;
     s->levels = 1;
     int32_t parts = 0;
 #pragma unroll 1
     for (int32_t t = 0; t < s->bodies; ++t) {
-        if (shared->of[t] == 0) continue;
-        const int32_t body = v.graph.body_of[s->first_slot + t], part = v.ncp.part_of[body], base = shared->at[t];
+        if (s->of[t] == 0) continue;
+        const int32_t body = v.graph.body_of[s->first_slot + t], part = v.ncp.part_of[body], base = s->at[t];
         if (part >= 0) {
             const int32_t levels = v.ncp.parts[part].levels;
             s->levels = levels > s->levels ? levels : s->levels;
@@ -61,7 +90,6 @@ static __device__ bool make_nodes(const cuda_view &v, ncp_island *s, ncp_memory 
     __syncthreads();
     each(s->bodies, [&](int32_t n) {
         ncp_node *node = &s->node[n];
-        int32_t rows = 0;
         v.ncp.number[node->body] = n;
         node->own = v.joints.bodies[node->body];
         node->bound = 0;
@@ -69,34 +97,38 @@ static __device__ bool make_nodes(const cuda_view &v, ncp_island *s, ncp_memory 
             const int32_t code = v.ncp.joints[j];
             const struct sadmm_row_constraint *constraint = &v.raw.constraints[code / 2];
             if (constraint->count == 0) continue;
-            rows += constraint->count;
             if (!constraint->rigid) right = false;
             node->bound = 1;
             for (int k = 0; k < 3; ++k) node->offset[k] = code % 2 ? constraint->offset[k] : -constraint->offset[k];
         }
-        node->rows = rows;
-        shared->of[n] = rows;
     });
-    return !any_of(!right, shared);
+    if (any_of(!right, shared)) return false;
+    return order_nodes(s, memory);
+}
+
+static __device__ __forceinline__ int32_t role_of(const struct raw_row &law, bool of_joint)
+{
+    const bool bounded = law.lo > -INFINITY || law.hi < INFINITY;
+    return of_joint && sadmm_law_is_coupled(law.compliance, law.lo, law.hi) ? NCP_LOCK
+           : law.gain == 0 || !(law.hi > law.lo)                            ? NCP_FIXED
+           : of_joint && !bounded && law.compliance > 0                     ? NCP_SOFT
+                                                                            : NCP_BOUNDED;
 }
 
 /* What a row says, but for what follows from directions. */
-static __device__ void load_row(const cuda_view &v, const ncp_island &s, ncp_row *row, bool after)
+static __device__ __noinline__ void load_row(const cuda_view &v, const ncp_island &s, ncp_row *row, bool after)
 {
-    const struct raw_row law = v.raw.rows[row->slot];
-    const bool fixed = law.gain == 0 || !(law.hi > law.lo), bounded = law.lo > -INFINITY || law.hi < INFINITY;
+    const struct raw_row &law = v.raw.rows[row->slot];
     const double start = after ? (double)v.rows.data[row->slot].lambda : v.model.warm_start ? law.lambda : 0;
     double response[2] = {0, 0};
-    for (int k = 0; k < 6; ++k) row->jacobian[k] = row->side ? law.jacobian[1][k] : law.jacobian[0][k];
+    for (int k = 0; k < 6; ++k) row->jacobian[k] = law.jacobian[row->side][k];
     row->gain = law.gain, row->bias = law.bias, row->compliance = law.compliance;
     row->lo = law.lo, row->hi = law.hi;
     row->number = -1;
-    row->role = row->node >= 0 && sadmm_law_is_coupled(law.compliance, law.lo, law.hi) ? NCP_LOCK
-                : fixed                                                                ? NCP_FIXED
-                : row->node >= 0 && !bounded && law.compliance > 0                     ? NCP_SOFT
-                                                                                       : NCP_BOUNDED;
-    row->lambda = articulation_clamp(fixed && law.compliance > 0 ? -law.bias / law.compliance : start, law.lo, law.hi);
-    if (row->role == NCP_LOCK || row->role == NCP_SOFT) return;
+    row->role = role_of(law, row->node >= 0);
+    row->lambda = articulation_clamp(row->role == NCP_FIXED && law.compliance > 0 ? -law.bias / law.compliance : start,
+                                     law.lo, law.hi);
+    if (row->role == NCP_SOFT) return;
     for (int side = 0; side < 2; ++side) {
         const int32_t n = side_of_gear(v, row->slot, side);
         if (n >= 0) response[side] = own_response(s.node[n].own, law.jacobian[side]);
@@ -105,8 +137,63 @@ static __device__ void load_row(const cuda_view &v, const ncp_island &s, ncp_row
     if (row->role == NCP_BOUNDED && !(row->response > 0)) row->role = NCP_FIXED;
 }
 
+/* Calls f(slot, side, role, which) for the rows of a node's joints, each by one of its eight lanes; which: counts those
+ * before it that are locks too, or are not, too. *locks, *others: how many there are. live: there is such a node. Every
+ * lane of the warp comes here. */
+template <class F>
+static __device__ __forceinline__ void each_joint_row(const cuda_view &v, const ncp_node &node, int lane, bool live,
+                                                      int32_t *locks, int32_t *others, const F &f)
+{
+    const int shift = (int)threadIdx.x % WARP / LANES * LANES;
+    const unsigned lanes = (1u << LANES) - 1, before = (1u << lane) - 1;
+    int32_t j = node.first_joint;
+    *locks = *others = 0;
+    while (__ballot_sync((unsigned)ALL_LANES, live && j < node.first_joint + node.joints) != 0) {
+        const bool more = live && j < node.first_joint + node.joints;
+        const int32_t code = v.ncp.joints[more ? j : 0], slot = code / 2 * SADMM_MAX_ROWS + lane;
+        const bool is = more && lane < v.raw.constraints[code / 2].count;
+        const int32_t role = is ? role_of(v.raw.rows[slot], true) : -1;
+        const unsigned lock = __ballot_sync((unsigned)ALL_LANES, role == NCP_LOCK) >> shift & lanes,
+                       other = __ballot_sync((unsigned)ALL_LANES, is && role != NCP_LOCK) >> shift & lanes;
+        const int32_t locks_before = *locks + __popc(lock & before), others_before = *others + __popc(other & before);
+        if (is) f(slot, code % 2, role, role == NCP_LOCK ? locks_before : others_before);
+        *locks += __popc(lock);
+        *others += __popc(other);
+        j += more;
+    }
+}
+
+/* Locks of a node's joints, to M and `held`; how many other rows there are. False: too many. */
+static __device__ __noinline__ bool load_locks(const cuda_view &v, ncp_node *node, int lane, bool live)
+{
+    int32_t locks, others;
+    each_joint_row(v, *node, lane, live, &locks, &others, [&](int32_t slot, int side, int32_t role, int32_t which) {
+        const struct raw_row &law = v.raw.rows[slot];
+        if (role != NCP_LOCK || which >= 6) return;
+        for (int k = 0; k < 6; ++k) node->M[6 * which + k] = law.jacobian[side][k];
+        node->held[which] = -law.bias / law.gain;
+        node->lock[which] = 2 * slot + side;
+    });
+    if (live && lane == 0) node->rows = others, node->locks[0] = locks;
+    return locks <= 6;
+}
+
+/* The other ones. */
+static __device__ __noinline__ void load_rows(const cuda_view &v, const ncp_island &s, int32_t n, int lane, bool live,
+                                              bool after)
+{
+    int32_t locks, others;
+    each_joint_row(v, s.node[n], lane, live, &locks, &others,
+                   [&](int32_t slot, int side, int32_t role, int32_t which) {
+                       if (role == NCP_LOCK) return;
+                       ncp_row *row = &s.row[s.node[n].first_row + which];
+                       row->slot = slot, row->side = side, row->node = n;
+                       load_row(v, s, row, after);
+                   });
+}
+
 /* Rows of the gears of the island's parts; returns how many. */
-static __device__ int32_t list_gears(const cuda_view &v, const ncp_island &s, const ncp_shared *shared, ncp_row *rows)
+static __device__ __noinline__ int32_t list_gears(const cuda_view &v, const ncp_shared *shared, ncp_row *rows)
 {
     int32_t count = 0;
     for (int32_t k = 0; k < shared->parts; ++k) {
@@ -121,63 +208,63 @@ static __device__ int32_t list_gears(const cuda_view &v, const ncp_island &s, co
             }
         }
     }
-    (void)s;
     return count;
 }
 
 /* Rows, and directions that locks leave. False: there is no room, or locks are not those of one joint. */
-static __device__ bool make_rows(const cuda_view &v, ncp_island *s, ncp_memory *memory, bool after,
-                                 ncp_shared *shared)
+static __device__ __noinline__ bool make_rows(const cuda_view &v, ncp_island *s, ncp_memory *memory, bool after,
+                                              ncp_shared *shared)
 {
     bool right = true;
-    s->first_gear = add_up(s->bodies, shared->of, shared->at, &shared->count);
-    s->rows = s->first_gear + list_gears(v, *s, shared, nullptr);
-    s->row = take<ncp_row>(memory, (size_t)s->rows);
-    if (memory->full) return false;
-    each(s->bodies, [&](int32_t n) {
-        ncp_node *node = &s->node[n];
-        int32_t at = node->first_row = shared->at[n];
-        for (int32_t j = node->first_joint; j < node->first_joint + node->joints; ++j) {
-            const int32_t code = v.ncp.joints[j], count = v.raw.constraints[code / 2].count;
-            for (int32_t k = 0; k < count; ++k, ++at) {
-                s->row[at].slot = code / 2 * SADMM_MAX_ROWS + k;
-                s->row[at].side = code % 2;
-                s->row[at].node = n;
-            }
-        }
-    });
-    (void)list_gears(v, *s, shared, s->row + s->first_gear);
-    __syncthreads();
-    each(s->rows, [&](int32_t r) { load_row(v, *s, &s->row[r], after); });
-    __syncthreads();
-    each(s->bodies, [&](int32_t n) {
-        ncp_node *node = &s->node[n];
-        if (!find_locks(*s, node)) right = false;
-        shared->of[n] = node->free * (12 + 2 * node->free + node->rows - node->locks[0] - node->locks[1]);
+    each_eight(s->bodies, [&](int32_t n, int lane) {
+        right = load_locks(v, &s->node[n < 0 ? 0 : n], lane, n >= 0) && right;
     });
     if (any_of(!right, shared)) return false;
-    s->pool = take<double>(memory, (size_t)add_up(s->bodies, shared->of, shared->at, &shared->count));
-    if (memory->full) return false;
     each(s->bodies, [&](int32_t n) {
         ncp_node *node = &s->node[n];
-        node->pool = shared->at[n];
+        right = sort_locks(node, node->locks[0]) && right;
+        s->of[n] = node->rows;
+    });
+    if (any_of(!right, shared)) return false;
+    s->first_gear = add_up(s->bodies, s->of, s->at, &shared->count);
+    each(s->bodies, [&](int32_t n) {
+        ncp_node *node = &s->node[n];
+        node->first_row = s->at[n];
+        s->of[n] = node->free * (13 + 2 * node->free + node->rows);
+    });
+    const int32_t pool = add_up(s->bodies, s->of, s->at, &shared->count);
+    s->rows = s->first_gear + list_gears(v, shared, nullptr);
+    s->row = take_large<ncp_row>(memory, (size_t)s->rows);
+    s->bounded_row = take_large<int32_t>(memory, (size_t)s->rows);
+    s->pool = take<double>(memory, (size_t)pool);
+    if (memory->full) return false;
+    (void)list_gears(v, shared, s->row + s->first_gear);
+    each_eight(s->bodies, [&](int32_t n, int lane) { load_rows(v, *s, n < 0 ? 0 : n, lane, n >= 0, after); });
+    __syncthreads();
+    each(s->rows - s->first_gear, [&](int32_t r) { load_row(v, *s, &s->row[s->first_gear + r], after); });
+    each(s->bodies, [&](int32_t n) {
+        ncp_node *node = &s->node[n];
+        int32_t at = s->at[n];
+        node->pool = at;
+        node->loads = 0;
         find_directions(*s, *node);
-        meet_locks(*s, node);
-        int32_t at = node->pool + node->free * (12 + 2 * node->free);
-        for (int32_t r = node->first_row; r < node->first_row + node->rows; ++r) {
-            if (s->row[r].role == NCP_LOCK) continue;
+        meet_locks(node);
+        at += node->free * (13 + 2 * node->free);
+        for (int32_t r = node->first_row; r < node->first_row + node->rows; ++r, at += node->free) {
             s->row[r].along = at;
-            at += node->free;
+            node->loads += s->row[r].role != NCP_SOFT;
         }
     });
     __syncthreads();
     each(s->first_gear, [&](int32_t r) {
         const ncp_row *row = &s->row[r];
         const ncp_node &node = s->node[row->node];
-        for (int i = 0; row->role != NCP_LOCK && i < node.free; ++i)
+        for (int i = 0; i < node.free; ++i)
             s->pool[row->along + i] = six_product(row->jacobian, directions_of(*s, node) + 6 * i);
     });
     __syncthreads();
+    s->bounded = make_list(s->rows, s->bounded_row, &shared->count,
+                           [&](int32_t r) { return s->row[r].role == NCP_BOUNDED; });
     return true;
 }
 
@@ -187,8 +274,8 @@ static __device__ __forceinline__ bool speaks(const cuda_view &v, int32_t code)
     return code / 2 < v.contacts.pair_capacity && (code % 2 == 0 || v.raw.pairs[code / 2].body_a < 0);
 }
 
-static __device__ void make_contact(const cuda_view &v, const ncp_island &s, int32_t pair_at, int32_t k, ncp_contact *c,
-                                    ncp_law *law, double impulse[3], bool after)
+static __device__ __noinline__ void make_contact(const cuda_view &v, const ncp_island &s, int32_t pair_at, int32_t k,
+                                                 ncp_contact *c, ncp_law *law, double impulse[3], bool after)
 {
     const struct sadmm_contact_pair *pair = &v.raw.pairs[pair_at];
     const struct sadmm_contact_point *points = &v.raw.points[pair->first];
@@ -219,21 +306,19 @@ static __device__ void make_contact(const cuda_view &v, const ncp_island &s, int
 }
 
 /* Contacts, and laws of theirs. False: there are too many, or there is no room. */
-static __device__ bool make_contacts(const cuda_view &v, ncp_island *s, ncp_memory *memory, bool after,
-                                     ncp_shared *shared)
+static __device__ __noinline__ bool make_contacts(const cuda_view &v, ncp_island *s, ncp_memory *memory, bool after,
+                                                  ncp_shared *shared)
 {
     each(s->bodies, [&](int32_t t) {
         const int32_t slot = s->first_slot + t;
         int32_t points = 0;
         for (int32_t at = v.graph.offsets[slot]; at < v.graph.offsets[slot + 1]; ++at)
             if (speaks(v, v.graph.incident[at])) points += v.raw.pairs[v.graph.incident[at] / 2].count;
-        shared->of[t] = points;
+        s->of[t] = points;
     });
-    s->contacts = add_up(s->bodies, shared->of, shared->at, &shared->count);
+    s->contacts = add_up(s->bodies, s->of, s->at, &shared->count);
     if (s->contacts > NCP_CONTACTS || s->contacts > v.ncp.points) return false;
-    int32_t bounded = 0;
-    for (int32_t r = 0; r < s->rows; ++r) bounded += s->row[r].role == NCP_BOUNDED;
-    const size_t laws = (size_t)(s->contacts + bounded);
+    const size_t laws = (size_t)(s->contacts + s->bounded);
     s->contact = take<ncp_contact>(memory, (size_t)s->contacts);
     s->impulse = take<double>(memory, 3 * (size_t)s->contacts);
     s->kept = take<double>(memory, 3 * (size_t)s->contacts + (size_t)s->rows);
@@ -241,7 +326,7 @@ static __device__ bool make_contacts(const cuda_view &v, ncp_island *s, ncp_memo
     if (memory->full) return false;
     each(s->bodies, [&](int32_t t) {
         const int32_t slot = s->first_slot + t;
-        int32_t k = shared->at[t];
+        int32_t k = s->at[t];
         for (int32_t at = v.graph.offsets[slot]; at < v.graph.offsets[slot + 1]; ++at) {
             const int32_t code = v.graph.incident[at];
             if (!speaks(v, code)) continue;

@@ -15,18 +15,22 @@ struct ncp_damping {
     double share, least, most;
 };
 
-/* Multiplications that a search may take, and steps that it makes at least: a matrix of 192 numbers takes a step some
- * 0.3 ms, and islands that are left are iterated. */
-#define NCP_BUDGET 3e7
-enum { NCP_LEAST_STEPS = 4 };
-static __device__ __forceinline__ int affordable_steps(int most, int32_t numbers)
+/* Multiplications that a thread may do for an island in search of its solution: what takes more is iterated, which is
+ * cheaper then. Without so many steps a search is not begun. */
+#define NCP_BUDGET 1.5e5
+enum { NCP_LEAST_STEPS = 8 };
+static __device__ __forceinline__ double elimination_of(int32_t numbers)
 {
-    const double steps = NCP_BUDGET / ((double)numbers * numbers * numbers + 1);
-    return steps >= most ? most : steps > NCP_LEAST_STEPS ? (int)steps : (int)NCP_LEAST_STEPS;
+    return (double)numbers * numbers * numbers / 2 / blockDim.x;
+}
+static __device__ __forceinline__ bool affords(ncp_island *s, double multiplications)
+{
+    s->budget -= multiplications;
+    return s->budget >= 0;
 }
 
 /* Pi(y) of a law, and its derivative (core/solve/ncp_dense.c). */
-static __device__ void project_law(const ncp_law &law, const double y[3], double to[3], double D[9])
+static __device__ __noinline__ void project_law(const ncp_law &law, const double y[3], double to[3], double D[9])
 {
     for (int k = 0; k < 9; ++k) D[k] = 0;
     if (law.count == 1) {
@@ -52,27 +56,43 @@ static __device__ void project_law(const ncp_law &law, const double y[3], double
 }
 
 /* The natural map of a law, m/s: of y = lambda - u / response. */
-static __device__ double natural_map_of(const ncp_law &law, const double *lambda, const double *u)
+static __device__ __noinline__ double natural_map_of(const ncp_law &law, const double *lambda, const double *u)
 {
-    double y[3], to[3], D[9], sum = 0;
+    double y[3] = {0, 0, 0}, to[3], D[9], sum = 0;
     for (int k = 0; k < law.count; ++k) y[k] = lambda[k] - u[k] / law.response;
     project_law(law, y, to, D);
     for (int k = 0; k < law.count; ++k) sum += (lambda[k] - to[k]) * (lambda[k] - to[k]);
     return sqrt(sum) * law.response;
 }
 
-static __device__ double natural_map(const ncp_island &s, ncp_shared *shared)
+/* Where laws have their numbers: how far that is, to s.step; which are not fixed by them, to s.pivot; derivatives.
+ * Returns the natural map. */
+static __device__ __noinline__ double look_at_laws(const ncp_island &s, ncp_shared *shared)
 {
     double own = 0;
     each(s.laws, [&](int32_t i) {
-        const double map = natural_map_of(s.law[i], s.lambda + s.law[i].first, s.u + s.law[i].first);
+        const ncp_law &law = s.law[i];
+        double y[3] = {0, 0, 0}, to[3], D[9], sum = 0;
+        for (int k = 0; k < law.count; ++k)
+            y[k] = s.lambda[law.first + k] - s.u[law.first + k] / law.response;
+        project_law(law, y, to, D);
+#pragma unroll
+        for (int k = 0; k < 3; ++k) {
+            if (k >= law.count) continue;
+            const double step = to[k] - s.lambda[law.first + k];
+            sum += step * step;
+            s.step[law.first + k] = step;
+            s.pivot[law.first + k] = D[3 * k] != 0 || D[3 * k + 1] != 0 || D[3 * k + 2] != 0;
+        }
+        for (int k = 0; k < 9; ++k) s.D[9 * i + k] = D[k];
+        const double map = sqrt(sum) * law.response;
         if (!(map <= own)) own = map;
     });
     return most_of(own, shared);
 }
 
 /* What the natural map is a share of: the largest speed, m/s, or load times response. */
-static __device__ double size_of(const ncp_island &s, ncp_shared *shared)
+static __device__ __noinline__ double size_of(const ncp_island &s, ncp_shared *shared)
 {
     double own = 0;
     each(s.laws, [&](int32_t i) {
@@ -84,40 +104,18 @@ static __device__ double size_of(const ncp_island &s, ncp_shared *shared)
     return most_of(own, shared);
 }
 
-/* Numbers that their law fixes go where it has them; the others are listed, to be solved for. */
-static __device__ int32_t sort_numbers(const ncp_island &s, ncp_shared *shared)
+/* Numbers that their law fixes go where it has them (look_at_laws); the others are listed, to be solved for. */
+static __device__ __noinline__ int32_t sort_numbers(const ncp_island &s, ncp_shared *shared)
 {
-    each(s.laws, [&](int32_t i) {
-        const ncp_law &law = s.law[i];
-        double y[3], to[3], *D = s.D + 9 * i;
-        for (int k = 0; k < law.count; ++k)
-            y[k] = s.lambda[law.first + k] - s.u[law.first + k] / law.response;
-        project_law(law, y, to, D);
-        for (int k = 0; k < law.count; ++k) {
-            s.step[law.first + k] = to[k] - s.lambda[law.first + k];
-            s.pivot[law.first + k] = D[3 * k] != 0 || D[3 * k + 1] != 0 || D[3 * k + 2] != 0;
-        }
-    });
-    __syncthreads();
-    if (threadIdx.x < WARP) {
-        int32_t count = 0;
-        for (int32_t first = 0; first < s.numbers; first += WARP) {
-            const int32_t n = first + (int32_t)threadIdx.x;
-            const bool is = n < s.numbers && s.pivot[n];
-            const unsigned lanes = __ballot_sync((unsigned)ALL_LANES, is);
-            if (is) s.list[count + __popc(lanes & ((1u << threadIdx.x) - 1))] = n;
-            count += __popc(lanes);
-        }
-        if (threadIdx.x == 0) shared->count = count;
-    }
+    const int32_t count = make_list(s.numbers, s.list, &shared->count, [&](int32_t n) { return s.pivot[n] != 0; });
     each(s.numbers, [&](int32_t r) { /* what those that are fixed move */
         double sum = 0;
         for (int32_t n = 0; n < s.numbers; ++n)
-            if (!s.pivot[n] && s.step[n] != 0) sum += s.G[r * s.numbers + n] * s.step[n];
+            if (!s.pivot[n]) sum += s.G[r * s.stride + n] * s.step[n];
         s.moved[r] = sum;
     });
     __syncthreads();
-    return shared->count;
+    return count;
 }
 
 /* Entry (i, c) of a step's matrix: (1 - D) step + D G step / response = Pi - lambda; c = count: the right side. */
@@ -132,7 +130,7 @@ static __device__ double step_entry(const ncp_island &s, int32_t count, int32_t 
         if (D[h] == 0) continue;
         const double share = D[h] / law.response;
         if (c == count) sum -= share * s.moved[law.first + h];
-        else sum += share * s.G[(law.first + h) * s.numbers + s.list[c]];
+        else sum += share * s.G[(law.first + h) * s.stride + s.list[c]];
     }
     if (c == count) return sum;
     const int32_t h = s.list[c] - law.first;
@@ -140,47 +138,52 @@ static __device__ double step_entry(const ncp_island &s, int32_t count, int32_t 
     return c == i ? sum + proximal : sum;
 }
 
-/* The row of column k's pivot among those that have none yet, by the first warp; -1: there is none. */
+/* The row of column k's pivot among those that have none yet, by the first warp; -1: there is none. The largest entry,
+ * but for what its first bits do not tell. */
+enum { NCP_ROW_BITS = 9 };
+static_assert(NCP_NUMBERS < 1 << NCP_ROW_BITS, "a row is a part of a key");
 static __device__ __forceinline__ void choose_pivot(const ncp_island &s, int32_t count, int32_t stride, int32_t k,
                                                     ncp_shared *shared)
 {
+    const unsigned rows = (1u << NCP_ROW_BITS) - 1;
     if (threadIdx.x >= WARP) return;
-    double most = 0;
-    int32_t row = -1;
+    unsigned key = 0;
     for (int32_t i = (int32_t)threadIdx.x; i < count; i += WARP) {
         const double entry = fabs(s.M[i * stride + k]);
-        if (s.pivot[i] < 0 && entry > most) most = entry, row = i;
+        const unsigned size = (unsigned)((unsigned long long)__double_as_longlong(entry) >> 32) & ~rows,
+                       own = size | (rows - (unsigned)i);
+        if (s.pivot[i] < 0 && entry > 0 && own > key) key = own;
     }
+#pragma unroll
     for (int o = WARP / 2; o > 0; o /= 2) {
-        const double other = __shfl_xor_sync((unsigned)ALL_LANES, most, o);
-        const int32_t other_row = __shfl_xor_sync((unsigned)ALL_LANES, row, o);
-        if (other > most || (other == most && other_row >= 0 && (row < 0 || other_row < row)))
-            most = other, row = other_row;
+        const unsigned other = __shfl_xor_sync((unsigned)ALL_LANES, key, o);
+        key = other > key ? other : key;
     }
     if (threadIdx.x == 0) {
+        const int32_t row = key == 0 ? -1 : (int32_t)(rows - (key & rows));
         shared->pivot = row;
         if (row >= 0) s.pivot[row] = k;
     }
 }
 
+/* Rows of a step's matrix, and their right sides. */
+static __device__ __forceinline__ int32_t stride_of(int32_t count) { return (count + 1) | 1; }
+
 /* M x = right by Gauss and Jordan's elimination, to `step`. False: singular. */
-static __device__ bool solve_step(const ncp_island &s, int32_t count, ncp_shared *shared)
+static __device__ __noinline__ bool solve_step(const ncp_island &s, int32_t count, ncp_shared *shared)
 {
-    const int32_t stride = count + 1;
+    const int32_t stride = stride_of(count);
     each(count, [&](int32_t i) { s.pivot[i] = -1; });
     __syncthreads();
 #pragma unroll 1
     for (int32_t k = 0; k < count; ++k) {
         choose_pivot(s, count, stride, k, shared);
         __syncthreads();
-        const int32_t p = shared->pivot, width = count - k;
+        const int32_t p = shared->pivot;
         if (p < 0) return false;
         const double inverse = 1 / s.M[p * stride + k];
-        each(count * width, [&](int32_t t) {
-            const int32_t i = t / width, c = k + 1 + t % width;
-            if (i == p) return;
-            const double share = s.M[i * stride + k] * inverse;
-            if (share != 0) s.M[i * stride + c] -= share * s.M[p * stride + c];
+        each_entry(count, count - k, [&](int32_t i, int32_t c) {
+            if (i != p) s.M[i * stride + k + 1 + c] -= s.M[i * stride + k] * inverse * s.M[p * stride + k + 1 + c];
         });
         __syncthreads();
     }
@@ -192,18 +195,18 @@ static __device__ bool solve_step(const ncp_island &s, int32_t count, ncp_shared
     return true;
 }
 
-static __device__ bool take_step(const ncp_island &s, double proximal, ncp_shared *shared)
+static __device__ __noinline__ bool take_step(ncp_island *island, double proximal, ncp_shared *shared)
 {
-    const int32_t count = sort_numbers(s, shared);
-    each(count * (count + 1), [&](int32_t t) {
-        const int32_t i = t / (count + 1), c = t % (count + 1);
-        s.M[t] = step_entry(s, count, i, c, proximal);
-    });
+    const ncp_island &s = *island;
+    const int32_t count = sort_numbers(s, shared), stride = stride_of(count);
+    if (!affords(island, elimination_of(count))) return false;
+    each_entry(count, count + 1,
+               [&](int32_t i, int32_t c) { s.M[i * stride + c] = step_entry(s, count, i, c, proximal); });
     __syncthreads();
     if (!solve_step(s, count, shared)) return false;
     each(s.numbers, [&](int32_t r) {
         double sum = 0;
-        for (int32_t n = 0; n < s.numbers; ++n) sum += s.G[r * s.numbers + n] * s.step[n];
+        for (int32_t n = 0; n < s.numbers; ++n) sum += s.G[r * s.stride + n] * s.step[n];
         s.u[r] += sum;
         s.lambda[r] += s.step[r];
     });
@@ -222,18 +225,19 @@ static __device__ __forceinline__ void keep_best(const ncp_island &s)
 
 /* Full steps: on the way to the right pieces of laws the map may grow. lambda, u: the best there was; returns its
  * map. */
-static __device__ double take_steps(const ncp_island &s, int steps, ncp_shared *shared)
+static __device__ __noinline__ double take_steps(ncp_island *island, int steps, ncp_shared *shared)
 {
+    const ncp_island &s = *island;
     const ncp_damping damping[2] = {{100, 1e-8, 1e-5}, {1, 1e-10, 1e-3}};
     const double size = size_of(s, shared);
-    double map = natural_map(s, shared), best = map;
+    double map = look_at_laws(s, shared), best = map;
     keep_best(s);
 #pragma unroll 1
     for (int step = 0; step < steps && best > NCP_AIM && map < INFINITY; ++step) {
         const double last = best;
         const ncp_damping &by = damping[step / NCP_IN_TURN % 2];
-        if (!take_step(s, fmin(by.most, fmax(by.least, by.share * map / size)), shared)) break;
-        map = natural_map(s, shared);
+        if (!take_step(island, fmin(by.most, fmax(by.least, by.share * map / size)), shared)) break;
+        map = look_at_laws(s, shared);
         if (map < best) keep_best(s);
         best = fmin(best, map);
         if (best < NCP_ENOUGH / 10 && !(best < last / 2)) break; /* what is left is rounding */

@@ -11,8 +11,6 @@
 /* Memory of all blocks at most, and of one. */
 #define NCP_MEMORY ((size_t)512 << 20)
 #define NCP_BLOCK_MEMORY ((size_t)2 << 20)
-/* Blocks on a multiprocessor. */
-enum { NCP_BLOCKS_EACH = 2 };
 
 /* In BUFFER_NCP, in this order: what the host gives; then what is the device's own. */
 struct ncp_arrays {
@@ -181,7 +179,8 @@ sadmm_status CUDA(reserve_ncp)(struct sadmm_context *c, struct sadmm_error *erro
 {
     struct cuda_step *s = c->step;
     if (!solves_ncp(c)) return SADMM_OK;
-    s->ncp_blocks = std::min(s->bodies, NCP_BLOCKS_EACH * c->multiprocessors);
+    const int each = has_large_ncp_blocks(c) ? (int)NCP_LARGE_EACH : (int)NCP_SMALL_EACH;
+    s->ncp_blocks = std::min(s->bodies, each * c->multiprocessors);
     s->ncp_bytes = std::min(NCP_BLOCK_MEMORY, NCP_MEMORY / (size_t)s->ncp_blocks / 16 * 16);
     TRY(CUDA(reserve)(c, BUFFER_NCP_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
     return CUDA(reserve)(c, BUFFER_NCP_MEMORY, (size_t)s->ncp_blocks * s->ncp_bytes, error);

@@ -7,7 +7,7 @@
 #ifndef SADMM_CUDA_STEP_NCP_RESPONSE_H
 #define SADMM_CUDA_STEP_NCP_RESPONSE_H
 
-#include "ncp_island.h"
+#include "ncp_tree.h"
 
 /* A node that a load has passed: where z and H z are, one behind the other. */
 struct ncp_passed {
@@ -23,12 +23,7 @@ struct ncp_ways {
     ncp_way *way;
     ncp_passed *passed;
     double *shares;
-};
-
-/* A load that goes to the root. Two of a number: what they have in common is one, since parents come after children. */
-struct ncp_load {
-    int32_t node; /* -1: it has come to its end */
-    double p[6];
+    double (*p)[6]; /* by eight lanes: a load where it is on its way */
 };
 
 static __device__ __forceinline__ int32_t next_node(const ncp_node &node)
@@ -61,48 +56,62 @@ static __device__ __forceinline__ void begin_nodes(const cuda_view &v, const ncp
     }
 }
 
-/* Number k of a law. */
-static __device__ void pass_number(const cuda_view &v, const ncp_island &s, const ncp_law &law, int k,
-                                   const ncp_ways &ways, const ncp_way &way)
+/* Component c of the load that number k of a law is at a side. */
+static __device__ __forceinline__ double load_of_number(const cuda_view &v, const ncp_island &s, const ncp_law &law,
+                                                        int k, int side, int c)
 {
-    ncp_load load[2] = {};
-    int32_t node[2], at = way.first, share = way.at;
+    if (law.count < 3)
+        return s.row[law.of].node >= 0 ? 0 : v.raw.rows[s.row[law.of].slot].jacobian[side][c];
+    double row[6];
+    contact_row(s.contact[law.of], k, side, row);
+    return c == 0 ? row[0] : c == 1 ? row[1] : c == 2 ? row[2] : c == 3 ? row[3] : c == 4 ? row[4] : row[5];
+}
+
+/* Number k of a law, by six lanes: c. What loads from two sides have in common they pass as one, since parents come
+ * after children. live: there is such a number. Every lane of the warp comes here. */
+static __device__ __forceinline__ void pass_number(const cuda_view &v, const ncp_island &s, const ncp_law &law, int k,
+                                                   const ncp_ways &ways, const ncp_way &way, int c, bool live)
+{
+    int32_t node[2] = {-1, -1}, at = way.first, share = way.at;
     const double *extra = nullptr; /* along the first joint */
-    begin_nodes(v, s, law, node);
-    for (int side = 0; side < 2; ++side) {
-        load[side].node = node[side];
-        if (node[side] < 0) continue;
-        if (law.count == 3) {
-            contact_row(s.contact[law.of], k, side, load[side].p);
-        } else if (s.row[law.of].node >= 0) {
-            extra = s.pool + s.row[law.of].along;
-        } else {
-            for (int c = 0; c < 6; ++c) load[side].p[c] = v.raw.rows[s.row[law.of].slot].jacobian[side][c];
-        }
+    double load[2] = {0, 0}, *exchange = ways.p[threadIdx.x / LANES];
+    if (live) {
+        begin_nodes(v, s, law, node);
+        if (law.count < 3 && s.row[law.of].node >= 0) extra = s.pool + s.row[law.of].along;
+        if (node[0] >= 0) load[0] = load_of_number(v, s, law, k, 0, c);
+        if (node[1] >= 0) load[1] = load_of_number(v, s, law, k, 1, c);
     }
-    each_passed(s, node[0], node[1], [&](int32_t n) {
-        const ncp_node &own = s.node[n];
-        const double *S = directions_of(s, own), *U = forces_of(s, own), *H = inverse_of(s, own);
-        double p[6] = {0, 0, 0, 0, 0, 0}, up[6] = {0, 0, 0, 0, 0, 0}, *z = ways.shares + share, *Hz = z + own.free;
-        for (int side = 0; side < 2; ++side)
-            for (int c = 0; load[side].node == n && c < 6; ++c) p[c] += load[side].p[c];
-        for (int i = 0; i < own.free; ++i) z[i] = six_product(S + 6 * i, p) + (extra ? extra[i] : 0);
-        extra = nullptr;
-        for (int i = 0; i < own.free; ++i) Hz[i] = along(own.free, H + i * own.free, z);
-        ways.passed[at].node = n;
-        ways.passed[at++].at = share;
-        share += 2 * own.free;
-        const int32_t next = next_node(own);
-        for (int c = 0; c < 6; ++c)
-            for (int i = 0; i < own.free; ++i) p[c] -= U[6 * i + c] * Hz[i];
-        if (next >= 0) add_load(own.offset, p, up);
-        const bool both = load[0].node == n && load[1].node == n;
-        for (int side = 0; side < 2; ++side) {
-            if (load[side].node != n) continue;
-            load[side].node = next;
-            for (int c = 0; c < 6; ++c) load[side].p[c] = side && both ? 0 : up[c];
+    while (__ballot_sync((unsigned)ALL_LANES, node[0] >= 0 || node[1] >= 0) != 0) {
+        const int32_t n = node[0] < 0 || (node[1] >= 0 && node[1] < node[0]) ? node[1] : node[0];
+        const bool is = n >= 0;
+        const ncp_node &own = s.node[is ? n : 0];
+        const bool first = node[0] == n, second = node[1] == n, free = is && c < own.free;
+        double p = (first ? load[0] : 0) + (second ? load[1] : 0), *z = ways.shares + share, *Hz = z + own.free;
+        if (is) exchange[c] = p;
+        __syncwarp((unsigned)ALL_LANES);
+        if (free) z[c] = six_product(directions_of(s, own) + 6 * c, exchange) + (extra ? extra[c] : 0);
+        __syncwarp((unsigned)ALL_LANES);
+        if (free) Hz[c] = along(own.free, inverse_of(s, own) + c * own.free, z);
+        __syncwarp((unsigned)ALL_LANES);
+        if (is) {
+            const double *U = forces_of(s, own) + c;
+#pragma unroll 1
+            for (int i = 0; i < own.free; ++i) p -= U[6 * i] * Hz[i];
+            exchange[c] = p;
+            if (c == 0) ways.passed[at].node = n, ways.passed[at].at = share;
         }
-    });
+        __syncwarp((unsigned)ALL_LANES);
+        if (is) {
+            const int32_t next = next_node(own);
+            if (next >= 0) p = carried(own.offset, exchange, c);
+            if (first) node[0] = next, load[0] = p;
+            if (second) node[1] = first ? -1 : next, load[1] = p;
+            extra = nullptr;
+            ++at;
+            share += 2 * own.free;
+        }
+        __syncwarp((unsigned)ALL_LANES);
+    }
 }
 
 /* Of numbers r and c, without what their laws take them by. */
@@ -124,8 +133,8 @@ static __device__ __forceinline__ double respond(const ncp_island &s, const ncp_
 }
 
 /* Where the ways of all numbers are. False: there is no room. */
-static __device__ bool lay_ways(const cuda_view &v, const ncp_island &s, ncp_memory *memory, ncp_ways *ways,
-                                ncp_shared *shared)
+static __device__ __noinline__ bool lay_ways(const cuda_view &v, const ncp_island &s, ncp_memory *memory,
+                                             ncp_ways *ways, ncp_shared *shared)
 {
     int32_t *count = (int32_t *)s.list, *first = s.pivot; /* as many as numbers; not in use yet */
     ways->way = take<ncp_way>(memory, (size_t)s.numbers);
@@ -151,28 +160,27 @@ static __device__ bool lay_ways(const cuda_view &v, const ncp_island &s, ncp_mem
     each(s.numbers, [&](int32_t n) { ways->way[n].at = first[n]; });
     ways->passed = take<ncp_passed>(memory, (size_t)nodes);
     ways->shares = take<double>(memory, (size_t)numbers);
+    ways->p = (double(*)[6])take<double>(memory, 6 * (size_t)blockDim.x / LANES);
     __syncthreads();
     return !memory->full;
 }
 
 /* G. regularisation: of contacts, a share of their response. */
-static __device__ void find_responses(const cuda_view &v, const ncp_island &s, const ncp_ways &ways)
+static __device__ __noinline__ void find_responses(const cuda_view &v, const ncp_island &s, const ncp_ways &ways)
 {
-    each(s.numbers, [&](int32_t n) {
+    each_eight(s.numbers, [&](int32_t n, int c) {
         int k;
-        const int32_t law = law_of(s, n, &k);
-        pass_number(v, s, s.law[law], k, ways, ways.way[n]);
+        const int32_t number = n < 0 ? 0 : n, law = law_of(s, number, &k);
+        pass_number(v, s, s.law[law], k, ways, ways.way[number], c < 6 ? c : 0, n >= 0 && c < 6);
     });
     __syncthreads();
-    const int32_t n = s.numbers;
-    each(n * n, [&](int32_t t) {
-        const int32_t r = t / n, c = t % n;
+    each_entry(s.numbers, s.numbers, [&](int32_t r, int32_t c) {
         if (r > c) return;
         const double G = respond(s, ways, r, c);
         int k;
         const ncp_law &row = s.law[law_of(s, r, &k)], &column = s.law[law_of(s, c, &k)];
-        s.G[r * n + c] = row.gain * G + (r == c ? row.compliance : 0);
-        if (r != c) s.G[c * n + r] = column.gain * G;
+        s.G[r * s.stride + c] = row.gain * G + (r == c ? row.compliance : 0);
+        if (r != c) s.G[c * s.stride + r] = column.gain * G;
     });
     __syncthreads();
 }

@@ -18,7 +18,7 @@ enum { NCP_ROUNDS = 8 };
 
 /* ---- the dense problem ------------------------------------------------------------------------------------------- */
 
-static __device__ void find_contact_velocity(const ncp_island &s, int32_t i, double u[3])
+static __device__ __noinline__ void find_contact_velocity(const ncp_island &s, int32_t i, double u[3])
 {
     const ncp_contact *c = &s.contact[i];
     for (int k = 0; k < 3; ++k) {
@@ -42,14 +42,15 @@ static __device__ __forceinline__ bool asks_for_number(const ncp_row &row)
 }
 
 /* Rows that ask for numbers get them, in their order. Did any? */
-static __device__ bool number_rows(ncp_island *s, ncp_shared *shared)
+static __device__ __noinline__ bool number_rows(ncp_island *s, ncp_shared *shared)
 {
     const int32_t before = s->laws;
+    if (s->bounded == 0) return false;
     if (threadIdx.x < WARP) {
         int32_t laws = before;
-        for (int32_t first = 0; first < s->rows; first += WARP) {
-            const int32_t r = first + (int32_t)threadIdx.x;
-            const bool asks = r < s->rows && asks_for_number(s->row[r]);
+        for (int32_t first = 0; first < s->bounded; first += WARP) {
+            const int32_t i = first + (int32_t)threadIdx.x, r = i < s->bounded ? s->bounded_row[i] : -1;
+            const bool asks = r >= 0 && asks_for_number(s->row[r]);
             const unsigned lanes = __ballot_sync((unsigned)ALL_LANES, asks);
             if (asks) {
                 ncp_row *row = &s->row[r];
@@ -81,12 +82,13 @@ static __device__ bool take_numbers(ncp_island *s, ncp_memory *memory)
     s->D = take<double>(memory, 9 * (size_t)s->laws);
     s->list = take<int32_t>(memory, n);
     s->pivot = take<int32_t>(memory, n);
-    s->G = take<double>(memory, n * n);
+    s->stride = s->numbers | 1;
+    s->G = take<double>(memory, n * (size_t)s->stride);
     return !memory->full;
 }
 
 /* lambda as it is; u by the velocities. */
-static __device__ void load_numbers(const ncp_island &s)
+static __device__ __noinline__ void load_numbers(const ncp_island &s)
 {
     each(s.contacts, [&](int32_t i) {
         for (int k = 0; k < 3; ++k) s.lambda[3 * i + k] = s.impulse[3 * i + k];
@@ -115,7 +117,7 @@ static __device__ void regularise(const ncp_island &s, double share)
 {
     each(3 * s.contacts, [&](int32_t n) {
         const double more = share * s.law[n / 3].response;
-        s.G[n * s.numbers + n] += more;
+        s.G[n * s.stride + n] += more;
         s.u[n] += more * s.lambda[n];
     });
     __syncthreads();
@@ -131,7 +133,7 @@ static __device__ double regularisation_of(const ncp_island &s, ncp_shared *shar
 }
 
 /* The natural map of all laws, of contacts that give by `share`. */
-static __device__ double map_of_all(const ncp_island &s, double share, ncp_shared *shared)
+static __device__ __noinline__ double map_of_all(const ncp_island &s, double share, ncp_shared *shared)
 {
     double own = 0;
     each(s.contacts, [&](int32_t i) {
@@ -141,9 +143,9 @@ static __device__ double map_of_all(const ncp_island &s, double share, ncp_share
         const double map = natural_map_of(s.law[i], s.impulse + 3 * i, u);
         if (!(map <= own)) own = map;
     });
-    each(s.rows, [&](int32_t r) {
+    each(s.bounded, [&](int32_t i) {
+        const int32_t r = s.bounded_row[i];
         const ncp_row *row = &s.row[r];
-        if (row->role != NCP_BOUNDED) return;
         const ncp_law law = {0, 1, r, row->response, 0, row->lo, row->hi, row->gain, row->compliance};
         const double map = natural_map_of(law, &row->lambda, &row->u);
         if (!(map <= own)) own = map;
@@ -154,8 +156,8 @@ static __device__ double map_of_all(const ncp_island &s, double share, ncp_share
 /* ---- the search -------------------------------------------------------------------------------------------------- */
 
 /* From where impulses and multipliers are. gives: contacts do. Returns the natural map of what is found. */
-static __device__ double search(const cuda_view &v, ncp_island *s, const ncp_memory &memory, bool gives,
-                                ncp_shared *shared)
+static __device__ __noinline__ double search(const cuda_view &v, ncp_island *s, const ncp_memory &memory, bool gives,
+                                             ncp_shared *shared)
 {
     const double share = gives ? NCP_GIVES : regularisation_of(*s, shared);
     double map = INFINITY;
@@ -166,6 +168,7 @@ static __device__ double search(const cuda_view &v, ncp_island *s, const ncp_mem
         map = map_of_all(*s, gives ? share : 0, shared);
         if (!(map > NCP_ENOUGH / 10) || s->numbers > NCP_NUMBERS || (round > 0 && !more && !(map > NCP_ENOUGH)))
             return map;
+        if (NCP_LEAST_STEPS * elimination_of(s->numbers) > s->budget) return INFINITY;
         ncp_memory left = memory;
         ncp_ways ways;
         if (!take_numbers(s, &left)) return INFINITY;
@@ -173,13 +176,14 @@ static __device__ double search(const cuda_view &v, ncp_island *s, const ncp_mem
         if (!lay_ways(v, *s, &left, &ways, shared)) return INFINITY;
         find_responses(v, *s, ways);
         left = before; /* ways are not needed any more */
-        s->M = take<double>(&left, (size_t)s->numbers * (size_t)(s->numbers + 1));
+        s->M = take<double>(&left, (size_t)s->numbers * (size_t)stride_of(s->numbers));
         if (left.full) return INFINITY;
         load_numbers(*s);
         regularise(*s, share);
-        if (!(take_steps(*s, affordable_steps(NCP_FROM_START, s->numbers), shared) <= NCP_ENOUGH)) {
-            (void)go_inside(*s, left, shared);
-            (void)take_steps(*s, affordable_steps(NCP_FROM_INSIDE, s->numbers), shared);
+        const double found = take_steps(s, NCP_FROM_START, shared);
+        if (!(found <= NCP_ENOUGH)) {
+            (void)go_inside(s, left, shared);
+            (void)take_steps(s, NCP_FROM_INSIDE, shared);
         }
         store_numbers(*s);
         solve_trees(v, *s);
@@ -188,45 +192,46 @@ static __device__ double search(const cuda_view &v, ncp_island *s, const ncp_mem
 }
 
 /* From nothing. */
-static __device__ void forget(ncp_island *s)
+static __device__ __noinline__ void forget(ncp_island *s)
 {
     each(3 * s->contacts, [&](int32_t n) { s->impulse[n] = 0; });
-    each(s->rows, [&](int32_t r) {
-        ncp_row *row = &s->row[r];
-        if (row->role == NCP_BOUNDED) row->lambda = articulation_clamp(0, row->lo, row->hi);
+    each(s->bounded, [&](int32_t i) {
+        ncp_row *row = &s->row[s->bounded_row[i]];
+        row->lambda = articulation_clamp(0, row->lo, row->hi);
     });
     __syncthreads();
 }
 
 /* Twice the energy of the island's motion; what forces alone, and all at the speed of corrections, would give it. */
-static __device__ void find_energies(const cuda_view &v, const ncp_island &s, double *now, double *expected)
+static __device__ __noinline__ void find_energies(const cuda_view &v, const ncp_island &s, double *now,
+                                                  double *expected)
 {
     const double speed = v.model.settings->correction_speed;
     each(s.bodies, [&](int32_t n) {
         ncp_node *node = &s.node[n];
         const double *w = node->velocity + 3, *I = node->own.inertia;
-        node->up[0] = node->own.mass * dot3(node->velocity, node->velocity) +
+        node->now.p[0] = node->own.mass * dot3(node->velocity, node->velocity) +
                       w[0] * (I[0] * w[0] + I[3] * w[1] + I[4] * w[2]) +
                       w[1] * (I[3] * w[0] + I[1] * w[1] + I[5] * w[2]) +
                       w[2] * (I[4] * w[0] + I[5] * w[1] + I[2] * w[2]);
         const vec3 moved = v3_scale(v3_load(node->own.b), 1 / node->own.mass), turn = v3_load(node->own.b + 3);
-        node->up[1] = node->own.mass * (v3_norm2(moved) + speed * speed) +
+        node->now.p[1] = node->own.mass * (v3_norm2(moved) + speed * speed) +
                       v3_dot(turn, m3_solve(inertia_of(node->own), turn));
     });
     __syncthreads();
     *now = *expected = 0;
-    for (int32_t n = 0; n < s.bodies; ++n) *now += s.node[n].up[0], *expected += s.node[n].up[1];
+    for (int32_t n = 0; n < s.bodies; ++n) *now += s.node[n].now.p[0], *expected += s.node[n].now.p[1];
     __syncthreads();
 }
 
 /* A solution is kept, or is that again. */
-static __device__ void keep_solution(const ncp_island &s)
+static __device__ __noinline__ void keep_solution(const ncp_island &s)
 {
     each(3 * s.contacts, [&](int32_t n) { s.kept[n] = s.impulse[n]; });
     each(s.rows, [&](int32_t r) { s.kept[3 * s.contacts + r] = s.row[r].lambda; });
     __syncthreads();
 }
-static __device__ void take_kept(const cuda_view &v, const ncp_island &s)
+static __device__ __noinline__ void take_kept(const cuda_view &v, const ncp_island &s)
 {
     each(3 * s.contacts, [&](int32_t n) { s.impulse[n] = s.kept[n]; });
     each(s.rows, [&](int32_t r) { s.row[r].lambda = s.kept[3 * s.contacts + r]; });
@@ -236,7 +241,8 @@ static __device__ void take_kept(const cuda_view &v, const ncp_island &s)
 
 /* Is it solved? By impulses, multipliers and velocities as they are then. A solution of much energy, as drives may ask
  * for, stays where contacts that give do not have less than half of it. */
-static __device__ bool search_all(const cuda_view &v, ncp_island *s, const ncp_memory &memory, ncp_shared *shared)
+static __device__ __noinline__ bool search_all(const cuda_view &v, ncp_island *s, const ncp_memory &memory,
+                                               ncp_shared *shared)
 {
     double energy, expected, given;
     const bool solved = search(v, s, memory, false, shared) <= NCP_ENOUGH;

@@ -6,11 +6,11 @@
 
 #include "backend_cuda/device/condition.h"
 #include "backend_cuda/device/plan_check.h"
+#include "core/model/push_law.h"
+#include "anchors.h"
 #include "assemble_again.h"
 #include "ncp_search.h"
 #include "world.h"
-
-enum { NCP_THREADS = 256 };
 
 /* Are all islands left to the iterations? Where some are seen from their supports, or are pushed apart. */
 static __device__ __forceinline__ bool is_left(const cuda_view &v)
@@ -20,7 +20,7 @@ static __device__ __forceinline__ bool is_left(const cuda_view &v)
 
 /* ---- islands ----------------------------------------------------------------------------------------------------- */
 
-static __device__ void store_island(const cuda_view &v, const ncp_island &s)
+static __device__ __noinline__ void store_island(const cuda_view &v, const ncp_island &s)
 {
     each(s.bodies * LANES, [&](int32_t t) {
         if (t % LANES < 6)
@@ -34,12 +34,12 @@ static __device__ void store_island(const cuda_view &v, const ncp_island &s)
                                                               c->frame[3 + k] * s.impulse[3 * i + 1] +
                                                               c->frame[6 + k] * s.impulse[3 * i + 2];
     });
-    store_locks(v, s);
+    store_rows(v, s);
     __syncthreads();
 }
 
 /* Does any body have another inertia by the forces that have been found? */
-static __device__ bool stiffen_island(const cuda_view &v, const ncp_island &s, ncp_shared *shared)
+static __device__ __noinline__ bool stiffen_island(const cuda_view &v, const ncp_island &s, ncp_shared *shared)
 {
     bool any = false;
     each(s.bodies, [&](int32_t n) {
@@ -55,7 +55,8 @@ static __device__ bool stiffen_island(const cuda_view &v, const ncp_island &s, n
 static __device__ bool solve_island(const cuda_view &v, ncp_island *s, ncp_memory memory, bool after,
                                     ncp_shared *shared)
 {
-    if (!make_nodes(v, s, &memory, shared) || !make_rows(v, s, &memory, after, shared)) return false;
+    if (!make_nodes(v, s, &memory, shared)) return false;
+    if (!make_rows(v, s, &memory, after, shared)) return false;
     if (!make_contacts(v, s, &memory, after, shared)) return false;
 #pragma unroll 1
     for (int turn = 0; turn < 2; ++turn) {
@@ -71,13 +72,17 @@ static __device__ bool solve_island(const cuda_view &v, ncp_island *s, ncp_memor
 }
 
 /* Blocks take islands in turn. args.count: after the iterations. */
-static __global__ void __launch_bounds__(NCP_THREADS)
+template <int BLOCK, int EACH>
+static __global__ void __launch_bounds__(BLOCK, EACH)
     ncp_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(dynamic);
     ncp_shared *shared = (ncp_shared *)dynamic;
     pdl_wait();
-    if (is_left(v)) return;
+    if (is_left(v)) {
+        if (blockIdx.x == 0 && threadIdx.x == 0) *v.ncp.unsolved = 1;
+        return;
+    }
     const int32_t islands = *v.ncp.count;
 #pragma unroll 1
     for (int32_t k = (int32_t)blockIdx.x; k < islands; k += (int32_t)gridDim.x) {
@@ -85,6 +90,7 @@ static __global__ void __launch_bounds__(NCP_THREADS)
         ncp_memory memory;
         char *far = v.ncp.memory + (size_t)blockIdx.x * v.ncp.bytes;
         s.label = v.ncp.islands[k];
+        s.budget = NCP_BUDGET;
         if (args.count && v.ncp.solved[s.label]) continue;
         s.first_slot = v.graph.slot_of[s.label];
         s.bodies = v.graph.island_bodies[s.label];
@@ -97,6 +103,7 @@ static __global__ void __launch_bounds__(NCP_THREADS)
         __syncthreads();
         if (threadIdx.x > 0) continue;
         v.ncp.solved[s.label] = solved;
+        if (!solved) *v.ncp.unsolved = 1;
         if (solved && args.checks > 0 && v.islands.info[s.label].stopped == 0) /* a check has counted it */
             atomicAdd(&v.islands.stop->unmet[args.checks % CHECKS_KEPT], -1);
     }
@@ -116,20 +123,36 @@ static __global__ void begin_kernel(const __grid_constant__ cuda_view v, const _
         const vec3 turn = m3_solve(inertia_of(body), v3_load(body.b + 3));
         for (int k = 0; k < 3; ++k) v.joints.velocity[6 * (size_t)i + (size_t)k] = body.b[k] / body.mass;
         v3_store(turn, v.joints.velocity + 6 * (size_t)i + 3);
-    } else if (v.graph.label[i] == i && v.graph.island_bodies[i] <= NCP_BODIES) {
-        v.ncp.islands[atomicAdd(v.ncp.count, 1)] = i;
+    } else if (v.graph.label[i] == i) {
+        if (v.graph.island_bodies[i] <= NCP_BODIES) v.ncp.islands[atomicAdd(v.ncp.count, 1)] = i;
+        else *v.ncp.unsolved = 1;
     }
+    if (v.islands.info && v.graph.label[i] == i) v.islands.info[i] = {weight_new_island(), 0, 1, 1, 0, 0, 0};
 }
 
 /* ---- where the step reads it ------------------------------------------------------------------------------------- */
+
+/* What the end of the step asks of the island of body i: its energy and its momentum are right; does anything outside
+ * hold on to it (weight/weigh.h)? */
+static __device__ __forceinline__ void put_island(const cuda_view &v, int32_t i, cuda_island *island)
+{
+    const int32_t slot = v.graph.slot_of[i], begin = v.graph.offsets[slot], end = v.graph.offsets[slot + 1];
+    if (v.graph.label[i] == i) island->slow_down = island->anchored = 1;
+    if (begin == end) {
+        island->anchored_outside = 1;
+    } else if (v.graph.incident[end - 1] / 2 >= v.contacts.pair_capacity) { /* rows come last */
+        island->rows = island->anchored_outside = 1;
+        if (v.push.bits) v.push.bits[v.graph.label[i]] = PUSH_ROWS;
+    } else if (anchors(v, i)) {
+        island->anchored_outside = 1;
+    }
+}
 
 static __device__ __forceinline__ void put_velocity(const cuda_view &v, int32_t i)
 {
     for (int k = 0; k < 6; ++k)
         v.bodies.state[(size_t)i * ROW + (size_t)k] = (solver_real)v.joints.velocity[6 * (size_t)i + (size_t)k];
-    if (v.graph.label[i] != i || !v.islands.info) return;
-    v.islands.info[i].slow_down = 1; /* its energy and its momentum are right */
-    v.islands.info[i].anchored = 1;
+    if (v.islands.info) put_island(v, i, &v.islands.info[v.graph.label[i]]);
 }
 
 static __device__ __forceinline__ void put_pair(const cuda_view &v, int32_t p)
@@ -153,18 +176,14 @@ static __device__ __forceinline__ void put_constraint(const cuda_view &v, int32_
     }
 }
 
-/* A thread a body, then a pair, then a constraint. args.count: after the iterations. */
-static __global__ void put_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+/* A thread a body, then a pair, then a constraint. */
+static __global__ void put_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     pdl_wait_if(all_pdl(v.model.bodies));
     int32_t i = thread_index();
     if (v.model.live->abort_code) return;
     if (i < v.model.bodies) {
-        if (!is_solved(v, i)) {
-            if (!args.count) *v.ncp.unsolved = 1;
-            return;
-        }
-        put_velocity(v, i);
+        if (is_solved(v, i)) put_velocity(v, i);
         return;
     }
     i -= v.model.bodies;
@@ -176,50 +195,66 @@ static __global__ void put_kernel(const __grid_constant__ cuda_view v, const __g
     if (i < v.rows.count) put_constraint(v, i);
 }
 
-/* Are there iterations to be done? */
+/* Is some island not solved? args.begin: before the iterations; else after them. */
 static __global__ void ask_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     pdl_wait_if(all_pdl(v.model.bodies));
+    if (args.begin) check_plan(v.model, v.iteration, v.step); /* as penalties do, which may be left out */
+    else if (thread_index() == 0) stamp_solved(v.step);
     if (thread_index() == 0) set_condition(args.condition, *v.ncp.unsolved != 0 && !v.model.live->abort_code);
 }
 
 /* ---- launches ---------------------------------------------------------------------------------------------------- */
 
-/* Bytes of a block's own memory: two blocks fit on a multiprocessor. */
-enum { NCP_SHARED = 104 * 1024 };
+static cuda_kernel ncp_kernel_of(bool large)
+{
+    return large ? ncp_kernel<NCP_LARGE_BLOCK, 1> : ncp_kernel<NCP_SMALL_BLOCK, NCP_SMALL_EACH>;
+}
+static int ncp_shared_of(bool large, int shared_limit)
+{
+    return std::min(large ? (int)NCP_LARGE_SHARED : (int)NCP_SMALL_SHARED, shared_limit);
+}
 
 sadmm_status CUDA(launch_ncp)(struct sadmm_context *c, bool after, struct sadmm_error *error)
 {
     cuda_args args = {};
     struct cuda_partition blocks = {};
+    const bool large = has_large_ncp_blocks(c);
     if (!after) {
         CUDA_CALL(c, cudaMemsetAsync(c->view.ncp.count, 0, 2 * sizeof(int32_t), c->stream), "cudaMemsetAsync(islands)");
         TRY(CUDA(launch)(c, begin_kernel, "islands to be solved", blocks_for(c->view.model.bodies), &args, error));
     }
     args.count = after;
     args.checks = after ? c->checks : 0;
-    args.cluster = std::min((int)NCP_SHARED, c->shared_limit);
+    args.cluster = ncp_shared_of(large, c->shared_limit);
     blocks.parts = c->step->ncp_blocks;
     blocks.cluster = 1;
-    blocks.threads = NCP_THREADS;
+    blocks.threads = large ? (int)NCP_LARGE_BLOCK : (int)NCP_SMALL_BLOCK;
     blocks.shared = (size_t)args.cluster;
-    return CUDA(launch_partition)(c, ncp_kernel, "dense contact solve", &blocks, &args, error);
+    return CUDA(launch_partition)(c, ncp_kernel_of(large), "dense contact solve", &blocks, &args, error);
 }
 
-sadmm_status CUDA(launch_ncp_put)(struct sadmm_context *c, bool after, unsigned long long condition,
+sadmm_status CUDA(launch_ncp_ask)(struct sadmm_context *c, bool after, unsigned long long condition,
                                   struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.count = after;
-    const int64_t threads = (int64_t)c->view.model.bodies + c->view.contacts.pair_capacity + c->view.rows.count;
-    TRY(CUDA(launch)(c, put_kernel, "solved islands", blocks_for(threads), &args, error));
-    if (!condition) return SADMM_OK;
+    args.begin = !after;
     args.condition = condition;
     return CUDA(launch)(c, ask_kernel, "islands that are left", 1, &args, error);
 }
 
+sadmm_status CUDA(launch_ncp_put)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const cuda_args args = {};
+    const int64_t threads = (int64_t)c->view.model.bodies + c->view.contacts.pair_capacity + c->view.rows.count;
+    return CUDA(launch)(c, put_kernel, "solved islands", blocks_for(threads), &args, error);
+}
+
 cudaError_t CUDA(ncp_allow)(int shared_limit)
 {
-    return cudaFuncSetAttribute((const void *)ncp_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                std::min((int)NCP_SHARED, shared_limit));
+    cudaError_t code = cudaSuccess;
+    for (int large = 0; large < 2 && code == cudaSuccess; ++large)
+        code = cudaFuncSetAttribute((const void *)ncp_kernel_of(large), cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                    ncp_shared_of(large, shared_limit));
+    return code;
 }

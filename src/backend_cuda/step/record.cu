@@ -59,14 +59,17 @@ sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, int substep, struct sad
     return CUDA(launch_admit)(c, error);
 }
 
-/* Launches go to a side stream while this lives; it begins behind what is on the main one. */
+/* Launches go to a side stream while this lives; it begins behind what is on the main one. Parts with a condition have
+ * no branches. */
 namespace {
 struct side_branch {
     struct sadmm_context *c;
     cudaStream_t main;
     cudaError_t code;
-    side_branch(struct sadmm_context *context, cudaStream_t side) : c(context), main(context->stream)
+    side_branch(struct sadmm_context *context, cudaStream_t side)
+        : c(context), main(context->stream), code(cudaSuccess)
     {
+        if (main == c->step->part) return;
         code = cudaEventRecord(c->fork, main);
         if (code == cudaSuccess) code = cudaStreamWaitEvent(side, c->fork, 0);
         c->stream = side;
@@ -116,7 +119,8 @@ static sadmm_status record_joint_rows(struct sadmm_context *c, struct sadmm_erro
     return SADMM_OK;
 }
 
-/* Those in the solver's form. Where articulations are apart, all that is to be done about them. */
+/* Those in the solver's form, if every step needs them. Where articulations are apart, all that is to be done about
+ * them. */
 static sadmm_status record_joints(struct sadmm_context *c, struct sadmm_error *error)
 {
     side_branch side(c, c->joint_side);
@@ -126,7 +130,7 @@ static sadmm_status record_joints(struct sadmm_context *c, struct sadmm_error *e
         TRY(CUDA(launch_articulations)(c, false, error));
         TRY(CUDA(launch_joint_solution)(c, error));
         TRY(CUDA(launch_joint_move)(c, error));
-    } else {
+    } else if (!solves_ncp(c)) {
         TRY(CUDA(assemble_rows)(c, error));
     }
     CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
@@ -170,23 +174,50 @@ static sadmm_status record_push_choice(struct sadmm_context *c, struct sadmm_err
     return CUDA(launch_push_choice)(c, error);
 }
 
-/* Islands that are solved before the iterations, and articulations of the others. */
+/* What is enqueued from here to end_unsolved is done if some island has not been solved before the iterations: a part
+ * of the step, where it can be one. */
+static sadmm_status begin_unsolved(struct sadmm_context *c, bool after, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    unsigned long long some = 0;
+    if (!solves_ncp(c) || c->plan.residuals || c->partition.tier == SADMM_CUDA_TIER_GRID)
+        return SADMM_OK; /* whose launches are cooperative */
+    CUDA_CALL(c, make_condition(c->stream, &some), "a condition of the step");
+    if (!some) return SADMM_OK;
+    TRY(CUDA(launch_ncp_ask)(c, after, some, error));
+    CUDA_CALL(c, begin_part(c->stream, some, s->part), "a part of the step");
+    s->main = c->stream;
+    c->stream = s->part;
+    return SADMM_OK;
+}
+
+static sadmm_status end_unsolved(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    if (c->stream != s->part) return SADMM_OK;
+    c->stream = s->main;
+    CUDA_CALL(c, end_part(s->part), "a part of the step");
+    return SADMM_OK;
+}
+
+/* Islands that are solved before the iterations; what the others need, up to SOLUTION, and of their articulations.
+ * Contacts are read by the end of every step. */
 static sadmm_status record_solved(struct sadmm_context *c, struct sadmm_error *error)
 {
-    if (solves_ncp(c)) TRY(CUDA(launch_ncp)(c, false, error));
+    if (solves_ncp(c)) {
+        TRY(CUDA(launch_ncp)(c, false, error));
+        TRY(CUDA(assemble_contacts)(c, error));
+        TRY(begin_unsolved(c, false, error));
+        TRY(CUDA(assemble_rows)(c, error));
+    }
     return record_articulations(c, error);
 }
 
 /* Contacts in the solver's form, and where iterations begin in islands that are solved. */
 static sadmm_status record_starts(struct sadmm_context *c, struct sadmm_error *error)
 {
-    struct cuda_step *s = c->step;
     TRY(CUDA(assemble_contacts)(c, error));
-    if (!solves_ncp(c)) return SADMM_OK;
-    s->some_unsolved = 0;
-    if (!c->plan.residuals && c->partition.tier != SADMM_CUDA_TIER_GRID) /* whose launches are cooperative */
-        CUDA_CALL(c, make_condition(c->stream, &s->some_unsolved), "a condition of the step");
-    return CUDA(launch_ncp_put)(c, false, s->some_unsolved, error);
+    return solves_ncp(c) ? CUDA(launch_ncp_put)(c, error) : SADMM_OK;
 }
 
 /* record_plan where there are kinematic bodies: one after the other. */
@@ -197,7 +228,7 @@ static sadmm_status record_kinematic_plan(struct sadmm_context *c, struct sadmm_
     TRY(CUDA(enqueue_bodies)(c, error));
     if (c->view.push.planned) TRY(record_push_choice(c, error));
     if (c->view.joints.count > 0) {
-        TRY(CUDA(assemble_rows)(c, error));
+        if (!solves_ncp(c)) TRY(CUDA(assemble_rows)(c, error));
         TRY(record_solved(c, error));
         TRY(wait_for_joints(c, error));
     }
@@ -271,32 +302,20 @@ static sadmm_status record_articulation_finish(struct sadmm_context *c, struct s
         TRY(CUDA(launch_finish)(c, c->step->articulations == 0, error));
         CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
     }
+    TRY(begin_unsolved(c, true, error));
     TRY(CUDA(launch_articulations)(c, true, error));
+    TRY(end_unsolved(c, error));
     TRY(wait_for_joints(c, error));
     return CUDA(launch_joint_solution)(c, error);
 }
 
-/* Iterations, where some island is not solved before them: a part of the step; then those that were not, once more. */
-static sadmm_status begin_iterations(struct sadmm_context *c, struct sadmm_error *error)
-{
-    struct cuda_step *s = c->step;
-    if (!solves_ncp(c) || !s->some_unsolved || c->stream == s->part) return SADMM_OK;
-    CUDA_CALL(c, begin_part(c->stream, s->some_unsolved, s->part), "a part of the step");
-    s->main = c->stream;
-    c->stream = s->part;
-    return SADMM_OK;
-}
-
+/* Islands that were not solved before the iterations, once more. */
 static sadmm_status end_iterations(struct sadmm_context *c, struct sadmm_error *error)
 {
-    struct cuda_step *s = c->step;
     if (!solves_ncp(c) || c->view.joints.count == 0) return SADMM_OK;
     TRY(CUDA(launch_ncp)(c, true, error));
-    if (c->stream == s->part) {
-        c->stream = s->main;
-        CUDA_CALL(c, end_part(s->part), "a part of the step");
-    }
-    return CUDA(launch_ncp_put)(c, true, 0, error);
+    TRY(end_unsolved(c, error));
+    return CUDA(launch_ncp_put)(c, error);
 }
 
 /* The end of the step, wrenches included; beside it the residuals of the last iteration where they are wanted. */
@@ -424,8 +443,6 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
         TRY(CUDA(enqueue_penalties)(c, error));
         return motions_beside(c) ? record_motions(c, error) : SADMM_OK;
     case SADMM_STAGE_ITERATE:
-        TRY(begin_iterations(c, error));
-        return record_solving(c, stage, residuals, limit, error);
     case SADMM_STAGE_RESIDUALS:
     case SADMM_STAGE_CHECK:
     case SADMM_STAGE_WEIGHTS:

@@ -72,7 +72,6 @@ struct cuda_step {
     size_t ncp_bytes;           /* and memory of each */
     cudaStream_t part;          /* parts of a step with a condition are recorded on it; */
     cudaStream_t main;          /* while such a part is recorded: what it is a part of */
-    unsigned long long some_unsolved; /* the condition of iterations in the sub-step that is recorded */
 
     bool pushes;                /* planned: islands are pushed apart, in a second problem (push.cu), */
     bool push_streams;          /* which has not fitted its partition once: tier STREAM */
@@ -133,15 +132,23 @@ static inline bool takes_hits(const struct sadmm_context *c) { return c->step->h
 /* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
 static inline bool stop_rule_checked(const struct sadmm_context *c) { return c->fast && c->settings.tolerance > 0; }
 
-/* Of so many bodies at most small islands are solved densely: a block each, which has most of a multiprocessor. */
-enum { NCP_MOST_BODIES = 264 };
+/* Blocks of the dense contact solve: large ones of few islands; where there are more mechanisms than such blocks, a
+ * warp each, many side by side. Threads; blocks on a multiprocessor; bytes of their own memory: so many fit there.
+ * Islands without joints are small work: of so many bodies a mechanism large blocks are still as fast. */
+enum { NCP_LARGE_BLOCK = 256, NCP_LARGE_EACH = 2, NCP_LARGE_SHARED = 104 * 1024, NCP_LARGE_BODIES = 16 };
+enum { NCP_SMALL_BLOCK = 32, NCP_SMALL_EACH = 16, NCP_SMALL_SHARED = 13 * 1024 };
+static inline bool has_large_ncp_blocks(const struct sadmm_context *c)
+{
+    const int32_t blocks = NCP_LARGE_EACH * c->multiprocessors;
+    return c->step->articulations <= blocks && c->step->bodies / NCP_LARGE_BODIES <= blocks;
+}
 
 /* Are small islands of worlds with joints solved before the iterations (ncp_island.h)? Where every constraint is of a
  * part. */
 static inline bool solves_ncp(const struct sadmm_context *c)
 {
-    return c->fast && c->settings.warm_start && c->settings.ncp_points > 0 && c->step->bodies <= NCP_MOST_BODIES &&
-           c->step->articulations > 0 && c->step->all_articulated && c->step->ncp_trees;
+    return c->fast && c->settings.warm_start && c->settings.ncp_points > 0 && c->step->articulations > 0 &&
+           c->step->all_articulated && c->step->ncp_trees;
 }
 
 /* world.cu */
@@ -251,11 +258,13 @@ sadmm_status CUDA(load_ncp)(struct sadmm_context *, int32_t first_gear, const st
                             struct sadmm_error *error);
 sadmm_status CUDA(reserve_ncp)(struct sadmm_context *, struct sadmm_error *error);
 void CUDA(view_ncp)(struct sadmm_context *);
-/* ncp_solve.cu: islands, before the iterations and what is left after them; put where these begin and where the end of
- * the step reads it. condition: of the iterations, 0: none. */
+/* ncp_solve.cu: islands, before the iterations and what is left after them; the condition of what is done about those
+ * that are not solved before; and what is solved is put where iterations begin and where the end of the step reads
+ * it. */
 sadmm_status CUDA(launch_ncp)(struct sadmm_context *, bool after, struct sadmm_error *error);
-sadmm_status CUDA(launch_ncp_put)(struct sadmm_context *, bool after, unsigned long long condition,
+sadmm_status CUDA(launch_ncp_ask)(struct sadmm_context *, bool after, unsigned long long condition,
                                   struct sadmm_error *error);
+sadmm_status CUDA(launch_ncp_put)(struct sadmm_context *, struct sadmm_error *error);
 cudaError_t CUDA(ncp_allow)(int shared_limit); /* once a device */
 
 #endif
