@@ -13,6 +13,7 @@ static const struct {
              {"ragdolls:2", 130, 2, 8},
              {"grippers:2", 60, 4, 128},
              {"grippers:40", 110, 2, 128},
+             {"grippers:300", 110, 2, 128}, /* more mechanisms than large blocks: a warp each */
              {"chain:4", 10, 4, 128}};
 enum { CASES = sizeof cases / sizeof *cases };
 
