@@ -17,7 +17,7 @@ struct ncp_damping {
 
 /* Multiplications that a thread may do for an island in search of its solution: what takes more is iterated, which is
  * cheaper then. Without so many steps a search is not begun. */
-#define NCP_BUDGET 1.5e5
+#define NCP_BUDGET 6e4
 enum { NCP_LEAST_STEPS = 8 };
 static __device__ __forceinline__ double elimination_of(int32_t numbers)
 {
