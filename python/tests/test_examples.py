@@ -57,8 +57,10 @@ def test_arm_lifts_cube(mass, lifted, capsys):
         pytest.skip("the arm's model is in gymnasium-robotics")
     up, height, slip = example("arm_lifts_cube").main(["--mass", str(mass)])
     assert up == lifted
-    if lifted:  # 2 mm: the last of the way that the arm is behind
-        assert height == pytest.approx(0.25, abs=2e-3) and slip < 2e-4
+    if lifted:
+        # 2 mm: the last of the way that the arm is behind. 0.5 mm: pads that are rigid may bear all of the load at one
+        # point each, about which the cube then turns a little; whether they do, rounding says.
+        assert height == pytest.approx(0.25, abs=2e-3) and slip < 5e-4
     else:
         assert height < 0.01
     assert ("not lifted" in capsys.readouterr().out) != lifted
