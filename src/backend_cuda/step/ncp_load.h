@@ -137,9 +137,9 @@ static __device__ __noinline__ void load_row(const cuda_view &v, const ncp_islan
     if (row->role == NCP_BOUNDED && !(row->response > 0)) row->role = NCP_FIXED;
 }
 
-/* Calls f(slot, side, role, which) for the rows of a node's joints, each by one of its eight lanes; which: counts those
- * before it that are locks too, or are not, too. *locks, *others: how many there are. live: there is such a node. Every
- * lane of the warp comes here. */
+/* Calls f(slot, side, role, which) for the rows of a node's joints, each by one of its eight lanes. which: of a lock,
+ * how many locks come before it; of another row, how many others. *locks, *others: all of them. live: there is such a
+ * node. Every lane of the warp comes here. */
 template <class F>
 static __device__ __forceinline__ void each_joint_row(const cuda_view &v, const ncp_node &node, int lane, bool live,
                                                       int32_t *locks, int32_t *others, const F &f)
