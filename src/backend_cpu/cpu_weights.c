@@ -131,6 +131,24 @@ static void add_up_impulses(const struct sadmm_context *c, const struct pair_blo
     }
 }
 
+/* The contacts of deep stacks close small separations slowly. */
+static void ease_separations(struct sadmm_context *c, size_t index)
+{
+    const struct pair_block *block = &c->pair_blocks[index];
+    double slop = c->settings.slop / c->settings.dt;
+    for (int l = 0; l < LANES; ++l) {
+        if (block->pair[l] < 0) continue;
+        const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
+        double share = cpu_island_of(c, pair->body_a, pair->body_b)->weights.separation_share;
+        for (int k = 0; k < pair->count && share < 1; ++k) {
+            real *error = c->plan.contact_rows == 3
+                              ? (real *)&((struct point_slot *)c->slots + block->first + k)->error
+                              : (real *)&((struct normal_slot *)c->slots + block->first + k)->error;
+            error[l] = (real)weight_separation_error((double)error[l], share, slop);
+        }
+    }
+}
+
 /* weight_most of a pair. */
 static double most_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
 {
@@ -213,6 +231,8 @@ static void update_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     const bool scales = c->weight_updates >= WEIGHT_FIRST_SCALE;
+    /* world level: separations, a slop and a step */
+    const bool eases = c->weight_updates == 0 && c->plan.warm && c->plan.rigid;
     size_t begin, end;
     cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) add_up_body(c, i, &c->body_sums[BODY_SUMS * i]);
@@ -223,6 +243,7 @@ static void update_share(void *context, int thread, int threads)
     sadmm_barrier_wait(&c->barrier, threads);
     sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
+    for (size_t k = begin; k < end && eases; ++k) ease_separations(c, k);
     sadmm_share(c->row_block_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) CPU(weigh_rows)(c, k);
     sadmm_barrier_wait(&c->barrier, threads);

@@ -291,6 +291,12 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
     add_up_islands(c);
     if (++c->weight_updates >= WEIGHT_FIRST_SCALE) update_weight_scales(c);
     for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p]);
+    if (c->weight_updates == 0 && c->plan->warm && c->plan->rigid)
+        for (size_t k = 0; k < points; ++k) {
+            struct ref_constraint *contact = &c->constraints[k];
+            contact->e[0] = weight_separation_error(contact->e[0], island_of(c, contact)->weights.separation_share,
+                                                    c->settings->slop / c->settings->dt);
+        }
     for (size_t k = points; k < c->constraint_count; ++k) weigh_constraint(c, &c->constraints[k]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         memset(c->bodies[i].C, 0, sizeof c->bodies[i].C);

@@ -70,7 +70,7 @@ static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const 
         const bool own_sides = i < (int32_t)blockDim.x / LANES;
         weighted_matrix<true>(v, t,
                               own_sides ? fetched : fetch_sides(v.model, v.graph, v.contacts, v.weights, t, t.begin),
-                              island, C);
+                              island, true, C);
         if (!t.live) return;
         if (i == first && t.lane == 0) {
             v.islands.info[v.graph.label[t.body]] = island;

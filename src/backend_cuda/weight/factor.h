@@ -10,6 +10,18 @@
 
 /* ---- weights of the method `fast` -------------------------------------------------------------------------------- */
 
+/* The contacts of deep stacks close small separations slowly. */
+static __device__ __forceinline__ void ease_separations(const model_view &model, const contact_view &contacts,
+                                                        int32_t p, double share)
+{
+    const double slop = model.settings->slop / model.settings->dt;
+    const int32_t count = share < 1 ? (int32_t)contacts.difference[p].w : 0;
+    for (int32_t k = 0; k < count; ++k) {
+        solver_real *error = &contacts.arm[point_slot(contacts, p, k)].w;
+        *error = (solver_real)weight_separation_error((double)*error, share, slop);
+    }
+}
+
 /* Of eight sides of a body, one a lane: which, what its weight is made of, and from all of their records the lane's
  * numbers. */
 struct eight_sides {
@@ -34,7 +46,7 @@ static __device__ __noinline__ double most_of(const body_view &bodies, const con
 /* B of the pair of the lane's side. Both of its sides work it out; the one at its first dynamic body keeps it. */
 static __device__ __forceinline__ double weigh_side(const model_view &model, const body_view &bodies,
                                                     const contact_view &contacts, const weight_view &weights,
-                                                    const eight_sides &sides, const cuda_island &island)
+                                                    const eight_sides &sides, const cuda_island &island, bool first)
 {
     const int32_t p = sides.code / 2;
     const double load = (double)sides.load, response = (double)sides.response;
@@ -47,6 +59,9 @@ static __device__ __forceinline__ double weigh_side(const model_view &model, con
     if (sides.code & 1 && a) return B;
     contacts.inv_s[p] = (solver_real)(both ? B / 2 : B);
     if (!(scale > 0)) weights.weight[p] = taken;
+    if (first && bodies.rigid)
+        ease_separations(model, contacts, p, island.weights.separation_share); /* world level: separations, a slop and
+                                                                                  a step */
     return B;
 }
 
@@ -115,10 +130,11 @@ static __device__ __forceinline__ eight_sides fetch_sides(const model_view &mode
 }
 
 /* C of a body by the weights, and beta = 1, in all lanes: each weighs every eighth side, and adds up a sum or two over
- * all. `sides`: the first of them. CLOSED: as in has_closed_form. Every lane of the warp comes here. */
+ * all. `sides`: the first of them. `first`: of a solve. CLOSED: as in has_closed_form. Every lane of the warp comes
+ * here. */
 template <bool CLOSED>
 static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const body_thread &t, eight_sides sides,
-                                                       const cuda_island &island, double C[PACKED])
+                                                       const cuda_island &island, bool first, double C[PACKED])
 {
     const bool three = CLOSED || v.model.contact_rows == 3;
     double sum[2] = {};
@@ -128,7 +144,7 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
         const bool rows = !CLOSED && sides.code >= 0 && sides.code >= 2 * v.contacts.pair_capacity;
         const double B = sides.code < 0 || rows
                              ? 0
-                             : weigh_side(v.model, v.bodies, v.contacts, v.weights, sides, island);
+                             : weigh_side(v.model, v.bodies, v.contacts, v.weights, sides, island, first);
         if (rows) add_weighted_rows(v.rows, sides.code / 2 - v.contacts.pair_capacity, sides.code & 1, C);
         else if (!three && sides.code >= 0) add_normals(v.contacts, sides.code, B, C);
 #pragma unroll

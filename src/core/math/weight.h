@@ -46,12 +46,13 @@ struct weight_sums {
 /* What the weights of an island's constraints are made of. */
 struct weight_island {
     double speed, mass; /* V in m/s; kg */
-    double scale;       /* the weight scale */
+    double separation_share; /* of separations within the slop, that a step closes */
+    double scale;            /* the weight scale */
 };
 
 SADMM_INLINE struct weight_island weight_new_island(void)
 {
-    const struct weight_island fresh = {0, 0, 1};
+    const struct weight_island fresh = {0, 0, 1, 1};
     return fresh;
 }
 
@@ -123,12 +124,19 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
  *
  *     n^2 > 5.8 K a^2 / (g dt^2 h)       a: half the width of a body, h: its height; 5.8: the square of a root of J_0
  *
- * so that B K must grow as n^2. B is raised by what it should be over what it is, up to WEIGHT_STIFFEST:
+ * so that B K must grow as n^2. What it should be over what it is, with d = max(n / WEIGHT_SPRING_DEPTH, 1):
  *
- *     need = WEIGHT_SPRING_ITERATIONS / K max(n / WEIGHT_SPRING_DEPTH, 1)^2 */
+ *     need = WEIGHT_SPRING_ITERATIONS / K d^2
+ *
+ * B is raised by that, up to WEIGHT_STIFFEST. Beyond, separations are closed slowly: closed in one step they act on the
+ * springs as an integral controller, which excites slow swaying, and shakes light bodies that are clamped. A step
+ * closes the share lack^-3 of them, lack = WEIGHT_SEPARATION_NEED need. Few iterations alone are no reason to: lack is
+ * at most d^2. */
 #define WEIGHT_SPRING_ITERATIONS 60 /* measured: bench/constants.py, heaps standing */
 #define WEIGHT_SPRING_DEPTH 20.0 /* measured: bench/constants.py, heaps standing */
 #define WEIGHT_STIFFEST 6.0 /* measured: bench/constants.py, heaps standing */
+#define WEIGHT_SEPARATION_NEED 3.3333333333333335 /* measured: bench/constants.py, heaps standing */
+#define WEIGHT_SEPARATION_LEAST 0.001 /* measured: bench/constants.py, heaps standing */
 
 /* K of a step whose contacts are springs, 0: they are none. A problem that is solved in short batches is no row of
  * steps: this is for worlds (`rigid`). */
@@ -137,11 +145,16 @@ SADMM_INLINE int weight_spring_iterations(int warm, int rigid, int iterations)
     return warm && rigid ? iterations : 0;
 }
 
-/* `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is n in a column. */
-SADMM_INLINE double weight_spring_need(double speed, double push, double mass, int iterations)
+/* d^2. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is n in a column. */
+SADMM_INLINE double weight_depth2(double speed, double push, double mass)
 {
     const double depth = max_of(push / (mass * speed * WEIGHT_SPRING_DEPTH), 1.0);
-    return depth * depth * WEIGHT_SPRING_ITERATIONS / iterations;
+    return depth * depth;
+}
+
+SADMM_INLINE double weight_spring_need(double depth2, int iterations)
+{
+    return depth2 * WEIGHT_SPRING_ITERATIONS / iterations;
 }
 
 /* V: an island whose bodies move is no spring, and heavy weights are slow: no less than their speed. */
@@ -151,15 +164,33 @@ SADMM_INLINE double weight_spring_speed(double speed, double need, double kineti
     return min_of(max_of(speed / stiffer, sqrt(kinetic / mass)), speed);
 }
 
-/* V; iterations: weight_spring_iterations. */
+/* The share of a separation within the slop that a step closes. */
+SADMM_INLINE double weight_separation_share(double depth2, double need)
+{
+    const double lack = min_of(WEIGHT_SEPARATION_NEED * need, depth2);
+    return min_of(max_of(1 / (lack * lack * lack), WEIGHT_SEPARATION_LEAST), 1.0);
+}
+
+/* e with that share; `slop` over dt, m/s. */
+SADMM_INLINE double weight_separation_error(double error, double share, double slop)
+{
+    double eased = share * error, beyond = error - (1 - share) * slop;
+    return error <= 0 ? error : eased > beyond ? eased : beyond;
+}
+
+/* V, and what goes with it; iterations: weight_spring_iterations. */
 SADMM_INLINE void weight_update_speed(struct weight_island *island, const struct weight_sums *sums, int iterations)
 {
     const double mass = sums->mass, speed = weight_speed(sums->energy, mass);
+    double depth2, need;
     island->mass = mass;
     island->speed = speed;
-    if (iterations > 0)
-        island->speed = weight_spring_speed(speed, weight_spring_need(speed, sums->push, mass, iterations),
-                                            sums->kinetic, mass);
+    island->separation_share = 1;
+    if (iterations == 0) return;
+    depth2 = weight_depth2(speed, sums->push, mass);
+    need = weight_spring_need(depth2, iterations);
+    island->speed = weight_spring_speed(speed, need, sums->kinetic, mass);
+    island->separation_share = weight_separation_share(depth2, need);
 }
 
 /* ---- B ----------------------------------------------------------------------------------------------------------- */
