@@ -130,7 +130,8 @@ def main(arguments=None):
     closed = arm.cube_in_hand()
     arm.move(CUBE + [0, 0, HIGH], 1.2, 0.0)
     arm.move(CUBE + [0, 0, HIGH], 0.5, 0.0)
-    height, slip = cube.position[2] - CUBE[2], float(np.linalg.norm(arm.cube_in_hand() - closed))
+    height, moved = cube.position[2] - CUBE[2], arm.cube_in_hand() - closed
+    slip = float(np.linalg.norm(moved))
     off = np.linalg.norm(arm.hand()[0] - CUBE - [0, 0, HIGH])
     print(f"the grip is {1e3 * off:.2f} mm off, at {arm.world.report.time:.1f} s")
     lifted = height > 0.9 * HIGH and slip < 0.005
@@ -138,7 +139,7 @@ def main(arguments=None):
         f"the cube is {'' if lifted else 'not '}lifted: {1e3 * height:.1f} mm up, "
         f"slip {1e3 * slip:.3f} mm since the fingers closed"
     )
-    return lifted, height, slip
+    return lifted, height, moved
 
 
 if __name__ == "__main__":

@@ -269,16 +269,11 @@ static __device__ __forceinline__ double along(int n, const double *a, const dou
     return sum;
 }
 
-/* X v: a velocity at a place r further on; p + X^T of a load there. */
+/* X v: a velocity at a place r further on. */
 static __device__ __forceinline__ void carry(const double r[3], const double v[6], double to[6])
 {
     for (int k = 0; k < 6; ++k) to[k] = v[k];
     add_cross(v + 3, r, 1, to);
-}
-static __device__ __forceinline__ void add_load(const double r[3], const double p[6], double to[6])
-{
-    for (int k = 0; k < 6; ++k) to[k] += p[k];
-    add_cross(r, p, 1, to + 3);
 }
 
 static __device__ __forceinline__ double *directions_of(const ncp_island &s, const ncp_node &node)

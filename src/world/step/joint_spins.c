@@ -48,6 +48,18 @@ struct turning {
     struct lanes3 own;
 };
 
+/* As bodies are turned, with spins in the world. */
+static inline struct turning turning_of(const double *const orientation[LANES], struct lanes3 spin)
+{
+    lanes q[4];
+    struct turning t;
+    lanes_gather(orientation, q);
+    t.q = (struct lanes_quat){q[0], q[1], q[2], q[3]};
+    t.R = lanes_matrix_of(t.q);
+    t.own = turned_back(&t.R, spin);
+    return t;
+}
+
 /* rigid_tumble_on. Returns where it is not that: of bodies whose moments are equal, that do not turn or turn far. */
 static inline lanes_mask tumble(struct turning *t, struct lanes3 inertia, double dt)
 {
@@ -90,13 +102,9 @@ static inline lanes_mask find_four(const struct sadmm_rigid *const body[LANES], 
                  *const spin[LANES] = {body[0]->velocity + 3, body[1]->velocity + 3, body[2]->velocity + 3,
                                        body[3]->velocity + 3};
     const struct lanes3 inertia = inertia_of(body);
-    lanes q[4], w[4];
-    struct turning t;
-    lanes_gather(at, q);
+    lanes w[4];
     lanes_gather(spin, w);
-    t.q = (struct lanes_quat){q[0], q[1], q[2], q[3]};
-    t.R = lanes_matrix_of(t.q);
-    t.own = turned_back(&t.R, (struct lanes3){w[0], w[1], w[2]});
+    struct turning t = turning_of(at, (struct lanes3){w[0], w[1], w[2]});
     const struct lanes3 momentum = lanes_turn(&t.R, each(inertia, t.own));
     const lanes_mask other = tumble(&t, inertia, dt / 2);
     const struct lanes3 angular = lanes_turn(&t.R, t.own), *r = t.R.r;
@@ -138,13 +146,9 @@ void SADMM_KERNEL(joint_moves)(const struct joint_movement *bodies, size_t count
         const double *const at[LANES] = {all[0].halfway, all[1].halfway, all[2].halfway, all[3].halfway},
                      *const spin[LANES] = {all[0].velocity + 2, all[1].velocity + 2, all[2].velocity + 2,
                                            all[3].velocity + 2};
-        lanes q[4], w[4], orientation[4];
-        struct turning t;
-        lanes_gather(at, q);
+        lanes w[4], orientation[4];
         lanes_gather(spin, w);
-        t.q = (struct lanes_quat){q[0], q[1], q[2], q[3]};
-        t.R = lanes_matrix_of(t.q);
-        t.own = turned_back(&t.R, (struct lanes3){w[1], w[2], w[3]});
+        struct turning t = turning_of(at, (struct lanes3){w[1], w[2], w[3]});
         const lanes_mask other = tumble(&t, inertia_of(body), dt / 2);
         const struct lanes3 angular = lanes_turn(&t.R, t.own);
         orientation[0] = t.q.w, orientation[1] = t.q.x, orientation[2] = t.q.y, orientation[3] = t.q.z;
