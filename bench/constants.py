@@ -2,7 +2,7 @@
 """What the tuned constants of src/core are worth: half of each, and twice it.
 
     bench/constants.py --list                   the constants and their values
-    bench/constants.py [NAME...] [--csv FILE]   measures them, all by default
+    bench/constants.py [NAME...] [--csv FILE]   measures them, all by default, one a core at a time
     bench/constants.py --check                  is every tuned constant marked? (part of the tests)
 
 Beside a tuned constant stands `measured: bench/constants.py, ` and the figures that it acts on. A variant is a build of
@@ -18,12 +18,14 @@ nothing.
 """
 import argparse
 import collections
+import concurrent.futures
 import csv
 import glob
 import io
 import json
 import math
 import os
+import queue
 import re
 import shutil
 import subprocess
@@ -35,6 +37,7 @@ MARK = "measured: bench/constants.py"
 MARKED = re.compile(re.escape(MARK) + r"(?:, (\w+(?: \w+)*))? \*/")
 CONSTANT = re.compile(r"(?:#define +|\b)([A-Z][A-Z0-9_]{3,})(?: = | +)(\d[\d.]*(?:e-?\d+)?\b|\(1 / [\d.]+\))")
 FACTORS = (0.5, 2)
+FALLEN = 1  # m, the drift of a scene that does not even come to its end
 TUNED = tuple(f"src/core/math/{name}.h" for name in ("weight", "energy_limit", "trapezoid"))
 Constant = collections.namedtuple("Constant", "name value figures path at end")
 
@@ -148,7 +151,8 @@ def standing(build):
         for iterations in ("5", "10", "20"):
             text = output([os.path.join(build, "bench", "subadmm-bench"), "stand", "--scene", scene, "--iterations",
                            iterations, "--steps", "300", "--precision", "f64", "--threads", "1"], (0, 1))
-            values.append(float(re.search(r"drift .*?: (\S+) of the", text)[1]) / 1e-6 + 1)
+            drift = re.search(r"drift .*?: (\S+) of the", text)
+            values.append((float(drift[1]) if drift else FALLEN) / 1e-6 + 1)
     return mean(values, 1)
 
 
@@ -193,7 +197,7 @@ class Copy:
             with open(path, "w", encoding="utf-8") as file:
                 file.write(text[:constant.at] + value + text[constant.end:])
         try:
-            output(["ninja", "-j", str(os.cpu_count()), "-C", self.build, "src/subadmm", "bench/subadmm-bench"])
+            output(["ninja", "-j", "1", "-C", self.build, "src/subadmm", "bench/subadmm-bench"])
             return {name: FIGURES[name](self.build) for name in names}
         finally:
             if constant:
@@ -201,21 +205,47 @@ class Copy:
                     file.write(text)
 
 
+class Copies:
+    """As many copies as cores, each measuring one thing at a time."""
+
+    def __init__(self, folder, count):
+        self.free = queue.Queue()
+        for k in range(count):
+            self.free.put(os.path.join(folder, str(k)))
+        self.made = {}
+
+    def figures(self, names, constant=None, factor=1):
+        folder = self.free.get()
+        try:
+            if folder not in self.made:
+                self.made[folder] = Copy(folder)
+            return self.made[folder].figures(names, constant, constant and changed(constant.value, factor))
+        finally:
+            self.free.put(folder)
+
+
 def rows(names=()):
     """One for each constant, with both factors' figures in one cell."""
     found = constants()
     chosen = [found[name] for name in names] or list(found.values())
+    cores = len(os.sched_getaffinity(0))
     with tempfile.TemporaryDirectory() as folder:
-        copy = Copy(folder)
-        base = copy.figures({name for constant in chosen for name in constant.figures})
-        for constant in chosen:
-            print(constant.name, end=" ", file=sys.stderr, flush=True)
-            variants = [copy.figures(constant.figures, constant, changed(constant.value, factor)) for factor in FACTORS]
-            row = {"constant": constant.name, "value": constant.value,
-                   **{name: "/".join(f"{variant[name] / base[name]:.2f}" for variant in variants
-                                     if name in variant) for name in FIGURES}}
-            print(*list(row.values())[1:], file=sys.stderr, flush=True)
-            yield row
+        copies, pool = Copies(folder, cores), concurrent.futures.ThreadPoolExecutor(cores)
+        try:
+            bases = {name: pool.submit(copies.figures, [name])
+                     for name in FIGURES if any(name in constant.figures for constant in chosen)}
+            variants = {constant.name: [pool.submit(copies.figures, constant.figures, constant, factor)
+                                        for factor in FACTORS] for constant in chosen}
+            base = {name: future.result()[name] for name, future in bases.items()}
+            for constant in chosen:
+                half_and_double = [future.result() for future in variants[constant.name]]
+                row = {"constant": constant.name, "value": constant.value,
+                       **{name: "/".join(f"{variant[name] / base[name]:.2f}" for variant in half_and_double
+                                         if name in variant) for name in FIGURES}}
+                print(*row.values(), file=sys.stderr, flush=True)
+                yield row
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def main():
