@@ -39,6 +39,12 @@ enum cuda_buffer_name {
     BUFFER_COUNT
 };
 
+/* What an iteration takes, in nanoseconds: floors of the tiers, of a cluster for each of its blocks, and of each side
+ * that a multiprocessor holds; and a kernel of a graph that waits for another. */
+struct cuda_timings {
+    double block, cluster, member, grid, side, kernel;
+};
+
 struct sadmm_context {
     int device;
     cudaStream_t stream;
@@ -48,6 +54,7 @@ struct sadmm_context {
     cudaEvent_t joint_join;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
     bool cooperative, clusters, pdl;   /* what the device can launch, with the code that was loaded for it */
+    cuda_timings timings;
 
     const struct sadmm_system *system;
     struct sadmm_plan plan;

@@ -49,6 +49,11 @@ bool CUDA(persistent_does_prologue)(const struct cuda_partition *);
  * the device and the code that was loaded for it know clusters. */
 cudaError_t CUDA(persistent_allow)(int bytes, bool device_has_clusters, bool *clusters);
 
+/* ---- timings.cu ---- */
+
+/* Of the context's device: measured by the first context that asks, then kept. */
+cuda_timings CUDA(timings)(const struct sadmm_context *);
+
 /* ---- partition.cu ---- */
 
 /* The tier and its thread blocks, from the statistics of this step (or of one like it), the plan and the device. */

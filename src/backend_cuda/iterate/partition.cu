@@ -25,19 +25,18 @@ enum {
     MOST_CLUSTER = 16 /* thread blocks a cluster */
 };
 
-/* Nanoseconds of an iteration: floors of the tiers, of a cluster for each of its blocks, and of each side that a
- * multiprocessor holds. For an H200 and f32; how they compare is all that matters. */
-enum { BLOCK_TIME = 350, CLUSTER_TIME = 580, MEMBER_TIME = 8, GRID_TIME = 1900, SIDE_TIME = 3 };
-/* Likewise, fast: of each body that touches nothing, on its multiprocessor; of STREAM's two kernels; and how many such
- * bodies these leave out in a nanosecond (iterate/streamed.cu). Of pile in flight an iteration took 1.4 us in BLOCK and
- * 2.75 in STREAM with 20,000 boxes, 8.7 and 4.4 with 100,000; both take the same with 60,000. */
-enum { FREE_TIME = 8, STREAM_TIME = 2750, FREE_A_TIME = 50 };
+/* Times are those of the device (timings.cu); these are ratios. fast: what a body that touches nothing takes on its
+ * multiprocessor, in sides; and of STREAM, which leaves out such bodies (iterate/streamed.cu), the kernels of an
+ * iteration, and how many bodies it leaves out in the time of one. On an H200, of pile in flight an iteration took 1.4
+ * us in BLOCK and 2.75 in STREAM with 20,000 boxes, 8.7 and 4.4 with 100,000; both take the same with 60,000. */
+#define FREE_SIDES (8.0 / 3)
+enum { STREAM_KERNELS = 2, STREAM_LEAVES_OUT = 68750 };
 
 /* A partition, why there is none (else NULL), and its nanoseconds an iteration. */
 struct choice {
     struct cuda_partition partition;
     const char *why;
-    int64_t time;
+    double time;
 };
 
 static int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
@@ -112,7 +111,7 @@ static struct bound body_bound(const struct sadmm_context *c, const struct cuda_
 
 static struct choice no_choice(const char *why)
 {
-    struct choice none = {{}, why, INT64_MAX};
+    struct choice none = {{}, why, INFINITY};
     return none;
 }
 
@@ -181,7 +180,7 @@ static struct choice choose_block(const struct sadmm_context *c, const struct cu
     side_by_side = smaller(side_by_side, larger((int64_t)(c->shared_limit / choice.partition.shared), 1));
     const int64_t rounds = up(smaller(parts, larger(statistics->islands, 1)), c->multiprocessors * side_by_side);
     const int64_t sides = side_by_side * larger(statistics->island_sides, up(statistics->sides, parts));
-    choice.time = rounds * (BLOCK_TIME + SIDE_TIME * sides);
+    choice.time = (double)rounds * (c->timings.block + c->timings.side * (double)sides);
     return choice;
 }
 
@@ -221,7 +220,8 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
     const int64_t rounds = up(smaller(clusters, larger(statistics->islands, 1)), active);
     const int64_t sides = up(larger(statistics->island_sides, up(statistics->sides, clusters)), size);
-    choice.time = rounds * (CLUSTER_TIME + MEMBER_TIME * size + SIDE_TIME * sides);
+    const cuda_timings &times = c->timings;
+    choice.time = (double)rounds * (times.cluster + times.member * size + times.side * (double)sides);
     return choice;
 }
 
@@ -269,7 +269,7 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
                                                               choice.partition.threads, choice.partition.shared);
         if (*code != cudaSuccess || parts > (int64_t)resident * c->multiprocessors) return no_choice(too_large);
-        choice.time = GRID_TIME + SIDE_TIME * side_by_side * up(statistics->sides, parts);
+        choice.time = c->timings.grid + c->timings.side * (double)(side_by_side * up(statistics->sides, parts));
         return choice;
     }
     return no_choice(too_large);
@@ -285,7 +285,8 @@ static struct choice choose_stream(void)
 static bool most_are_free(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics)
 {
     const int64_t free = larger((int64_t)c->view.model.bodies - statistics->sides, 0);
-    return c->fast && FREE_TIME * up(free, c->multiprocessors) > STREAM_TIME + free / FREE_A_TIME;
+    const double moved = FREE_SIDES * c->timings.side * (double)up(free, c->multiprocessors);
+    return c->fast && moved > c->timings.kernel * (STREAM_KERNELS + (double)free / STREAM_LEAVES_OUT);
 }
 
 /* What is likely the fastest; a tier whose floor is above what another takes is left out. */
@@ -293,12 +294,12 @@ static struct choice choose_any(const struct sadmm_context *c, const struct cuda
                                 cudaError_t *code)
 {
     struct choice best = choose_block(c, statistics);
-    if (best.time > CLUSTER_TIME) {
+    if (best.time > c->timings.cluster) {
         const struct choice cluster = choose_cluster(c, statistics, code);
         if (*code != cudaSuccess) return cluster;
         if (cluster.time < best.time) best = cluster;
     }
-    if (best.time > GRID_TIME) {
+    if (best.time > c->timings.grid) {
         const struct choice grid = choose_grid(c, statistics, code);
         if (*code != cudaSuccess) return grid;
         if (grid.time < best.time) best = grid;

@@ -67,6 +67,7 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
     CUDA_CALL(c, CUDA(ncp_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, CUDA(joint_close_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    c->timings = CUDA(timings)(c);
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->joint_side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     CUDA_CALL(c, cudaEventCreateWithFlags(&c->joint_join, cudaEventDisableTiming), "cudaEventCreateWithFlags");
