@@ -27,6 +27,7 @@ static const struct {
     {"shapes", bench_shapes, "what the manifold of a pair costs one core, by types of shapes"},
     {"queries", bench_queries, "what rays, overlaps and closest points of a scene cost"},
     {"joints", bench_joints, "motions and reactions of joints against reference tables"},
+    {"stress", bench_stress, "extreme cases judged by physics: pass, or what limits them"},
 };
 
 static void usage(FILE *out)

@@ -143,6 +143,15 @@ def rows_standing(tools):
         yield {"scene": scene, "steps": 600, **{key: match.group(1) if match else "" for key, match in found.items()}}
 
 
+def rows_stress(tools):
+    """Every row, those that fail too."""
+    command = [tools.bench, "stress", "--csv", "-"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 1) or not done.stdout:
+        sys.exit(f"{' '.join(command)}: exit status {done.returncode}\n{done.stderr}")
+    yield from csv.DictReader(io.StringIO(done.stdout))
+
+
 def rows_constants(_):
     return constants.rows()
 
@@ -172,6 +181,7 @@ REPORTS = {
     "standing": Report(rows_standing, columns(scene="scene", steps="steps", penetration_m="penetration, m",
                                               drift_m="drift, m", ncp="natural map, m/s")),
     "constants": Report(rows_constants),
+    "stress": Report(rows_stress),
 }
 SAME_EVERYWHERE = {"scenes"}  # no figure of theirs is measured
 
