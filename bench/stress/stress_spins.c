@@ -85,8 +85,7 @@ static void gyroscope(struct stress *s)
         const double *x = stress_state(s, ball.body_b).position, angle = atan2(x[1], x[0]);
         turned += remainder(angle - last, 2 * M_PI);
         last = angle;
-        stress_check(s, "energy over the start, share", (now.kinetic + now.potential) / start - 1,
-                     1e-4);
+        stress_check(s, "energy over the start, share", (now.kinetic + now.potential) / start - 1, 1e-4);
         stress_check(s, "off the level, share of the arm", fabs(x[2]) / arm, bound);
         if (s->time > 1) stress_check(s, "rate of going round, share", fabs(turned / (rate * s->time) - 1), bound);
     }
@@ -95,9 +94,9 @@ static void gyroscope(struct stress *s)
 
 /* In both precisions. */
 #define LIMIT(most, why) .precisions = STRESS_BOTH, .bound = most, .reason = why
-#define TURNS   "a joint that turns by more than 0.1 rad in a step loses energy (docs/guide/limits.md)"
-#define ADDS_UP "errors of second order in the turn of a step add up in 1,000 s: half the step leaves a quarter"
-#define NODS    "its axis nods by several radians a step: steps of 1 ms follow it"
+#define TURNS            "a joint that turns by more than 0.1 rad in a step loses energy (docs/guide/limits.md)"
+#define ADDS_UP          "errors of second order in a step's turn add up in 1,000 s: half the step leaves a quarter"
+#define NODS             "its axis nods by several radians a step: steps of 1 ms follow it"
 
 static const struct stress_case cases[] = {
     {.name = "free_spin",
