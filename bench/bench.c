@@ -11,6 +11,7 @@
 #include "core/base/parallel.h"
 #include "core/base/processors.h"
 #include "core/solve/schedule.h"
+#include "scenes/scenes.h"
 
 static const struct {
     const char *name;
@@ -21,6 +22,7 @@ static const struct {
     {"scaling", bench_scaling, "ms per step of growing scenes, CPU by threads against GPU"},
     {"convergence", bench_convergence,
      "iterations and time to a tolerance, errors of warm steps: method against method"},
+    {"precision", bench_precision, "error against run time of frozen problems, by backend, precision and method"},
     {"stand", bench_stand, "does a structure stand for many steps, and what does a step cost"},
     {"motion", bench_motion, "total error against run time of scenes in motion, and how deep bodies overlap"},
     {"rows", bench_rows, "what one constraint given by rows costs an iteration of a scene"},
@@ -142,6 +144,20 @@ static void cpu_name(char *name, size_t size)
         break;
     }
     fclose(file);
+}
+
+int bench_check_scenes(const char *command, const char *const *scenes, int count)
+{
+    struct sadmm_scene scene;
+    struct sadmm_error error;
+    for (int k = 0; k < count; ++k) {
+        if (sadmm_scene_open(scenes[k], &scene, &error) != SADMM_OK) {
+            fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
+            return 2;
+        }
+        sadmm_scene_close(&scene);
+    }
+    return 0;
 }
 
 int bench_machine_threads(void) { return sadmm_processors(); }

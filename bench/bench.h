@@ -10,6 +10,7 @@
 int bench_kernels(int argc, char **argv);
 int bench_scaling(int argc, char **argv);
 int bench_convergence(int argc, char **argv);
+int bench_precision(int argc, char **argv);
 int bench_stand(int argc, char **argv);
 int bench_motion(int argc, char **argv);
 int bench_rows(int argc, char **argv);
@@ -24,6 +25,9 @@ double bench_memory_bandwidth(int threads);
 /* The CPU's or the accelerator's name. */
 void bench_runs_on(sadmm_backend backend, char *name, size_t size);
 int bench_machine_threads(void);
+
+/* Are all of them scenes? Else says on standard error which is not; returns 0 or the exit status of wrong usage. */
+int bench_check_scenes(const char *command, const char *const *scenes, int count);
 
 /* A field of a CSV: quoted, on one line. */
 void bench_write_csv_text(FILE *out, const char *text);

@@ -78,7 +78,7 @@ static void progress(const struct bench *b, const char *what, int method)
 static void measure_problem(struct bench *b, struct set_problem *problem)
 {
     struct sadmm_error error = {SADMM_OK, ""};
-    struct cold_plan plan = {(int)b->o->limit, b->o->quick ? 1 : 20};
+    const struct cold_plan plan = {.limit = (int)b->o->limit, .time_ms = b->o->quick ? 1 : 20};
     for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
         if (!wanted_method(b->o, method) || interrupted()) continue;
         progress(b, problem->name, method);
@@ -162,20 +162,6 @@ static void measure_backend(struct bench *b, sadmm_backend backend, sadmm_precis
 
 /* ---- command line ---------------------------------------------------------------------------------------------- */
 
-static int check_scenes(const struct options *o)
-{
-    struct sadmm_scene scene;
-    struct sadmm_error error;
-    for (int k = 0; k < o->scene_count; ++k) {
-        if (sadmm_scene_open(o->scenes[k], &scene, &error) != SADMM_OK) {
-            fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
-            return 2;
-        }
-        sadmm_scene_close(&scene);
-    }
-    return 0;
-}
-
 static int parse(int argc, char **argv, struct options *o)
 {
     static const struct bench_word parts[] = {{"cold", PART_COLD}, {"warm", PART_WARM}};
@@ -199,7 +185,7 @@ static int parse(int argc, char **argv, struct options *o)
         BENCH_TEXT("csv", "FILE|-", &o->csv, "the rows as CSV"),
     };
     const int code = bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
-    return code ? code : check_scenes(o);
+    return code ? code : bench_check_scenes(command, o->scenes, o->scene_count);
 }
 
 int bench_convergence(int argc, char **argv)

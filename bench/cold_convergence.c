@@ -4,15 +4,16 @@
 
 #include "cli/interrupt.h"
 #include "core/base/clock.h"
+#include "core/base/memory.h"
 #include "core/base/settings_fields.h"
 #include "core/solve/schedule.h"
 
-enum { MOST_SAMPLES = 1280, MOST_REPEATS = 15 };
+enum { MOST_SAMPLES = 1280, MOST_REPEATS = 15, ENOUGH_IN_A_ROW = 3 };
 static const double tolerances[] = {1e-3, 1e-4, 1e-6};
 
 struct sample {
     int iterations;
-    double ncp_max, ncp_balanced, momentum_max, ms;
+    double ncp_max, ncp_balanced, momentum_max, distance, ms;
 };
 
 struct cold {
@@ -20,6 +21,7 @@ struct cold {
     const struct cold_plan *plan;
     const struct series *series;
     sadmm_settings settings;
+    double *velocities; /* with a reference */
     struct sadmm_error *error;
 };
 
@@ -35,7 +37,7 @@ static sadmm_status solve(struct cold *c, int iterations, struct sample *s)
     sadmm_solve_report report;
     sadmm_certificate balanced;
     c->settings.iterations = iterations;
-    *s = (struct sample){iterations, INFINITY, INFINITY, INFINITY, NAN};
+    *s = (struct sample){iterations, INFINITY, INFINITY, INFINITY, NAN, NAN};
     sadmm_status status = sadmm_problem_solve(problem, c->series->backend, c->series->precision, &c->settings, &report);
     if (status == SADMM_ERROR_NON_FINITE) return SADMM_OK;
     TRY(check(c, status));
@@ -45,6 +47,9 @@ static sadmm_status solve(struct cold *c, int iterations, struct sample *s)
     s->momentum_max = report.certificate.momentum_max;
     s->ncp_balanced = balanced.ncp_max;
     s->ms = report.solve_ms;
+    if (!c->velocities) return SADMM_OK;
+    TRY(check(c, sadmm_problem_get_solution(problem, c->velocities, NULL, NULL)));
+    s->distance = reference_distance(c->plan->reference, c->velocities);
     return SADMM_OK;
 }
 
@@ -69,6 +74,7 @@ static sadmm_status add(struct cold *c, struct rows *rows, struct row *row, cons
     row->ncp_max = s->ncp_max;
     row->ncp_balanced = s->ncp_balanced;
     row->momentum_max = s->momentum_max;
+    row->distance = s->distance;
     row->ms = s->ms;
     return rows_add(rows, row) ? SADMM_OK : sadmm_fail_memory(c->error, "the rows");
 }
@@ -109,13 +115,47 @@ static int next_sample(int iterations, int density)
     return next;
 }
 
+/* The curve, and all samples. */
+static sadmm_status sample_curve(struct cold *c, struct rows *rows, struct row *row, struct sample *samples, int *count)
+{
+    const int density = c->plan->density > 0 ? c->plan->density : density_for(c->problem);
+    int below_in_a_row = 0;
+    for (int k = 1; k <= c->plan->limit && *count < MOST_SAMPLES && !interrupted(); k = next_sample(k, density)) {
+        struct sample *s = &samples[(*count)++];
+        TRY(solve(c, k, s));
+        if (is_curve_point(k)) {
+            TRY(time_solve(c, s));
+            TRY(add(c, rows, row, s));
+        }
+        below_in_a_row = below(s, c->plan->enough) ? below_in_a_row + 1 : 0;
+        if (below_in_a_row >= ENOUGH_IN_A_ROW && is_curve_point(k)) break;
+    }
+    return SADMM_OK;
+}
+
+static sadmm_status converge(struct cold *c, struct rows *rows, struct row *row)
+{
+    struct sample samples[MOST_SAMPLES];
+    int count = 0;
+    TRY(sample_curve(c, rows, row, samples, &count));
+    row->kind = ROW_COUNT;
+    for (size_t t = 0; t < sizeof tolerances / sizeof *tolerances && !interrupted(); ++t) {
+        int first = count; /* of those that stay below */
+        while (first > 0 && below(&samples[first - 1], tolerances[t])) --first;
+        struct sample reached = first < count ? samples[first] : (struct sample){0, NAN, NAN, NAN, NAN, NAN};
+        if (first < count) TRY(refine(c, tolerances[t], first > 0 ? samples[first - 1].iterations : 0, &reached));
+        row->tolerance = tolerances[t];
+        snprintf(row->status, sizeof row->status, first < count ? "ok" : "not reached");
+        TRY(add(c, rows, row, &reached));
+    }
+    return SADMM_OK;
+}
+
 sadmm_status cold_convergence(const struct set_problem *problem, sadmm_method method, const struct series *series,
                               const struct cold_plan *plan, struct rows *rows, struct sadmm_error *error)
 {
-    struct sample samples[MOST_SAMPLES];
     struct cold c = {
         .problem = problem, .plan = plan, .series = series, .settings = sadmm_settings_default(), .error = error};
-    int count = 0, density = density_for(problem);
     sadmm_settings_fix_work(&c.settings);
     c.settings.method = method;
     c.settings.dt = problem->dt;
@@ -128,21 +168,11 @@ sadmm_status cold_convergence(const struct set_problem *problem, sadmm_method me
     row.contacts = sadmm_problem_contact_count(problem->problem);
     row.blocks = sadmm_problem_block_count(problem->problem);
     row.limit = plan->limit;
-    for (int k = 1; k <= plan->limit && count < MOST_SAMPLES && !interrupted(); k = next_sample(k, density), ++count) {
-        TRY(solve(&c, k, &samples[count]));
-        if (!is_curve_point(k)) continue;
-        TRY(time_solve(&c, &samples[count]));
-        TRY(add(&c, rows, &row, &samples[count]));
+    if (plan->reference) {
+        c.velocities = sadmm_alloc((size_t)row.bodies, 6 * sizeof *c.velocities);
+        if (!c.velocities) return sadmm_fail_memory(error, "the velocities");
     }
-    row.kind = ROW_COUNT;
-    for (size_t t = 0; t < sizeof tolerances / sizeof *tolerances && !interrupted(); ++t) {
-        int first = count; /* of those that stay below */
-        while (first > 0 && below(&samples[first - 1], tolerances[t])) --first;
-        struct sample reached = first < count ? samples[first] : (struct sample){0, NAN, NAN, NAN, NAN};
-        if (first < count) TRY(refine(&c, tolerances[t], first > 0 ? samples[first - 1].iterations : 0, &reached));
-        row.tolerance = tolerances[t];
-        snprintf(row.status, sizeof row.status, first < count ? "ok" : "not reached");
-        TRY(add(&c, rows, &row, &reached));
-    }
-    return SADMM_OK;
+    const sadmm_status status = converge(&c, rows, &row);
+    sadmm_free(c.velocities);
+    return status;
 }

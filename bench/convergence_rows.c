@@ -18,6 +18,7 @@ struct row row_start(enum row_kind kind, const char *name, sadmm_method method, 
                       .ncp_max = NAN,
                       .ncp_balanced = NAN,
                       .momentum_max = NAN,
+                      .distance = NAN,
                       .ms = NAN,
                       .ncp_median = NAN,
                       .ncp_last = NAN,
@@ -36,8 +37,7 @@ void rows_write_header(FILE *csv)
 {
     fputs("kind,name,method,backend,precision,threads,runs_on,bodies,contacts,blocks,limit,iterations,tolerance,"
           "ncp_max,ncp_balanced,momentum_max,ms,ncp_median,ncp_last,settle_s,energy_excess_m,penetration_m,limited,"
-          "commit,"
-          "status\n",
+          "distance,commit,status\n",
           csv);
 }
 
@@ -65,7 +65,8 @@ static void write_row(FILE *out, const struct row *r)
     write_integer(out, r->limit);
     write_integer(out, r->iterations);
     const double numbers[] = {r->tolerance, r->ncp_max,  r->ncp_balanced,  r->momentum_max, r->ms,     r->ncp_median,
-                              r->ncp_last,  r->settle_s, r->energy_excess, r->penetration,  r->limited};
+                              r->ncp_last,  r->settle_s, r->energy_excess, r->penetration,  r->limited,
+                              r->distance};
     for (size_t k = 0; k < sizeof numbers / sizeof *numbers; ++k) write_number(out, numbers[k]);
     fprintf(out, ",%s,", sadmm_build_commit());
     bench_write_csv_text(out, r->status);

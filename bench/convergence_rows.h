@@ -33,6 +33,7 @@ struct row {
     int iterations;                             /* COUNT: needed; CURVE: done; WARM: a step */
     double tolerance;                           /* COUNT, m/s */
     double ncp_max, ncp_balanced, momentum_max; /* CURVE, COUNT at its iterations; WARM: medians */
+    double distance;                            /* CURVE, COUNT: from a reference solution, m/s */
     double ms;                                  /* COUNT, CURVE: of the solve; WARM: of a step (median) */
     double ncp_median, ncp_last, settle_s, energy_excess, penetration; /* WARM */
     double limited; /* WARM: share of steps in which an island was slowed down (sadmm_step_report) */

@@ -5,7 +5,8 @@ of warm steps against the iterations a step, a panel a scene.
     subadmm-bench convergence --csv convergence.csv
     bench/plot_convergence.py convergence.csv docs/convergence
 
-writes docs/convergence_iterations.png and docs/convergence_warm.png, as bench/report.py does. Needs matplotlib.
+writes docs/convergence_iterations.png, docs/convergence_time.png and docs/convergence_warm.png; what was not
+measured is left out. The CSV of `subadmm-bench precision` has curves, too. Needs matplotlib.
 """
 import argparse
 import csv
@@ -27,7 +28,7 @@ def read_curves(paths, kind, x, y):
     for path in paths:
         with open(path, newline="") as file:
             for row in csv.DictReader(line for line in file if not line.startswith("#")):
-                point = number(row[x]), number(row[y])
+                point = number(row.get(x, "")), number(row[y])
                 if row["kind"] != kind or not all(math.isfinite(value) for value in point):
                     continue
                 series = f'{row["backend"]} {row["precision"]}'
@@ -77,6 +78,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("csv", nargs="+", help="written by subadmm-bench convergence --csv")
     parser.add_argument("prefix", help="of the pictures' paths")
+    parser.add_argument("--only", choices=("iterations", "time", "warm"), help="of the pictures")
     parser.add_argument("--suffix", default="png", help="png (default), svg or pdf")
     arguments = parser.parse_args()
     try:
@@ -87,9 +89,11 @@ def main():
     import matplotlib.pyplot as plt
 
     error = "error, m/s"
-    for kind, x_label, name in (("curve", "iterations", "iterations"), ("warm", "iterations a step", "warm")):
-        draw(plt, read_curves(arguments.csv, kind, "iterations", "ncp_balanced"),
-             f"{arguments.prefix}_{name}.{arguments.suffix}", x_label, error)
+    for kind, x, x_label, name in (("curve", "iterations", "iterations", "iterations"), ("curve", "ms", "ms", "time"),
+                                   ("warm", "iterations", "iterations a step", "warm")):
+        if arguments.only in (None, name):
+            draw(plt, read_curves(arguments.csv, kind, x, "ncp_balanced"),
+                 f"{arguments.prefix}_{name}.{arguments.suffix}", x_label, error)
 
 
 if __name__ == "__main__":

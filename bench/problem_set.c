@@ -352,6 +352,15 @@ sadmm_status problem_set_make(size_t index, struct set_problem *out, struct sadm
     return status;
 }
 
+sadmm_status problem_set_freeze(const char *scene, int steps, struct set_problem *out, struct sadmm_error *error)
+{
+    *out = (struct set_problem){.dt = 0.005, .penalty_period = 30};
+    snprintf(out->name, sizeof out->name, "scene %.50s", scene);
+    const sadmm_status status = from_scene(scene, steps, out, error);
+    if (status != SADMM_OK) problem_set_free(out);
+    return status;
+}
+
 sadmm_status problem_set_load(const char *path, struct set_problem *out, struct sadmm_error *error)
 {
     const char *slash = strrchr(path, '/');

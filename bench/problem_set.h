@@ -23,6 +23,8 @@ bool problem_set_quick(size_t index);
 /* Build one; the caller frees it. A scene's problem is that of the step after it has settled by the paper's method with
  * the scene's own settings, in double on the CPU. Errors: those of problems, scenes and worlds. */
 sadmm_status problem_set_make(size_t index, struct set_problem *out, struct sadmm_error *error);
+/* A scene's problem after so many steps. Errors as above. */
+sadmm_status problem_set_freeze(const char *scene, int steps, struct set_problem *out, struct sadmm_error *error);
 /* From an FCLIB file. It has no time step: 5 ms. */
 sadmm_status problem_set_load(const char *path, struct set_problem *out, struct sadmm_error *error);
 void problem_set_free(struct set_problem *problem);

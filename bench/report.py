@@ -28,6 +28,8 @@ import constants
 
 PROJECT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 RESULTS = os.path.join(PROJECT, "docs", "results")
+PRECISION_SCENES = ["vertical_stacks:12", "oblique_stacks:2", "card_houses:1", "sliding_cubes:500", "pile:200",
+                    "settled_pile:1000", "pyramid:30", "chain:20", "ragdolls:4", "grippers:8"]
 SCENES = ["vertical_stacks", "oblique_stacks", "card_houses", "sliding_cubes:2000", "mixed_pile", "hand_demo"]
 LARGE = ["settled_pile:100000", "pile:100000"]
 
@@ -102,11 +104,40 @@ def rows_convergence(tools):
                                          "iterations", "tolerance", "ncp_balanced")}
 
 
-def draw_convergence(path):
-    done = subprocess.run([sys.executable, os.path.join(PROJECT, "bench", "plot_convergence.py"), path,
-                           os.path.join(PROJECT, "docs", "convergence")], check=False)
-    if done.returncode:
-        print("no pictures", file=sys.stderr)
+def rows_precision(tools):
+    scenes = [word for scene in PRECISION_SCENES for word in ("--scene", scene)]
+    text = tools.output([tools.bench, "precision", "--csv", "-", *scenes])
+    for row in csv.DictReader(io.StringIO(text)):
+        if row["kind"] == "curve":
+            yield {key: row[key] for key in ("kind", "name", "method", "backend", "precision", "threads", "contacts",
+                                             "iterations", "ms", "ncp_balanced", "distance")}
+
+
+def draw_curves(path, name, *pictures):
+    for only in pictures:
+        done = subprocess.run([sys.executable, os.path.join(PROJECT, "bench", "plot_convergence.py"), path,
+                               os.path.join(PROJECT, "docs", name), "--only", only], check=False)
+        if done.returncode:
+            print("no picture", file=sys.stderr)
+
+
+def soonest_of(rows):
+    """By which backend, precision, method and iterations a scene comes to an error first, and in how many ms."""
+    scenes = {}
+    for row in rows:
+        scene = scenes.setdefault(row["name"], {})
+        scene.setdefault((row["backend"], row["precision"], row["method"]), []).append(
+            (float(row["ncp_balanced"]), float(row["ms"]), row["iterations"]))
+    for name, runs in scenes.items():
+        line = {"scene": name.removeprefix("scene ")}
+        for level in ("1e-3", "1e-5", "1e-8"):
+            reached = []
+            for run, points in runs.items():
+                bad = max((k for k, point in enumerate(points) if not point[0] <= float(level)), default=-1)
+                if bad + 1 < len(points):
+                    reached.append((points[bad + 1][1], f"{' '.join(run)}, {points[bad + 1][2]}"))
+            line[level] = "{1}: {0:.3g} ms".format(*min(reached)) if reached else "-"
+        yield line
 
 
 def counts_of(rows):
@@ -177,7 +208,11 @@ REPORTS = {
     "motion": Report(rows_motion, columns(**{
         key: key for key in ("motion", "error by dt", "dt/4", "order", "energy left")}), on_the_plane),
     "convergence": Report(rows_convergence, columns(problem="problem", contacts="contacts", paper="`paper`",
-                                                    fast="`fast`"), counts_of, draw_convergence),
+                                                    fast="`fast`"), counts_of,
+                          lambda path: draw_curves(path, "convergence", "iterations", "warm")),
+    "precision": Report(rows_precision, columns(scene="scene", **{level: f"{level} m/s" for level in
+                                                                  ("1e-3", "1e-5", "1e-8")}), soonest_of,
+                        lambda path: draw_curves(path, "precision", "time")),
     "standing": Report(rows_standing, columns(scene="scene", steps="steps", penetration_m="penetration, m",
                                               drift_m="drift, m", ncp="natural map, m/s")),
     "constants": Report(rows_constants),

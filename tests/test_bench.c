@@ -276,6 +276,30 @@ START_TEST(convergence_of_one_problem)
 }
 END_TEST
 
+/* Curves against another method's solution: where the natural map is at rounding, velocities are that solution's. 1e-10:
+ * a natural map of 1e-12 times the problem's condition, some tens. */
+START_TEST(precision_against_a_reference)
+{
+    static struct table table;
+    static char out[MAX_TEXT];
+    char arguments[256];
+    int exact = 0;
+    snprintf(arguments, sizeof arguments, "precision --problem \"stack of 10\" --backend cpu --csv %s", csv_path);
+    ck_assert_int_eq(run(arguments, out), 0);
+    ck_assert_msg(strstr(out, "reference by Newton's method"), "%s", out);
+    ck_assert_msg(strstr(out, "1e-08 m/s first: cpu f64 fast"), "%s", out);
+    read_csv(csv_path, &table);
+    for (int row = 0; row < table.rows; ++row) {
+        if (strcmp(field(&table, row, "kind"), "curve") != 0) continue;
+        const double map = number(&table, row, "ncp_balanced"), distance = number(&table, row, "distance");
+        if (map > 1e-12) continue;
+        ++exact;
+        ck_assert_msg(distance < 1e-10, "natural map %g, distance %g", map, distance);
+    }
+    ck_assert_int_ge(exact, 2); /* paper and fast, in double */
+}
+END_TEST
+
 static const struct {
     const char *arguments, *says;
 } refused[] = {
@@ -298,6 +322,8 @@ static const struct {
     {"scaling --max-seconds nan", "--max-seconds nan: must be"},
     {"scaling --device -1", "--device -1: must be"},
     {"scaling here", "unexpected argument \"here\""},
+    {"precision --scene moon", "moon"},
+    {"precision --limit 0", "--limit 0: must be in [1, 1000000]"},
     {"convergence --method slow", "--method slow: must be paper, fast or both"},
     {"convergence --only hot", "--only hot: must be cold or warm"},
     {"convergence --limit 0", "--limit 0: must be in [1, 1000000]"},
@@ -363,6 +389,7 @@ int main(void)
     tcase_add_test(cases, scaling_says_what_it_skips);
     tcase_add_test(cases, convergence_measures);
     tcase_add_test(cases, convergence_of_one_problem);
+    tcase_add_test(cases, precision_against_a_reference);
     tcase_add_test(cases, stand_reports_what_stands);
     tcase_add_loop_test(cases, bad_options_are_refused, 0, sizeof refused / sizeof *refused);
     tcase_add_test(cases, helps);
