@@ -65,6 +65,24 @@ static inline void add_cluster(sadmm_world *world, const struct cluster *c, cons
     }
 }
 
+/* Balls that fall towards the middle: they hit each other within steps, and then press on each other. */
+static inline void add_bouncing_balls(sadmm_world *world)
+{
+    static const double at[3] = {10, -20, 30};
+    static const struct cluster balls = {SADMM_SHAPE_SPHERE, 125, 0.25, false};
+    add_cluster(world, &balls, at);
+    for (int32_t i = 0; i < sadmm_world_body_count(world); ++i) {
+        sadmm_body_state state = body_state(world, body_at(world, i));
+        for (int k = 0; k < 3; ++k) state.linear_velocity[k] -= 6 * (state.position[k] - at[k]);
+        MUST(world, sadmm_world_set_body_state(world, body_at(world, i), &state));
+    }
+    for (int32_t i = 0; i < sadmm_world_shape_count(world); ++i) {
+        sadmm_shape_id id;
+        MUST(world, sadmm_world_shape_at(world, i, &id));
+        MUST(world, sadmm_world_set_shape_material(world, id, 0.5, 0.5));
+    }
+}
+
 static inline void add_plane(sadmm_world *world, double friction)
 {
     sadmm_body_def body = sadmm_body_def_default();

@@ -63,6 +63,19 @@ START_TEST(clusters_in_flight)
 }
 END_TEST
 
+/* As on the host. */
+START_TEST(clusters_that_bounce)
+{
+    const int precision = _i;
+    sadmm_world *world = begin_world(precision, RUNS - 1, false);
+    use_device(world, precision, 0);
+    add_bouncing_balls(world);
+    for (int k = 0; k < 12; ++k)
+        expect_momentum_kept(world, ALL_MOMENTUM, momentum_tolerance((sadmm_precision)precision), "balls that bounce");
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 START_TEST(bodies_on_ice)
 {
     const int precision = _i / RUNS, run = _i % RUNS;
@@ -169,6 +182,7 @@ int main(void)
     const int parts = tested_precisions();
     Suite *suite = suite_create("cuda_momentum");
     ADD_CASE(suite, clusters_in_flight, 0, RUNS * parts);
+    ADD_CASE(suite, clusters_that_bounce, 0, parts);
     ADD_CASE(suite, bodies_on_ice, 0, RUNS * parts);
     ADD_CASE(suite, mechanisms, 0, RUNS * parts);
     ADD_CASE(suite, mixtures_agree, 0, RUNS * parts);

@@ -217,6 +217,21 @@ START_TEST(clusters_in_flight)
 }
 END_TEST
 
+/* What was hit moves by the velocity that it ends with, so that its contacts do not roll (core/model/rolling.h). */
+START_TEST(clusters_that_bounce)
+{
+    sadmm_world *world = empty_world(engines[_i].backend, engines[_i].precision, SADMM_METHOD_FAST, 20, false);
+    int hits = 0;
+    add_bouncing_balls(world);
+    for (int k = 0; k < 30; ++k) {
+        expect_momentum_kept(world, ALL_MOMENTUM, momentum_tolerance(engines[_i].precision), "balls that bounce");
+        hits += sadmm_world_contact_count(world) - world_report(world).contacts;
+    }
+    ck_assert_int_gt(hits, 100);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 START_TEST(a_large_cluster)
 {
     for (int engine = 1; engine < ENGINES; ++engine) /* ref takes long */
@@ -408,6 +423,7 @@ int main(void)
     tcase_set_timeout(worlds, 120);
     if (!races_are_looked_for()) {
         tcase_add_loop_test(worlds, clusters_in_flight, 0, ENGINES * BUDGETS);
+        tcase_add_loop_test(worlds, clusters_that_bounce, 0, ENGINES);
         tcase_add_loop_test(worlds, a_large_cluster, 0, BUDGETS);
         tcase_add_loop_test(worlds, mechanisms, 0, 2 * ENGINES * BUDGETS);
         tcase_add_loop_test(worlds, bodies_on_ice, 0, ENGINES * BUDGETS);

@@ -151,7 +151,7 @@ static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next,
                   next[i].velocity);
         rolling_forget(&next[i]);
         next[i].was_hit = 0;
-        next[i].mean = kind == TRAPEZOID_OWN;
+        next[i].mean = body_moves_by_mean(start, kind);
     }
     return SADMM_OK;
 }

@@ -64,7 +64,7 @@ static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int
     for (int k = 0; k < 6; ++k) wide[k] += v.raw.system.support_motion[6 * (size_t)i + (size_t)k];
 }
 
-/* Body i goes to `place`; mean: by the mean of its velocities. */
+/* Body i goes to `place`; mean: by the mean of its velocities, if it was not hit (body_moves_by_mean). */
 static __device__ __forceinline__ void store_moved(const cuda_view &v, int32_t i, const body_before &before,
                                                    const double place[PLACE], bool mean, double dt)
 {
@@ -75,7 +75,7 @@ static __device__ __forceinline__ void store_moved(const cuda_view &v, int32_t i
     for (int k = 0; k < 6; ++k) next.velocity[k] = place[7 + k];
     rolling_forget(&next);
     next.was_hit = 0;
-    next.mean = mean;
+    next.mean = mean && !before.body.was_hit;
     extrapolation_keep(&extrapolation, &before.body, &next, dt);
     store_first<offsetof(struct sadmm_rigid, owed)>(next, &v.step.after[i]); /* nothing is owed yet */
     v.step.extrapolation_after[i] = extrapolation;

@@ -117,7 +117,7 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
     const enum trapezoid_kind kind = body_trapezoid_kind(&v.raw.system.rigid[i], island, own);
     move_body(&v.raw.system.rigid[i], halfway_of(v, i), velocity, v.model.settings->dt, v.model.settings->gravity, kind,
               out);
-    out[PLACE] = kind == TRAPEZOID_OWN;
+    out[PLACE] = body_moves_by_mean(&v.raw.system.rigid[i], kind);
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)

@@ -20,6 +20,13 @@ SADMM_INLINE void body_trapezoid(const struct sadmm_rigid *body, const double be
     for (int k = 0; k < 3; ++k) correction[k] = body->was_hit ? 0 : correction[k];
 }
 
+/* Does it move by the mean of its velocities (sadmm_rigid.mean), so that its contacts may roll? What was hit moves by
+ * the velocity that it ends with. */
+SADMM_INLINE bool body_moves_by_mean(const struct sadmm_rigid *body, enum trapezoid_kind kind)
+{
+    return kind == TRAPEZOID_OWN && !body->was_hit;
+}
+
 /* Bits of the island that a contact gives it by itself. inner: between two dynamic bodies. */
 SADMM_INLINE int body_contact_touch(bool inner, double friction)
 {

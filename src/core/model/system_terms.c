@@ -84,7 +84,7 @@ static void advance(const struct sadmm_rigid *body, const double velocity[6], co
     sadmm_advance_later(body, next);
     spin_move_from(body, trapezoid->halfway, velocity, mean, trapezoid->kind != TRAPEZOID_OWN, dt, next->position,
                    next->orientation, next->velocity);
-    next->mean = trapezoid->kind == TRAPEZOID_OWN;
+    next->mean = body_moves_by_mean(body, trapezoid->kind);
 }
 
 void sadmm_advance(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
