@@ -124,10 +124,8 @@ static void gas(struct stress *s)
     stress_check(s, "energy lost, share", 1 - stress_sum(s).kinetic / start, stress_by(s, 1e-3, 1e-3));
 }
 
-/* Three rods with moments of their own, in a row from a fixed point, swing from the level: on hinges or ball joints. */
-static const char *const links[] = {"hinges", "ball joints"};
-
-static void mechanism(struct stress *s)
+/* Rods with moments of their own, in a row from a fixed point, swing from the level. */
+static void swing(struct stress *s, int rods, sadmm_joint_kind kind)
 {
     const double seconds = stress_seconds(s, 2, 1000), length = 0.3;
     double along_y[4], mass = 0;
@@ -135,20 +133,20 @@ static void mechanism(struct stress *s)
     stress_turn(0, M_PI / 2, along_y);
     s->def.settings.dt = s->value;
     stress_open(s, STRESS_G);
-    joint.kind = s->variant ? SADMM_JOINT_SPHERICAL : SADMM_JOINT_REVOLUTE;
-    for (int k = 0; k < 3; ++k) {
+    joint.kind = kind;
+    for (int k = 0; k < rods; ++k) {
         const struct stress_body rod = {.shape = SADMM_SHAPE_BOX,
                                         .size = {length / 2, 0.05, 0.01 * (k + 1)},
                                         .mass = 1 + k,
                                         .ghost = true,
                                         .position = {length * (k + 0.5), 0, 0},
-                                        .spin = {s->variant ? 5 * (k + 1) : 0, 0, 0}};
+                                        .spin = {kind == SADMM_JOINT_SPHERICAL ? 5 * (k + 1) : 0, 0, 0}};
         joint.body_a = joint.body_b;
         joint.body_b = stress_add(s, &rod);
         stress_join(s, &joint, length * k, 0, 0, along_y);
         mass += rod.mass;
     }
-    const double start = energy(s), scale = mass * STRESS_G * 3 * length;
+    const double start = energy(s), scale = mass * STRESS_G * rods * length;
     double end = start;
     while (s->time < seconds && stress_step(s)) {
         end = energy(s);
@@ -157,6 +155,11 @@ static void mechanism(struct stress *s)
     }
     stress_check(s, "energy lost, share", (start - end) / scale, 0.1);
 }
+
+static void pendulum(struct stress *s) { swing(s, 1, SADMM_JOINT_REVOLUTE); }
+
+static const char *const links[] = {"hinges", "ball joints"};
+static void mechanism(struct stress *s) { swing(s, 3, s->variant ? SADMM_JOINT_SPHERICAL : SADMM_JOINT_REVOLUTE); }
 
 static const struct stress_case cases[] = {
     {.name = "rolling",
@@ -191,8 +194,15 @@ static const struct stress_case cases[] = {
      .value_count = 3,
      .quick = 0x2,
      .run = gas},
+    {.name = "pendulum",
+     .about = "a rod on a hinge swings from the level: energy, joint",
+     .parameter = "dt, s",
+     .values = {2.5e-4, 1e-3, 5e-3},
+     .value_count = 3,
+     .quick = 0x2,
+     .run = pendulum},
     {.name = "mechanism",
-     .about = "three rods of unequal moments swing from the level: energy, joints",
+     .about = "three rods of unequal moments in a row swing from the level: energy, joints",
      .parameter = "dt, s",
      .values = {2.5e-4, 1e-3, 5e-3},
      .value_count = 3,
