@@ -276,8 +276,8 @@ START_TEST(convergence_of_one_problem)
 }
 END_TEST
 
-/* Curves against another method's solution: where the natural map is at rounding, velocities are that solution's. 1e-10:
- * a natural map of 1e-12 times the problem's condition, some tens. */
+/* Curves against another method's solution: where the natural map is at rounding, velocities are that solution's.
+ * 1e-10: a natural map of 1e-12 times the problem's condition, some tens. */
 START_TEST(precision_against_a_reference)
 {
     static struct table table;

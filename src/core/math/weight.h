@@ -15,7 +15,15 @@
  * 20, 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
 enum { WEIGHT_FIRST_UPDATE = 5, WEIGHT_DOUBLE_BELOW = 40 }; /* measured: bench/constants.py, cold */
 
-SADMM_INLINE int weight_next_update(int at) { return at < WEIGHT_DOUBLE_BELOW ? 2 * at : at + at / 2; }
+/* ADMM is known to converge with weights that change finitely often (He, Yang and Wang, J. Optim. Theory Appl. 106,
+ * 2000). So many iterations have found the loads; heaps at 1e-6 m/s were thrown back to 1e-2 by changes after them. */
+enum { WEIGHT_LAST_UPDATE = 1000, WEIGHT_NO_UPDATE = 1 << 30 };
+
+SADMM_INLINE int weight_next_update(int at)
+{
+    const int next = at < WEIGHT_DOUBLE_BELOW ? 2 * at : at + at / 2;
+    return next <= WEIGHT_LAST_UPDATE ? next : WEIGHT_NO_UPDATE;
+}
 
 /* phi. Contacts: loads that have not been found yet are the ones to come. Joints and springs hold in all directions,
  * loaded or not; but a mechanism moves along what none of its joints holds, which no body knows by itself, and an
