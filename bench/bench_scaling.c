@@ -116,7 +116,8 @@ static void write_row(const struct sinks *out, const struct row *row)
 /* False: something failed (what is skipped has not failed). */
 static bool run_row(const struct options *o, struct series *s, long size, const struct sinks *out)
 {
-    struct scene_timing_plan plan = {(int)o->warm_up, (int)o->steps, (int)o->certified, o->max_seconds};
+    const struct scene_timing_plan plan = {.warm_up = (int)o->warm_up, .steps = (int)o->steps,
+                                           .certified = (int)o->certified, .seconds = o->max_seconds};
     struct sadmm_scene scene;
     struct sadmm_error error = {SADMM_OK, ""};
     char spec[96];

@@ -28,6 +28,7 @@ import constants
 
 PROJECT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 RESULTS = os.path.join(PROJECT, "docs", "results")
+ABLATION_SCENES = ["vertical_stacks", "card_houses:1", "pile:300", "ragdolls:4", "hand_demo"]
 PRECISION_SCENES = ["vertical_stacks:12", "oblique_stacks:2", "card_houses:1", "sliding_cubes:500", "pile:200",
                     "settled_pile:1000", "pyramid:30", "chain:20", "ragdolls:4", "grippers:8"]
 SCENES = ["vertical_stacks", "oblique_stacks", "card_houses", "sliding_cubes:2000", "mixed_pile", "hand_demo"]
@@ -140,6 +141,20 @@ def soonest_of(rows):
         yield line
 
 
+def rows_ablation(tools):
+    scenes = [word for scene in ABLATION_SCENES for word in ("--scene", scene)]
+    yield from csv.DictReader(io.StringIO(tools.output([tools.bench, "ablation", "--csv", "-", *scenes])))
+
+
+def times_and_errors_of(rows):
+    """What is varied: how many times as long a step takes, and its error, scene by scene."""
+    lines = {}
+    for row in rows:
+        line = lines.setdefault(row["name"], {"name": row["name"], "what": row["what"]})
+        line[row["scene"]] = f"{float(row['times']):.2f}, {float(row['ncp_max']):.0e}"
+    return list(lines.values())
+
+
 def counts_of(rows):
     """Cold problems: iterations to 1e-6 m/s, the methods beside each other."""
     problems = {}
@@ -213,6 +228,8 @@ REPORTS = {
     "precision": Report(rows_precision, columns(scene="scene", **{level: f"{level} m/s" for level in
                                                                   ("1e-3", "1e-5", "1e-8")}), soonest_of,
                         lambda path: draw_curves(path, "precision", "time")),
+    "ablation": Report(rows_ablation, columns(name="", what="what", **{scene: scene for scene in ABLATION_SCENES}),
+                       times_and_errors_of),
     "standing": Report(rows_standing, columns(scene="scene", steps="steps", penetration_m="penetration, m",
                                               drift_m="drift, m", ncp="natural map, m/s")),
     "constants": Report(rows_constants),

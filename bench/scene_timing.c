@@ -104,6 +104,7 @@ sadmm_status scene_timing_run(const struct sadmm_scene *scene, const struct scen
     if (!times) return sadmm_fail_memory(error, "the times");
     sadmm_status status = sadmm_scene_build(scene, &w.world, error);
     timing->build_s = 1e-3 * (sadmm_clock_ms() - w.begin);
+    if (status == SADMM_OK && plan->change) status = fail(w.world, plan->change(w.world), error);
     if (status == SADMM_OK) status = run(&w, plan, times, error);
     sadmm_world_destroy(w.world);
     free(times);

@@ -9,6 +9,7 @@ struct scene_timing_plan {
     int steps;      /* timed steps */
     int certified;  /* further steps, not timed, whose certificates are measured */
     double seconds; /* no timed step is begun after that much time, the building of the world included */
+    sadmm_status (*change)(sadmm_world *); /* of the world before its first step; NULL: none */
 };
 
 struct scene_timing {

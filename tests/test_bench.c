@@ -300,6 +300,32 @@ START_TEST(precision_against_a_reference)
 }
 END_TEST
 
+/* Every variation is measured; what only measures changes no bit, what solves differently does. */
+START_TEST(ablation_measures)
+{
+    static struct table table;
+    static char out[MAX_TEXT];
+    char arguments[256];
+    int same = 0, other = 0, added = 0;
+    snprintf(arguments, sizeof arguments, "ablation --quick --csv %s", csv_path);
+    const int code = run(arguments, out);
+    ck_assert_msg(code == 0, "exit code %d\n%s", code, out);
+    read_csv(csv_path, &table);
+    for (int row = 0; row < table.rows; ++row) {
+        const char *name = field(&table, row, "name"), *bits = field(&table, row, "same");
+        const bool measures = !strcmp(name, "certificate") || !strcmp(name, "residuals") || !strcmp(name, "wrenches"),
+                   solves = !strcmp(name, "half") || !strcmp(name, "method") || !strcmp(name, "precision");
+        ck_assert(number(&table, row, "total_ms") > 0 && number(&table, row, "times") > 0);
+        if (measures || row == 0) ck_assert_msg(!strcmp(bits, "yes"), "%s: %s", name, bits);
+        if (solves) ck_assert_msg(!strcmp(bits, "no"), "%s: %s", name, bits);
+        same += measures;
+        other += solves;
+        added += !*bits;
+    }
+    ck_assert(same == 3 && other == 3 && added >= 4);
+}
+END_TEST
+
 static const struct {
     const char *arguments, *says;
 } refused[] = {
@@ -323,6 +349,7 @@ static const struct {
     {"scaling --device -1", "--device -1: must be"},
     {"scaling here", "unexpected argument \"here\""},
     {"precision --scene moon", "moon"},
+    {"ablation --repeats 0", "--repeats 0: must be in [1, 1000]"},
     {"precision --limit 0", "--limit 0: must be in [1, 1000000]"},
     {"convergence --method slow", "--method slow: must be paper, fast or both"},
     {"convergence --only hot", "--only hot: must be cold or warm"},
@@ -390,6 +417,7 @@ int main(void)
     tcase_add_test(cases, convergence_measures);
     tcase_add_test(cases, convergence_of_one_problem);
     tcase_add_test(cases, precision_against_a_reference);
+    tcase_add_test(cases, ablation_measures);
     tcase_add_test(cases, stand_reports_what_stands);
     tcase_add_loop_test(cases, bad_options_are_refused, 0, sizeof refused / sizeof *refused);
     tcase_add_test(cases, helps);
