@@ -1,5 +1,5 @@
 /* subadmm-bench ablation: what each thing costs that a step does or leaves out, and what it gives: time and error with
- * and without it. Either a setting is the other way round, or something is added to the scene that it does not need, far
+ * and without it. Either a setting is the other way round, or something is added that the scene does not need, far
  * away: one joint, one kinematic body, one body of another kind. */
 #include <math.h>
 #include <string.h>

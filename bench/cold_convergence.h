@@ -22,7 +22,8 @@ struct cold_plan {
 
 /* Adds a ROW_CURVE for 1, 2, 3, 5, 7, 10, ... iterations, and a ROW_COUNT for 1e-3, 1e-4 and 1e-6 m/s: the fewest
  * iterations after which the error stays below, as far as solves with 7 (large problems) to 70 counts between k and 2 k
- * (plan->density) can tell. A solve that fails (not finite) counts as an error above every tolerance. Errors: OUT_OF_MEMORY, UNAVAILABLE, ... */
+ * (plan->density) can tell. A solve that fails (not finite) counts as an error above every tolerance. Errors:
+ * OUT_OF_MEMORY, UNAVAILABLE, ... */
 sadmm_status cold_convergence(const struct set_problem *problem, sadmm_method method, const struct series *series,
                               const struct cold_plan *plan, struct rows *rows, struct sadmm_error *error);
 

@@ -2,6 +2,7 @@
  * iterations, and as the host solves them. */
 #include "cuda_worlds.h"
 #include "fewer.h"
+#include "grip_worlds.h"
 
 /* Scenes whose islands are trees of joints with contacts, the steps of them from which on they are compared, and how
  * many points an island may have: of 8 some ragdolls have more, and iterate beside others. */
@@ -123,11 +124,37 @@ START_TEST(what_drives_ask_for_is_done_as_by_the_host)
 }
 END_TEST
 
+/* As on the host: impulses of up to 1e5 m/s by a jaw's mass are solved to what rounding leaves of them. */
+START_TEST(strong_jaws_stop_at_what_they_grip)
+{
+    static const double forces[] = {2e5, 4e5, 8e5, 2e6};
+    for (int k = 0; k < 4; ++k) {
+        sadmm_world_def def = sadmm_world_def_default();
+        def.backend = SADMM_BACKEND_CPU, def.precision = (sadmm_precision)_i;
+        def.settings.threads = 1;
+        struct grip grip = make_grip(&def, 2, 1e4, 0.1, 0.5, forces[k]);
+        int unsolved = 0;
+        double deepest = 0;
+        MUST(grip.world, sadmm_world_set_body_gravity_scale(grip.world, grip.cube, 0));
+        use_device(grip.world, _i, 0);
+        for (int step = 0; step < 100; ++step) {
+            step_world(grip.world, 1);
+            unsolved += world_report(grip.world).unsolved > 0;
+            deepest = fmax(deepest, world_report(grip.world).penetration_max);
+        }
+        ck_assert_msg(unsolved == 0 && deepest <= 1e-5, "%g N: %d steps unsolved, %g m deep", forces[k], unsolved,
+                      deepest);
+        sadmm_world_destroy(grip.world);
+    }
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("cuda_ncp");
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     ADD_CASE(suite, islands_are_solved_as_by_the_host, 0, CASES * tested_precisions());
     ADD_CASE(suite, what_drives_ask_for_is_done_as_by_the_host, 0, tested_precisions());
+    ADD_CASE(suite, strong_jaws_stop_at_what_they_grip, 0, tested_precisions());
     return run_cuda_suite(suite);
 }
