@@ -155,6 +155,21 @@ def times_and_errors_of(rows):
     return list(lines.values())
 
 
+def verdicts_of(rows):
+    """Case by case: how many rows there are, pass, are at a limit, fail; what is worst."""
+    cases = {}
+    for row in rows:
+        case = cases.setdefault(row["case"], {"case": row["case"], "parameter": row["parameter"], "values": [],
+                                              "pass": 0, "limit": 0, "FAIL": 0})
+        case[row["verdict"]] += 1
+        if row["value"] not in case["values"]:
+            case["values"].append(row["value"])
+    for case in cases.values():
+        values = sorted(case["values"], key=float)
+        span = values[0] if len(values) == 1 else f"{values[0]} to {values[-1]}"
+        yield {**{key: str(value) for key, value in case.items()}, "values": span}
+
+
 def counts_of(rows):
     """Cold problems: iterations to 1e-6 m/s, the methods beside each other."""
     problems = {}
@@ -233,7 +248,8 @@ REPORTS = {
     "standing": Report(rows_standing, columns(scene="scene", steps="steps", penetration_m="penetration, m",
                                               drift_m="drift, m", ncp="natural map, m/s")),
     "constants": Report(rows_constants),
-    "stress": Report(rows_stress),
+    "stress": Report(rows_stress, columns(case="case", parameter="parameter", values="of", **{
+        "pass": "pass", "limit": "limits", "FAIL": "fails"}), lambda rows: list(verdicts_of(rows))),
 }
 SAME_EVERYWHERE = {"scenes"}  # no figure of theirs is measured
 
