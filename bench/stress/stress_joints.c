@@ -245,13 +245,6 @@ static const struct stress_case cases[] = {
      .quick = 0x6,
      .variants = rows,
      .variant_count = 3,
-     .run = contradict,
-     .limits = {{.check = "impulse of a joint, N s",
-                 .from = 0,
-                 .to = 1,
-                 .precisions = STRESS_BOTH,
-                 .bound = 1e10,
-                 .reason =
-                     "locks that disagree press against each other: only the regularization bounds by how much"}}},
+     .run = contradict},
 };
 const struct stress_group stress_joints = {cases, sizeof cases / sizeof *cases};

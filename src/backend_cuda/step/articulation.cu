@@ -11,6 +11,7 @@
 
 /* What a part's threads share. */
 struct articulation_shared {
+    unsigned long long most; /* largest_residual */
     double speed;
     int32_t touched, flag;
     int32_t aborted, pairs; /* as one thread has seen them: a branch beside this one may abort the step at any time */
@@ -286,7 +287,8 @@ static __global__ void __launch_bounds__(ARTICULATION_THREADS)
 #pragma unroll 1
     for (int turn = 0;; ++turn) { /* before the iterations once more, with the stiffness of the forces found */
         load_part<SMALL>(v, p, after, turn > 0, shared);
-        const bool solved = solve_part<false>(p, kept ? v.joints.kept_state : nullptr, &shared->flag, nullptr);
+        const bool solved =
+            solve_part<false>(p, kept ? v.joints.kept_state : nullptr, &shared->flag, &shared->most);
         store_part(v, p, after, solved);
         if (after || turn > 0 || !v.model.warm_start || !stiffen_part(v, p, &shared->flag)) return;
         load_again(v, p);

@@ -242,18 +242,6 @@ static __device__ __forceinline__ double largest_residual(const articulation_vie
     return most;
 }
 
-/* Are rows to be refined? last: their largest residual before the last time. */
-template <bool EXACT>
-static __device__ __forceinline__ bool goes_on(const articulation_view &p, int32_t *shared_flag,
-                                               unsigned long long *shared_most, double *last)
-{
-    if (!EXACT) return any_row(p, shared_flag, [&](int32_t r) { return articulation_needs_refinement(&p, r); });
-    const double residual = largest_residual(p, shared_most);
-    const bool on = residual > ARTICULATION_EXACT && residual < *last / 2;
-    *last = residual;
-    return on;
-}
-
 /* Until no row changes its state. Are all numbers finite then? EXACT: rows are refined as far as they can be
  * (core/solve/articulation_part.h), not only where their regularisation leaves much. */
 template <bool EXACT>
@@ -269,16 +257,31 @@ static __device__ __forceinline__ bool solve_part(const articulation_view &p, co
 #pragma unroll 1
         for (int32_t level = 0; level < p.s.levels; ++level) factor_level(p, level);
         double last = INFINITY;
+        int again = 0;
+        bool relented = false;
 #pragma unroll 1
-        for (int again = 0; again < TIMES; ++again) {
-            if (again && !goes_on<EXACT>(p, shared_flag, shared_most, &last)) break;
-            solve_rows(p, again != 0);
-            if (EXACT && again) continue; /* where they have got to, at the end */
-            changed = any_row(p, shared_flag, [&](int32_t r) { return articulation_change_row(&p, r); });
-            if (changed) break;
+        for (;;) {
+            solve_rows(p, again > 0 && !relented);
+            if (again == 0) {
+                changed = any_row(p, shared_flag, [&](int32_t r) { return articulation_change_row(&p, r); });
+                if (changed) break;
+            }
+            if (relented) break;
+            if (!EXACT && again == 0 &&
+                !any_row(p, shared_flag, [&](int32_t r) { return articulation_needs_refinement(&p, r); }))
+                break;
+            const double residual = largest_residual(p, shared_most);
+            if (again + 1 < TIMES && residual < last / 2 && (!EXACT || residual > ARTICULATION_EXACT)) {
+                last = residual;
+                ++again;
+                continue;
+            }
+            if (again == 0 || !articulation_contradicts_itself(residual, last)) break;
+            each(p.s.columns * SADMM_MAX_ROWS, [&](int32_t r) { articulation_relent(&p, r); });
+            __syncthreads();
+            relented = true;
         }
-        if (EXACT && !changed)
-            changed = any_row(p, shared_flag, [&](int32_t r) { return articulation_change_row(&p, r); });
+        if (again > 0) changed = any_row(p, shared_flag, [&](int32_t r) { return articulation_change_row(&p, r); });
     }
     return !changed && !any_row(p, shared_flag, [&](int32_t r) { /* a column has no more bodies than rows */
         const int32_t k = r % SADMM_MAX_ROWS, a = p.s.side[2 * (r / SADMM_MAX_ROWS)],

@@ -544,6 +544,20 @@ SADMM_INLINE double articulation_residual_size(const struct articulation_view *v
     return v->state[r] == ROW_INSIDE ? fabs(articulation_row_residual(v, r, true, true)) : 0;
 }
 
+/* Do rows contradict each other: have they a residual that a refinement does not make half of what it was? */
+SADMM_INLINE bool articulation_contradicts_itself(double residual, double before)
+{
+    return residual > ARTICULATION_REFINE_ABOVE && !(residual < before / 2);
+}
+
+/* What is left of a row is taken out of its law. All rows can be met then, at the velocities there are, and without the
+ * multipliers that only press them against each other: of the solutions in the sense of least squares the one of least
+ * multipliers. */
+SADMM_INLINE void articulation_relent(const struct articulation_view *v, int32_t r)
+{
+    if (v->state[r] == ROW_INSIDE) v->rows[r].bias -= articulation_row_residual(v, r, true, true);
+}
+
 /* The change of a row's multiplier before and after it has been found. */
 SADMM_INLINE void articulation_put_change(const struct articulation_view *v, int32_t r, bool again, bool found)
 {
