@@ -32,6 +32,8 @@ ABLATION_SCENES = ["vertical_stacks", "card_houses:1", "pile:300", "ragdolls:4",
 PRECISION_SCENES = ["vertical_stacks:12", "oblique_stacks:2", "card_houses:1", "sliding_cubes:500", "pile:200",
                     "settled_pile:1000", "pyramid:30", "chain:20", "ragdolls:4", "grippers:8"]
 SCENES = ["vertical_stacks", "oblique_stacks", "card_houses", "sliding_cubes:2000", "mixed_pile", "hand_demo"]
+PEERS = os.path.join(PROJECT, "bench", "peers", "run.py")
+ENGINES = ["subadmm", "MuJoCo", "Bullet", "ODE"]
 LARGE = ["settled_pile:100000", "pile:100000"]
 
 
@@ -171,10 +173,10 @@ def verdicts_of(rows):
 
 
 def counts_of(rows):
-    """Cold problems: iterations to 1e-6 m/s, the methods beside each other."""
+    """Cold problems: iterations to 1e-6 m/s, the methods beside each other. Those of scenes are in `precision`."""
     problems = {}
     for row in rows:
-        if row["kind"] == "count" and float(row["tolerance"]) == 1e-6:
+        if row["kind"] == "count" and float(row["tolerance"]) == 1e-6 and not row["name"].startswith("scene "):
             problem = problems.setdefault(row["name"], {"problem": row["name"], "contacts": row["contacts"]})
             problem[row["method"]] = row["iterations"] or "> " + row["limit"]
     return list(problems.values())
@@ -213,6 +215,32 @@ def rows_stress(tools):
     yield from csv.DictReader(io.StringIO(done.stdout))
 
 
+def rows_peers(_):
+    """Needs the Python package (PYTHONPATH, or installed) and the engines that are to stand in the table."""
+    text = Tools.output([sys.executable, PEERS, "--csv", "-"])
+    yield from csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
+
+
+def draw_peers(path):
+    picture = os.path.join(PROJECT, "docs", "peers.png")
+    if subprocess.run([sys.executable, PEERS, "--rows", path, "--picture", picture], stdout=subprocess.DEVNULL,
+                      check=False).returncode:
+        print("no picture", file=sys.stderr)
+
+
+def side_by_side(rows):
+    """Of each scene the measure that comes first, and the time of a step: tuned settings, the longer step."""
+    scenes = {}
+    for row in rows:
+        scene = scenes.setdefault(row["scene"], {"scene": row["scene"], "measure": row["first"],
+                                                "dt": float(row["dt"])})
+        if row["settings"] == "tuned" and float(row["dt"]) == scene["dt"]:
+            time = float(row["us_per_step"])
+            scene[row["engine"]] = f"{row[row['first']]} ({time:.{0 if time >= 10 else 1}f})"
+    return [{"scene": scene["scene"], "measure": scene["measure"].replace("_", " "),
+             **{engine: scene.get(engine, "-") for engine in ENGINES}} for scene in scenes.values()]
+
+
 def rows_constants(_):
     return constants.rows()
 
@@ -247,6 +275,8 @@ REPORTS = {
                        times_and_errors_of),
     "standing": Report(rows_standing, columns(scene="scene", steps="steps", penetration_m="penetration, m",
                                               drift_m="drift, m", ncp="natural map, m/s")),
+    "peers": Report(rows_peers, columns(scene="scene", measure="measure", **{name: name for name in ENGINES}),
+                    side_by_side, draw_peers),
     "constants": Report(rows_constants),
     "stress": Report(rows_stress, columns(case="case", parameter="parameter", values="of", **{
         "pass": "pass", "limit": "limits", "FAIL": "fails"}), lambda rows: list(verdicts_of(rows))),

@@ -4,9 +4,11 @@ forces.
 An adapter is a class with
 
     name, version                  as tables show them
-    SETTINGS                       {"default": ..., "tuned": ...}: what is set, as `--list` prints it
-    __init__(scene, dt, settings)  builds; one thread, nothing sleeps
+    SETTINGS                       {"default": ..., "tuned": ...}: what is set, a dict or a text; where there is
+                                   "tuned, smooth", that is taken for scenes in which nothing rubs
+    __init__(scene, dt, settings)  builds, by a key of these; one thread, nothing sleeps
     step(time)                     one step that begins at this time; returns the seconds of the engine's own call
+    only_named                     True: left out where --engine does not name it
     state()                        (poses: bodies x 7, velocities: bodies x 6), in the scene's order
     contacts()                     judge.Contacts of the last step, or None
 
@@ -29,11 +31,14 @@ from scenes import force_at, turn_to
 
 class Subadmm:
     name = "subadmm"
+    only_named = False
     SETTINGS = {
         # As the library comes: error at most 1e-6 m/s a step, in at most 200 iterations.
         "default": {},
         # The error of the solve below that of anything else.
         "tuned": {"tolerance": 1e-9, "iterations": 2000},
+        # What turns far in a step loses accuracy (docs/guide/choose.md, "Time step").
+        "tuned, smooth": {"tolerance": 1e-9, "iterations": 2000, "substeps": 4},
     }
 
     @classmethod
@@ -94,6 +99,7 @@ class Subadmm:
 
 class MuJoCo:
     name = "MuJoCo"
+    only_named = False
     SETTINGS = {
         "default": {},
         # What MuJoCo's own guide says for contacts that are stiff and do not slip ("Tuning", "Preventing slip"):
@@ -119,8 +125,6 @@ class MuJoCo:
 
     def __init__(self, scene, dt, settings):
         self.dt, self.scene = dt, scene
-        if settings == "tuned" and scene.smooth:
-            settings = "tuned, smooth"
         self.model = self.module.MjModel.from_xml_string(self.xml(scene, dt, self.SETTINGS[settings]))
         self.data = self.module.MjData(self.model)
         number = self.module.mj_name2id
@@ -208,6 +212,9 @@ class MuJoCo:
             self.data.qpos[position], self.data.qvel[dof] = now - start, (end - now) / self.dt
         for made, body in self.pressed:
             self.data.xfrc_applied[made, :3] = force_at(body, time)
+        return self.advance()
+
+    def advance(self):
         start = clock.perf_counter()
         self.module.mj_step(self.model, self.data)
         return clock.perf_counter() - start
@@ -242,6 +249,56 @@ class MuJoCo:
                         np.array([data.contact[k].friction[0] for k in rows]), forces, *self.places, self.now)
 
 
+class MuJoCoWarp(MuJoCo):
+    """One world, in single precision; it tells no contact forces here."""
+    name = "MuJoCo-Warp"
+    only_named = True       # made for thousands of worlds on a GPU: its time for one says little
+    SETTINGS = {
+        "default": {},
+        # As for MuJoCo, but for what it lacks: the discrete integrator, and with it shorter solrefs than two steps.
+        "tuned": {"cone": "elliptic", "impratio": 100, "integrator": "implicitfast", "iterations": 200,
+                  "tolerance": 1e-6, "solref_steps": 2, "solimp": "0.99 0.999 0.0001"},
+        "tuned, smooth": {"integrator": "RK4", "iterations": 200, "tolerance": 1e-6, "solref_steps": 2,
+                          "solimp": "0.99 0.999 0.0001"},
+    }
+    MOST = {"nconmax": 2048, "njmax": 8192}     # contacts and rows that it has room for
+
+    @classmethod
+    def find(cls):
+        super().find()
+        try:
+            import mujoco_warp
+            import warp
+        except ImportError as error:
+            raise Missing(f"not installed ({error}): python -m pip install mujoco-warp") from None
+        warp.config.quiet = True
+        cls.device, cls.warp = mujoco_warp, warp
+        cls.version = getattr(mujoco_warp, "__version__", "unknown")
+
+    def __init__(self, scene, dt, settings):
+        super().__init__(scene, dt, settings)
+        self.device_model = self.device.put_model(self.model)
+        self.device_data = self.device.put_data(self.model, self.data, nworld=1, **self.MOST)
+
+    def advance(self):
+        data = self.device_data
+        if self.moved:
+            data.qpos.assign(self.data.qpos[None].astype(np.float32))
+            data.qvel.assign(self.data.qvel[None].astype(np.float32))
+        if self.pressed:
+            data.xfrc_applied.assign(self.data.xfrc_applied[None].astype(np.float32))
+        self.warp.synchronize()
+        start = clock.perf_counter()
+        self.device.step(self.device_model, data)
+        self.warp.synchronize()
+        spent = clock.perf_counter() - start
+        self.data.qpos[:], self.data.qvel[:] = data.qpos.numpy()[0], data.qvel.numpy()[0]
+        return spent
+
+    def contacts(self):
+        return None
+
+
 def quaternion_between(turn, orientation):
     """Of an orientation relative to a frame's matrix."""
     return quaternion_of(turn.T @ matrices(orientation))
@@ -262,5 +319,18 @@ def quaternion_of(m):
     return q / np.linalg.norm(q)
 
 
+def key_of(engine, scene, settings):
+    """Of SETTINGS, for a scene."""
+    smooth = f"{settings}, smooth"
+    return smooth if scene.smooth and smooth in engine.SETTINGS else settings
+
+
+def text_of(engine, key):
+    given = engine.SETTINGS[key]
+    if isinstance(given, str):
+        return given
+    return ", ".join(f"{name} {value}" for name, value in given.items()) or "as it comes"
+
+
 def all_engines(drivers=()):
-    return [Subadmm, MuJoCo, native.Bullet, native.ODE, *native.drivers(drivers)]
+    return [Subadmm, MuJoCo, native.Bullet, native.ODE, MuJoCoWarp, *native.drivers(drivers)]

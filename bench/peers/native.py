@@ -84,6 +84,7 @@ def numbers(values):
 
 class Native:
     """Base of the adapters: `name`, and how to `locate` the library."""
+    only_named = False
 
     @classmethod
     def find(cls):
@@ -96,7 +97,7 @@ class Native:
         self.scene, self.world = scene, None
         moving = [body.shape for body in scene.bodies if body.mass and body.shape]
         self.world = self.library.peer_create(SceneStruct(
-            dt, scene.gravity, scene.friction, scene.restitution, settings == "tuned", scene.smooth,
+            dt, scene.gravity, scene.friction, scene.restitution, settings != "default", scene.smooth,
             bool(moving) and all(shape.kind == "sphere" for shape in moving), "natural_map" in scene.judged))
         self.dt, self.start = dt, None
         if not self.world:

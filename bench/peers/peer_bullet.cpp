@@ -49,8 +49,9 @@ const char *peer_version(void)
 
 const char *peer_settings(int tuned)
 {
-    return tuned ? "1000 iterations or a residual of 1e-20, two friction directions with a cone, split impulse at any "
-                   "depth; joints without contacts: direct solver (btMLCPSolver, Dantzig), ERP 0.8"
+    /* With one friction direction, its default, boxes slide more exactly, but card houses fall and grips are lost. */
+    return tuned ? "1000 iterations or a residual of 1e-30, two friction directions, split impulse at any depth; "
+                   "joints without contacts: direct solver (btMLCPSolver, Dantzig), ERP 0.8"
                  : "10 iterations, split impulse below 4 cm, ERP 0.2";
 }
 
@@ -65,8 +66,8 @@ peer_world *peer_create(const peer_scene *scene)
     btContactSolverInfo &info = w->world->getSolverInfo();
     if (scene->tuned) {
         info.m_numIterations = 1000;
-        info.m_leastSquaresResidualThreshold = 1e-20; /* ends where nothing changes any more */
         info.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+        info.m_leastSquaresResidualThreshold = 1e-30; /* ends where nothing changes any more */
         info.m_splitImpulsePenetrationThreshold = 0;
         if (scene->smooth) info.m_erp = 0.8;
     }

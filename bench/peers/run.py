@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The same scenes in several engines: time of a step, and errors measured from poses.
 
-    bench/peers/run.py                                   all scenes and engines, a table; under an hour
+    bench/peers/run.py                                   all scenes and engines, a table; 20 minutes
     bench/peers/run.py --engine subadmm --engine MuJoCo --scene stack --csv stack.csv --picture stack.png
     bench/peers/run.py --list                            scenes, engines and what is set in them
     bench/peers/run.py --driver Jolt=libpeer_jolt.so     an engine of your own build, behind the functions of peer.h
@@ -30,7 +30,6 @@ import judge
 import scenes
 
 FRAME = 0.01            # between the times at which poses are compared, s
-FINE = 64               # of reference runs: steps in one
 LIMIT = 300.0           # of a run, s of the engine's own time
 
 
@@ -59,42 +58,28 @@ def simulate(engine, scene, dt, settings, seconds, contacts=True):
     return run, costs
 
 
-class References:
-    """Our own runs with fine steps, one a scene."""
-
-    def __init__(self):
-        self.runs = {}
-
-    def of(self, scene, seconds):
-        if not scene.reference:
-            return None
-        if scene.name not in self.runs:
-            engines.Subadmm.find()
-            self.runs[scene.name], _ = simulate(engines.Subadmm, scene, scene.dt / FINE, "tuned", seconds, False)
-        return self.runs[scene.name]
-
-
-def measure(engine, scene, dt, settings, seconds, references):
-    run, costs = simulate(engine, scene, dt, settings, seconds, "natural_map" in scene.judged)
+def measure(engine, scene, dt, settings, seconds):
+    key = engines.key_of(engine, scene, settings)
+    run, costs = simulate(engine, scene, dt, key, seconds, "natural_map" in scene.judged)
     ended = run.times[-1] >= seconds - 1e-9
-    found = judge.judge(scene, run, references.of(scene, seconds)) if ended else dict.fromkeys(scene.judged, math.inf)
+    found = judge.judge(scene, run) if ended else dict.fromkeys(scene.judged, math.inf)
     shown = {name: "" if name not in found or found[name] is None else f"{found[name]:.3g}" for name in judge.UNITS}
     return {"scene": scene.name, "engine": engine.name, "version": engine.version, "settings": settings,
-            "dt": f"{dt:g}", "us_per_step": f"{1e6 * statistics.median(costs):.4g}", "steps": len(costs), **shown}
+            "dt": f"{dt:g}", "us_per_step": f"{1e6 * statistics.median(costs):.4g}", "steps": len(costs), **shown,
+            "first": scene.judged[0], "set": engines.text_of(engine, key)}
 
 
 def rows_of(names, chosen, quick, progress):
-    references = References()
     for name in names:
+        scene = scenes.SCENES[name]()   # once, so that exact motions are integrated once
+        seconds = scene.duration
+        if quick:
+            seconds, scene.settled = max(round(scene.duration / 10 / FRAME), 4) * FRAME, 0.0
         for engine in chosen:
             for settings in ("tuned",) if quick else ("default", "tuned"):
                 for part in (1,) if quick else (1, 4):
-                    scene = scenes.SCENES[name]()
-                    seconds = max(round(scene.duration / 10 / FRAME), 4) * FRAME if quick else scene.duration
-                    if quick and scene.settled:
-                        scene.settled = 0.0
                     progress(f"{name}: {engine.name}, {settings}, dt {scene.dt / part:g}")
-                    yield measure(engine, scene, scene.dt / part, settings, seconds, references)
+                    yield measure(engine, scene, scene.dt / part, settings, seconds)
 
 
 def find_engines(wanted, drivers):
@@ -105,7 +90,7 @@ def find_engines(wanted, drivers):
             sys.exit(f"--engine {name}: must be one of {', '.join(engine.name for engine in known.values())}")
     chosen, missing = [], []
     for key, engine in known.items():
-        if wanted and key not in [name.lower() for name in wanted]:
+        if key not in [name.lower() for name in wanted] if wanted else engine.only_named:
             continue
         try:
             engine.find()
@@ -134,6 +119,11 @@ def write_csv(file, rows, chosen, missing):
     writer.writerows(rows)
 
 
+def read_csv(path):
+    with open(path, encoding="utf-8") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
 def with_unit(measure):
     return measure if judge.UNITS[measure] == "1" else f"{measure}, {judge.UNITS[measure]}"
 
@@ -159,10 +149,11 @@ def draw(rows, path):
         return
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    import matplotlib.ticker
     names = list(dict.fromkeys(row["scene"] for row in rows))
-    wide = min(4, len(names))
+    wide = min(5, len(names))
     figure, axes = plt.subplots(-(-len(names) // wide), wide, squeeze=False,
-                                figsize=(3.6 * wide, 3 * -(-len(names) // wide)))
+                                figsize=(2.9 * wide, 2.6 * -(-len(names) // wide)))
     kinds = list(dict.fromkeys(row["engine"] for row in rows))
     for axis, name in zip(axes.flat, names):
         first = scenes.SCENES[name]().judged[0]
@@ -177,10 +168,11 @@ def draw(rows, path):
         axis.set_title(name, fontsize="small")
         axis.set_ylabel(with_unit(first), fontsize="x-small")
         axis.tick_params(labelsize="x-small")
+        axis.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
         axis.grid(True, alpha=0.3)
     for axis in axes.flat[len(names):]:
         axis.set_visible(False)
-    for axis in axes[-1]:
+    for axis in axes.flat[max(0, len(names) - wide):len(names)]:
         axis.set_xlabel("ms per simulated second", fontsize="x-small")
     marks = [plt.Line2D([], [], marker="o", linestyle="", color=f"C{k}", label=kind) for k, kind in enumerate(kinds)]
     marks += [plt.Line2D([], [], marker=mark, linestyle="", color="0.3", markerfacecolor=face, label=label)
@@ -188,10 +180,6 @@ def draw(rows, path):
     figure.legend(handles=marks, loc="lower center", ncol=len(marks), fontsize="small")
     figure.tight_layout(rect=(0, 0.05, 1, 1))
     figure.savefig(path, dpi=100)
-
-
-def settings_text(given):
-    return ", ".join(f"{key} {value}" for key, value in given.items()) or "as it comes"
 
 
 def print_list(drivers):
@@ -204,8 +192,8 @@ def print_list(drivers):
             print(f"\n{engine.name}: {reason}")
             continue
         print(f"\n{engine.name} {engine.version}")
-        for settings, what in engine.SETTINGS.items():
-            print(f"  {settings}: {what if isinstance(what, str) else settings_text(what)}")
+        for settings in engine.SETTINGS:
+            print(f"  {settings}: {engines.text_of(engine, settings)}")
 
 
 def main():
@@ -214,6 +202,7 @@ def main():
     parser.add_argument("--scene", action="append", default=[], metavar="NAME", help="likewise")
     parser.add_argument("--driver", action="append", default=[], metavar="NAME=FILE",
                         help="an engine behind peer.h, as a shared library")
+    parser.add_argument("--rows", metavar="FILE", help="do not measure; take the rows of such a CSV file")
     parser.add_argument("--csv", metavar="FILE", help="write all rows (-: to standard output)")
     parser.add_argument("--picture", metavar="FILE", help="draw errors against time")
     parser.add_argument("--quick", action="store_true", help="a tenth of the duration, tuned, whole steps only")
@@ -225,6 +214,12 @@ def main():
     for name in args.scene:
         if name not in scenes.SCENES:
             parser.error(f"--scene {name}: must be one of {', '.join(scenes.SCENES)}")
+    if args.rows:
+        rows = read_csv(args.rows)
+        print_table(rows)
+        if args.picture:
+            draw(rows, args.picture)
+        return
     chosen, missing = find_engines(args.engine, args.driver)
     for line in missing:
         print(line, file=sys.stderr)
