@@ -12,8 +12,8 @@
 /* m/s: what is left alone, of the natural map and of the momentum residual; the aim; that of Newton's steps, which
  * solve for the rows in their states. */
 static const double ENOUGH = 1e-9, AIM = 1e-10, NEWTON_AIM = 1e-13;
-/* Of the largest speed that an impulse makes by itself: what rounding leaves of the natural map, with room. A drive of
- * 4e5 N on a jaw of 0.1 kg: 3e4 m/s, and 1e-8 m/s are left. */
+/* Of the largest speed that a drive makes by itself: what rounding leaves of the natural map, with room. A drive of 4e5
+ * N on a jaw of 0.1 kg: 3e4 m/s, and 1e-8 m/s are left. */
 static const double ROUNDING = 1e-12;
 /* m/s: regularisation of contacts in G, that of the one with the largest load, others in proportion: of all impulses
  * that are solutions the least are found. Else a car stands on two wheels across, and which two changes from step to
@@ -431,11 +431,23 @@ static double size_of(const struct island *s, const double *lambda)
     return most;
 }
 
-/* How far what is taken for a solution may be from the laws, m/s: what rounding leaves of its impulses, if the
- * tolerance allows that. */
-static double enough_for(const struct island *s, const double *lambda)
+/* How far what is taken for a solution may be from the laws, m/s: what rounding leaves of the forces of drives, if the
+ * tolerance allows that. Those are given: impulses of contacts and locks may be so large because nothing meets them. */
+static double enough_for(const struct island *s)
 {
-    return fmax(ENOUGH, fmin(s->settings->tolerance, ROUNDING * size_of(s, lambda)));
+    double most = 0;
+    for (int32_t k = 0; k < s->parts; ++k) {
+        const struct articulation_part *part = part_of(s, k);
+        EACH_ARTICULATION_ROW(s->slots, &part->view, r, from)
+        {
+            const struct articulation_row *row = &part->view.rows[r];
+            if (!isfinite(row->lo) || !isfinite(row->hi)) continue;
+            const double force = articulation_clamp(row->lambda + part->view.change[r], row->lo, row->hi);
+            most = fmax(most, fabs(force) * sadmm_articulation_part_scale(part, r));
+            (void)from;
+        }
+    }
+    return fmax(ENOUGH, fmin(s->settings->tolerance, ROUNDING * most));
 }
 
 /* Is what was found taken, which is no solution? Where there is none, bodies that are wedged say, impulses may grow
@@ -575,7 +587,7 @@ static bool solve_island(struct island *s, int32_t label)
     find_contact_velocities(s);
     const double before = fmax(ncp_natural_map(&s->dense), momentum_residual(s));
     d->error[label] = before;
-    if (!(before > enough_for(s, s->dense.lambda))) {
+    if (!(before > enough_for(s))) {
         d->kind[label] |= ISLAND_SOLVED;
         return false;
     }
@@ -586,7 +598,7 @@ static bool solve_island(struct island *s, int32_t label)
     s->gives = false;
     begin_search(s, d->states);
     search(s, G, d->states, d->states + rows, rows);
-    const bool solved = !(s->best > enough_for(s, s->best_lambda)),
+    const bool solved = !(s->best > enough_for(s)),
                wild = s->best < before && has_too_much_energy(s);
     if (solved || (!wild && is_nearer(s, before, size_before))) take(s, label, solved);
     if (solved && !wild) return true;
@@ -594,7 +606,7 @@ static bool solve_island(struct island *s, int32_t label)
     begin_giving(s, d->states, rows);
     search(s, G, d->states, d->states + rows, rows);
     const double missed = s->best_hard / s->settings->correction_speed;
-    const bool gives = !(s->best > enough_for(s, s->best_lambda)) &&
+    const bool gives = !(s->best > enough_for(s)) &&
                        (solved     ? best_energy2(s) <= energy / 2
                         : s->again ? s->best_hard <= nearest
                                    : missed > CANNOT);
