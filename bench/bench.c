@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "bench.h"
+#include "bench_options.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/base/clock.h"
@@ -145,6 +146,14 @@ static void cpu_name(char *name, size_t size)
         break;
     }
     fclose(file);
+}
+
+bool bench_is_available(sadmm_backend backend, sadmm_precision precision, FILE *notes)
+{
+    sadmm_backend_info info;
+    if (sadmm_backend_query(backend, &info) == SADMM_OK && info.available[precision]) return true;
+    fprintf(notes, "%s in %s: not available: %s\n", info.name, bench_precision_name(precision), info.reason);
+    return false;
 }
 
 int bench_check_scenes(const char *command, const char *const *scenes, int count)

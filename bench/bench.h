@@ -27,6 +27,9 @@ double bench_memory_bandwidth(int threads);
 void bench_runs_on(sadmm_backend backend, char *name, size_t size);
 int bench_machine_threads(void);
 
+/* Can a backend run in a precision? Else `notes` says why not. */
+bool bench_is_available(sadmm_backend backend, sadmm_precision precision, FILE *notes);
+
 /* Are all of them scenes? Else says on standard error which is not; returns 0 or the exit status of wrong usage. */
 int bench_check_scenes(const char *command, const char *const *scenes, int count);
 

@@ -145,10 +145,7 @@ static void measure_series(struct bench *b)
 /* Not available although asked for by name: a failure. */
 static void measure_backend(struct bench *b, sadmm_backend backend, sadmm_precision precision)
 {
-    sadmm_backend_info info;
-    sadmm_backend_query(backend, &info);
-    if (!info.available[precision]) {
-        fprintf(stderr, "%s in %s: not available: %s\n", info.name, bench_precision_name(precision), info.reason);
+    if (!bench_is_available(backend, precision, stderr)) {
         if (b->o->backend == (int)backend) b->failed = true;
         return;
     }

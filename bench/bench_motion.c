@@ -109,14 +109,10 @@ static int make_plan(const struct options *o, struct motion_plan *plan)
 
 static bool available(const struct motion_plan *plan)
 {
-    sadmm_backend_info info;
-    sadmm_backend_query(plan->backend, &info);
-    for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
-        if ((plan->precision >= 0 && plan->precision != precision) || info.available[precision]) continue;
-        fprintf(stderr, "%s in %s: not available: %s\n", info.name, bench_precision_name((sadmm_precision)precision),
-                info.reason);
-        return false;
-    }
+    for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision)
+        if ((plan->precision < 0 || plan->precision == precision) &&
+            !bench_is_available(plan->backend, (sadmm_precision)precision, stderr))
+            return false;
     return true;
 }
 

@@ -148,10 +148,7 @@ static void measure_backend(struct bench *b, struct set_problem *problem, const 
                                    .enough = precision == SADMM_F32 ? 0 : 1e-10,
                                    .reference = reference};
     struct series series = {.backend = backend, .precision = precision, .threads = 1};
-    sadmm_backend_info info;
-    sadmm_backend_query(backend, &info);
-    if (!info.available[precision]) {
-        fprintf(stderr, "%s in %s: not available: %s\n", info.name, bench_precision_name(precision), info.reason);
+    if (!bench_is_available(backend, precision, stderr)) {
         if (b->o->backend == (int)backend) b->failed = true;
         return;
     }

@@ -185,12 +185,7 @@ static bool run_cpu(const struct options *o, sadmm_precision precision, const st
 static bool run_backend(const struct options *o, sadmm_backend backend, sadmm_precision precision,
                         const struct sinks *out, FILE *notes)
 {
-    sadmm_backend_info info;
-    if (sadmm_backend_query(backend, &info) != SADMM_OK) return false;
-    if (!info.available[precision]) {
-        fprintf(notes, "%s in %s: not available: %s\n", info.name, bench_precision_name(precision), info.reason);
-        return o->backend != (int)backend;
-    }
+    if (!bench_is_available(backend, precision, notes)) return o->backend != (int)backend;
     if (backend == SADMM_BACKEND_CPU) return run_cpu(o, precision, out, notes);
     struct series s = {.backend = backend, .precision = precision, .threads = 1};
     bench_runs_on(backend, s.runs_on, sizeof s.runs_on);

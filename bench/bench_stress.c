@@ -114,13 +114,9 @@ static void run_case(const struct options *o, const struct stress_case *about, c
 /* By one backend and precision, where that is; one that was asked for by name must be. */
 static int run_by(const struct options *o, sadmm_backend backend, sadmm_precision precision, struct tally *tally)
 {
-    sadmm_backend_info info;
     sadmm_world_def def = sadmm_world_def_default();
-    sadmm_backend_query(backend, &info);
-    if (!info.available[precision]) {
-        fprintf(stderr, "%s in %s: not available: %s\n", info.name, bench_precision_name(precision), info.reason);
+    if (!bench_is_available(backend, precision, stderr))
         return o->backend == (int)backend && o->precision == (int)precision ? 1 : 0;
-    }
     def.backend = backend;
     def.precision = precision;
     def.device = (int)o->device;

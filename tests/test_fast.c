@@ -433,6 +433,20 @@ END_TEST
 /* The weight scale stays where the residuals are balanced, goes down where the momentum converges slower, up where the
  * impulses creep, by the power 0.3 of how far they are off and a factor of 4 at most an update; it never leaves [0.1,
  * 5]. */
+/* 5, 10, 20, 40, 60, 90, ... 681, and no more. */
+START_TEST(weights_change_finitely_often)
+{
+    int at = WEIGHT_FIRST_UPDATE, count = 0, last = 0;
+    for (; at != WEIGHT_NO_UPDATE; at = weight_next_update(at), ++count) {
+        ck_assert_int_gt(at, last);
+        ck_assert_int_le(at, WEIGHT_LAST_UPDATE);
+        last = at;
+    }
+    ck_assert_int_eq(count, 11);
+    ck_assert_int_eq(last, 681);
+}
+END_TEST
+
 START_TEST(weight_scales_follow_the_imbalance)
 {
     ck_assert(!weight_stagnates(30) && weight_stagnates(31));
@@ -789,6 +803,7 @@ int main(void)
     tcase_add_loop_test(weights, solutions_are_not_slowed_down, 0, table_count + 1);
     tcase_add_loop_test(weights, small_separations_are_eased, 0, 4);
     tcase_add_test(weights, blocks_have_no_unit);
+    tcase_add_test(weights, weights_change_finitely_often);
     tcase_add_test(weights, weight_scales_follow_the_imbalance);
     tcase_add_test(weights, contact_residuals_are_known);
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);

@@ -21,13 +21,15 @@ import sys
 import warnings
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+FOLDER = os.path.dirname(os.path.abspath(__file__))
+sys.path[:0] = [FOLDER, os.path.dirname(FOLDER)]
 
 import numpy as np
 
 import engines
 import judge
 import scenes
+from report import machine
 
 FRAME = 0.01            # between the times at which poses are compared, s
 LIMIT = 300.0           # of a run, s of the engine's own time
@@ -98,15 +100,6 @@ def find_engines(wanted, drivers):
         except engines.Missing as reason:
             missing.append(f"{engine.name} is left out: {reason}")
     return chosen, missing
-
-
-def machine():
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            model = next(line.split(":", 1)[1].strip() for line in file if line.startswith("model name"))
-    except (OSError, StopIteration):
-        model = "unknown processor"
-    return f"{model}, {os.cpu_count()} cores"
 
 
 def write_csv(file, rows, chosen, missing):

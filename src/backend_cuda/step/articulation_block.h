@@ -258,15 +258,15 @@ static __device__ __forceinline__ bool solve_part(const articulation_view &p, co
         for (int32_t level = 0; level < p.s.levels; ++level) factor_level(p, level);
         double last = INFINITY;
         int again = 0;
-        bool relented = false;
+        bool dropped = false;
 #pragma unroll 1
         for (;;) {
-            solve_rows(p, again > 0 && !relented);
+            solve_rows(p, again > 0 && !dropped);
             if (again == 0) {
                 changed = any_row(p, shared_flag, [&](int32_t r) { return articulation_change_row(&p, r); });
                 if (changed) break;
             }
-            if (relented) break;
+            if (dropped) break;
             if (!EXACT && again == 0 &&
                 !any_row(p, shared_flag, [&](int32_t r) { return articulation_needs_refinement(&p, r); }))
                 break;
@@ -276,10 +276,10 @@ static __device__ __forceinline__ bool solve_part(const articulation_view &p, co
                 ++again;
                 continue;
             }
-            if (again == 0 || !articulation_contradicts_itself(residual, last)) break;
-            each(p.s.columns * SADMM_MAX_ROWS, [&](int32_t r) { articulation_relent(&p, r); });
+            if (again == 0 || !articulation_is_inconsistent(residual, last)) break;
+            each(p.s.columns * SADMM_MAX_ROWS, [&](int32_t r) { articulation_drop_residual(&p, r); });
             __syncthreads();
-            relented = true;
+            dropped = true;
         }
         if (again > 0) changed = any_row(p, shared_flag, [&](int32_t r) { return articulation_change_row(&p, r); });
     }

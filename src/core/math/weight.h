@@ -9,15 +9,17 @@
 #ifndef SADMM_MATH_WEIGHT_H
 #define SADMM_MATH_WEIGHT_H
 
+#include <limits.h>
+
 #include "max.h"
 
 /* Iterations after which a step that started cold recomputes its weights, from the loads it has found by then: 5, 10,
- * 20, 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
+ * 20, 40, and from there half as many again each time. Changes as late as that are small, and a change disturbs. */
 enum { WEIGHT_FIRST_UPDATE = 5, WEIGHT_DOUBLE_BELOW = 40 }; /* measured: bench/constants.py, cold */
 
 /* ADMM is known to converge with weights that change finitely often (He, Yang and Wang, J. Optim. Theory Appl. 106,
- * 2000). So many iterations have found the loads; heaps at 1e-6 m/s were thrown back to 1e-2 by changes after them. */
-enum { WEIGHT_LAST_UPDATE = 1000, WEIGHT_NO_UPDATE = 1 << 30 };
+ * 2000). So many iterations have found the loads; a later change would only throw back what has converged. */
+enum { WEIGHT_LAST_UPDATE = 1000, WEIGHT_NO_UPDATE = INT_MAX };
 
 SADMM_INLINE int weight_next_update(int at)
 {

@@ -544,16 +544,15 @@ SADMM_INLINE double articulation_residual_size(const struct articulation_view *v
     return v->state[r] == ROW_INSIDE ? fabs(articulation_row_residual(v, r, true, true)) : 0;
 }
 
-/* Do rows contradict each other: have they a residual that a refinement does not make half of what it was? */
-SADMM_INLINE bool articulation_contradicts_itself(double residual, double before)
+/* Are rows inconsistent: have they a residual that a refinement does not make half of what it was `before`? */
+SADMM_INLINE bool articulation_is_inconsistent(double residual, double before)
 {
     return residual > ARTICULATION_REFINE_ABOVE && !(residual < before / 2);
 }
 
-/* What is left of a row is taken out of its law. All rows can be met then, at the velocities there are, and without the
- * multipliers that only press them against each other: of the solutions in the sense of least squares the one of least
- * multipliers. */
-SADMM_INLINE void articulation_relent(const struct articulation_view *v, int32_t r)
+/* What is left of an inconsistent row is dropped from its law. All rows can be met then, at the velocities there are,
+ * without multipliers that only press rows against each other: the least-squares solution of least multipliers. */
+SADMM_INLINE void articulation_drop_residual(const struct articulation_view *v, int32_t r)
 {
     if (v->state[r] == ROW_INSIDE) v->rows[r].bias -= articulation_row_residual(v, r, true, true);
 }

@@ -262,16 +262,16 @@ static double largest_residual(const struct articulation_view *v)
     return most;
 }
 
-/* Rows that contradict each other are solved as well as they can be. */
-static void relent(const struct articulation_view *v)
+/* Of inconsistent rows, which are solved once more. */
+static void drop_residuals(const struct articulation_view *v)
 {
     const int32_t rows = SADMM_MAX_ROWS * v->s.columns;
-    for (int32_t r = 0; r < rows; ++r) articulation_relent(v, r);
+    for (int32_t r = 0; r < rows; ++r) articulation_drop_residual(v, r);
     solve_rows(v, false);
 }
 
 /* Iterative refinement: each solve takes away nearly all of what the regularisation has left, but where light bodies
- * between heavy ones pass on a load. Where it does not, rows contradict each other. Have they stayed in their states?
+ * between heavy ones pass on a load. Where it does not, they are inconsistent. Have rows stayed in their states?
  */
 static bool refine(const struct articulation_part *part)
 {
@@ -283,7 +283,7 @@ static bool refine(const struct articulation_part *part)
         solve_rows(v, true);
         residual = largest_residual(v);
     }
-    if (articulation_contradicts_itself(residual, last)) relent(v);
+    if (articulation_is_inconsistent(residual, last)) drop_residuals(v);
     return !change_rows(v);
 }
 
@@ -303,7 +303,7 @@ static bool solve_sparse(const struct articulation_part *part, const uint8_t *ea
         } else if (needs_refinement(v)) {
             const double before = largest_residual(v);
             solve_rows(v, true);
-            if (articulation_contradicts_itself(largest_residual(v), before)) relent(v);
+            if (articulation_is_inconsistent(largest_residual(v), before)) drop_residuals(v);
             solved = !change_rows(v);
         }
     }

@@ -431,11 +431,13 @@ static double size_of(const struct island *s, const double *lambda)
     return most;
 }
 
-/* How far what is taken for a solution may be from the laws, m/s: what rounding leaves of the forces of drives, if the
- * tolerance allows that. Those are given: impulses of contacts and locks may be so large because nothing meets them. */
-static double enough_for(const struct island *s)
+/* Is what is this far from the laws, m/s, a solution: is it what rounding leaves of the forces of drives, if the
+ * tolerance allows that? Those are given: impulses of contacts and locks may be so large because nothing meets them. */
+static bool is_enough(const struct island *s, double map)
 {
     double most = 0;
+    if (!(map > ENOUGH)) return true;
+    if (!(map <= s->settings->tolerance)) return false;
     for (int32_t k = 0; k < s->parts; ++k) {
         const struct articulation_part *part = part_of(s, k);
         EACH_ARTICULATION_ROW(s->slots, &part->view, r, from)
@@ -447,7 +449,7 @@ static double enough_for(const struct island *s)
             (void)from;
         }
     }
-    return fmax(ENOUGH, fmin(s->settings->tolerance, ROUNDING * most));
+    return map <= ROUNDING * most;
 }
 
 /* Is what was found taken, which is no solution? Where there is none, bodies that are wedged say, impulses may grow
@@ -587,7 +589,7 @@ static bool solve_island(struct island *s, int32_t label)
     find_contact_velocities(s);
     const double before = fmax(ncp_natural_map(&s->dense), momentum_residual(s));
     d->error[label] = before;
-    if (!(before > enough_for(s))) {
+    if (is_enough(s, before)) {
         d->kind[label] |= ISLAND_SOLVED;
         return false;
     }
@@ -598,15 +600,14 @@ static bool solve_island(struct island *s, int32_t label)
     s->gives = false;
     begin_search(s, d->states);
     search(s, G, d->states, d->states + rows, rows);
-    const bool solved = !(s->best > enough_for(s)),
-               wild = s->best < before && has_too_much_energy(s);
+    const bool solved = is_enough(s, s->best), wild = s->best < before && has_too_much_energy(s);
     if (solved || (!wild && is_nearer(s, before, size_before))) take(s, label, solved);
     if (solved && !wild) return true;
     const double nearest = d->error[label], energy = solved ? best_energy2(s) : HUGE_VAL;
     begin_giving(s, d->states, rows);
     search(s, G, d->states, d->states + rows, rows);
     const double missed = s->best_hard / s->settings->correction_speed;
-    const bool gives = !(s->best > enough_for(s)) &&
+    const bool gives = is_enough(s, s->best) &&
                        (solved     ? best_energy2(s) <= energy / 2
                         : s->again ? s->best_hard <= nearest
                                    : missed > CANNOT);

@@ -27,12 +27,12 @@ static int until(int done, int period, int limit)
     return left < limit ? left : limit;
 }
 
-/* The first update of the weights after `done` iterations, INT_MAX: none. */
+/* The first update of the weights after `done` iterations, or WEIGHT_NO_UPDATE. */
 static int next_weight_update(int done)
 {
     int at = WEIGHT_FIRST_UPDATE;
-    while (at <= done && at <= INT_MAX / 2) at = weight_next_update(at);
-    return at > done ? at : INT_MAX;
+    while (at <= done) at = weight_next_update(at);
+    return at;
 }
 
 /* The batch of iterations that begins now, and what comes after it. Returns its iterations. */
