@@ -2,10 +2,10 @@
 #ifndef SADMM_CUDA_STEP_NCP_NEWTON_H
 #define SADMM_CUDA_STEP_NCP_NEWTON_H
 
+#include "core/math/solve_rounding.h"
 #include "ncp_island.h"
 
-/* m/s: what is a solution, and what steps aim at. */
-#define NCP_ENOUGH 1e-9
+/* m/s: what steps aim at. */
 #define NCP_AIM 1e-12
 
 /* What is added to the diagonal of a step's matrix, whose entries are shares of a law's own response: `share` of the

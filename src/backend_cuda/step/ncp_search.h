@@ -239,18 +239,32 @@ static __device__ __noinline__ void take_kept(const cuda_view &v, const ncp_isla
     solve_trees(v, s);
 }
 
+/* Is what is this far from the laws, m/s, a solution: is it what rounding leaves of the forces of drives, if the
+ * tolerance allows that? */
+static __device__ __noinline__ bool is_enough(const cuda_view &v, const ncp_island &s, double map)
+{
+    double most = 0;
+    if (!(map > NCP_ENOUGH)) return true;
+    if (!(map <= v.model.settings->tolerance)) return false;
+    for (int32_t r = 0; r < s.rows; ++r) {
+        const ncp_row *row = &s.row[r];
+        if (isfinite(row->lo) && isfinite(row->hi)) most = fmax(most, fabs(row->lambda) * row->response);
+    }
+    return map <= NCP_DRIVE_ROUNDING * most;
+}
+
 /* Is it solved? By impulses, multipliers and velocities as they are then. A solution of much energy, as drives may ask
  * for, stays where contacts that give do not have less than half of it. */
 static __device__ __noinline__ bool search_all(const cuda_view &v, ncp_island *s, const ncp_memory &memory,
                                                ncp_shared *shared)
 {
     double energy, expected, given;
-    const bool solved = search(v, s, memory, false, shared) <= NCP_ENOUGH;
+    const bool solved = is_enough(v, *s, search(v, s, memory, false, shared));
     find_energies(v, *s, &energy, &expected);
     if (solved && energy <= NCP_MOST_ENERGY * expected) return true;
     keep_solution(*s);
     forget(s);
-    const bool gives = search(v, s, memory, true, shared) <= NCP_ENOUGH;
+    const bool gives = is_enough(v, *s, search(v, s, memory, true, shared));
     find_energies(v, *s, &given, &expected);
     if (gives && !(solved && given > energy / 2)) return true;
     if (solved) take_kept(v, *s);

@@ -5,16 +5,13 @@
 
 #include "asked_energy.h"
 #include "core/base/memory.h"
+#include "core/math/solve_rounding.h"
 #include "core/model/system_math.h"
 #include "ncp_island.h"
 #include "ncp_newton.h"
 
-/* m/s: what is left alone, of the natural map and of the momentum residual; the aim; that of Newton's steps, which
- * solve for the rows in their states. */
-static const double ENOUGH = 1e-9, AIM = 1e-10, NEWTON_AIM = 1e-13;
-/* Of the largest speed that a drive makes by itself: what rounding leaves of the natural map, with room. A drive of 4e5
- * N on a jaw of 0.1 kg: 3e4 m/s, and 1e-8 m/s are left. */
-static const double ROUNDING = 1e-12;
+/* m/s: the aim; that of Newton's steps, which solve for the rows in their states. */
+static const double AIM = 1e-10, NEWTON_AIM = 1e-13;
 /* m/s: regularisation of contacts in G, that of the one with the largest load, others in proportion: of all impulses
  * that are solutions the least are found. Else a car stands on two wheels across, and which two changes from step to
  * step. */
@@ -432,11 +429,11 @@ static double size_of(const struct island *s, const double *lambda)
 }
 
 /* Is what is this far from the laws, m/s, a solution: is it what rounding leaves of the forces of drives, if the
- * tolerance allows that? Those are given: impulses of contacts and locks may be so large because nothing meets them. */
+ * tolerance allows that? */
 static bool is_enough(const struct island *s, double map)
 {
     double most = 0;
-    if (!(map > ENOUGH)) return true;
+    if (!(map > NCP_ENOUGH)) return true;
     if (!(map <= s->settings->tolerance)) return false;
     for (int32_t k = 0; k < s->parts; ++k) {
         const struct articulation_part *part = part_of(s, k);
@@ -449,7 +446,7 @@ static bool is_enough(const struct island *s, double map)
             (void)from;
         }
     }
-    return map <= ROUNDING * most;
+    return map <= NCP_DRIVE_ROUNDING * most;
 }
 
 /* Is what was found taken, which is no solution? Where there is none, bodies that are wedged say, impulses may grow
