@@ -17,11 +17,11 @@ static sadmm_coupling_id coupling;
 static sadmm_gear_id gear;
 
 /* The call is refused, and the message names the argument. */
-#define REFUSES(name, call)                                                                              \
-    do {                                                                                                 \
-        ck_assert_msg((call) == SADMM_ERROR_INVALID_ARGUMENT, "%s: not refused", #call);                 \
-        ck_assert_msg(strstr(sadmm_last_message(), name " = NULL: must be given") != NULL, "%s: \"%s\"", \
-                      #call, sadmm_last_message());                                                      \
+#define REFUSES(name, call)                                                                                     \
+    do {                                                                                                        \
+        ck_assert_msg((call) == SADMM_ERROR_INVALID_ARGUMENT, "%s: not refused", #call);                        \
+        ck_assert_msg(strstr(sadmm_last_message(), name " = NULL: must be given") != NULL, "%s: \"%s\"", #call, \
+                      sadmm_last_message());                                                                    \
     } while (0)
 
 static void on_worlds(void)
@@ -65,6 +65,45 @@ static void on_arrays(void)
     REFUSES("world", sadmm_world_dynamic_bodies(NULL, &index, 1, &index));
     REFUSES("count", sadmm_world_dynamic_bodies(world, &index, 1, NULL));
     REFUSES("indices", sadmm_world_dynamic_bodies(world, NULL, 1, &index));
+}
+
+static void on_environments(void)
+{
+    sadmm_environments *environments, *none;
+    sadmm_environments_array array;
+    double values[64] = {0};
+    char bytes[16];
+    size_t size;
+    int32_t state;
+    REFUSES("world", sadmm_world_replicate(NULL, 1, &none));
+    REFUSES("out", sadmm_world_replicate(world, 1, NULL));
+    ck_assert_int_eq(sadmm_world_replicate(world, 1, &environments), SADMM_OK);
+    sadmm_environments_destroy(NULL);
+    ck_assert_str_eq(sadmm_environments_message(NULL), "");
+    ck_assert_int_eq(sadmm_environments_count(NULL), 0);
+    ck_assert_uint_eq(sadmm_environments_memory(NULL), 0);
+    REFUSES("environments", sadmm_environments_step(NULL, 1));
+    sadmm_settings settings = sadmm_environments_settings(NULL);
+    ck_assert(settings.dt == sadmm_settings_default().dt);
+    REFUSES("environments", sadmm_environments_set_settings(NULL, &settings));
+    REFUSES("settings", sadmm_environments_set_settings(environments, NULL));
+    REFUSES("environments", sadmm_environments_reset(NULL, NULL, 0, NULL));
+    ck_assert_int_eq(sadmm_environments_reset(environments, NULL, 0, NULL), SADMM_OK); /* all */
+    REFUSES("environments", sadmm_environments_keep(NULL, 0, &state));
+    REFUSES("state", sadmm_environments_keep(environments, 0, NULL));
+    REFUSES("environments", sadmm_environments_save(NULL, 0, bytes, sizeof bytes, &size));
+    REFUSES("size", sadmm_environments_save(environments, 0, bytes, sizeof bytes, NULL));
+    REFUSES("buffer", sadmm_environments_save(environments, 0, NULL, sizeof bytes, &size));
+    ck_assert_int_eq(sadmm_environments_rows(NULL, SADMM_ARRAY_BODY_STATE), 0);
+    REFUSES("environments", sadmm_environments_get(NULL, SADMM_ARRAY_BODY_STATE, NULL, 0, values));
+    REFUSES("values", sadmm_environments_get(environments, SADMM_ARRAY_BODY_STATE, NULL, 0, NULL));
+    REFUSES("environments", sadmm_environments_set(NULL, SADMM_ARRAY_BODY_STATE, NULL, 0, values));
+    REFUSES("values", sadmm_environments_set(environments, SADMM_ARRAY_BODY_STATE, NULL, 0, NULL));
+    REFUSES("environments", sadmm_environments_bind(NULL, SADMM_ARRAY_BODY_STATE, SADMM_F64, &array));
+    REFUSES("out", sadmm_environments_bind(environments, SADMM_ARRAY_BODY_STATE, SADMM_F64, NULL));
+    ck_assert_ptr_null(sadmm_environments_marked(NULL));
+    ck_assert_str_eq(sadmm_environments_mark(NULL, 0), "");
+    sadmm_environments_destroy(environments);
 }
 
 static void on_saves(void)
@@ -516,22 +555,39 @@ static const struct {
 } functions[] = {
     {on_worlds, {W(create), W(destroy), W(message), W(settings_sized), W(set_settings), W(set_backend)}},
     {on_bodies,
-     {W(add_body), W(remove_body), W(body_count), W(body_at), W(body_state), W(set_body_state), W(body_def_sized),
-      W(set_body_wrench), W(add_body_force_at), W(apply_body_impulse_at), W(set_body_mass), W(set_body_user_data),
-      W(set_body_gravity_scale), W(set_body_damping), W(move_body),
-      W(body_user_data), W(body_contact_wrench), W(set_body_pair_contact), W(body_wrench), W(body_move),
-      W(body_pair_off_count), W(body_pair_off_at)}},
+     {W(add_body),
+      W(remove_body),
+      W(body_count),
+      W(body_at),
+      W(body_state),
+      W(set_body_state),
+      W(body_def_sized),
+      W(set_body_wrench),
+      W(add_body_force_at),
+      W(apply_body_impulse_at),
+      W(set_body_mass),
+      W(set_body_user_data),
+      W(set_body_gravity_scale),
+      W(set_body_damping),
+      W(move_body),
+      W(body_user_data),
+      W(body_contact_wrench),
+      W(set_body_pair_contact),
+      W(body_wrench),
+      W(body_move),
+      W(body_pair_off_count),
+      W(body_pair_off_at)}},
     {on_shapes,
      {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def_sized), W(set_shape_material),
       W(set_pair_friction), W(pair_friction_count), W(pair_friction_at)}},
     {on_joints,
      {W(place_joint), W(add_joint), W(remove_joint), W(joint_count), W(joint_at), W(joint_def_sized),
-      W(set_joint_enabled),
-      W(set_joint_coordinate_sized), W(joint_state), W(set_joint_spring_table), W(joint_spring_table)}},
+      W(set_joint_enabled), W(set_joint_coordinate_sized), W(joint_state), W(set_joint_spring_table),
+      W(joint_spring_table)}},
     {on_couplings,
      {W(add_coupling), W(remove_coupling), W(coupling_count), W(coupling_at), W(coupling_def_sized),
-      W(set_coupling_target),
-      W(set_coupling_gains), W(set_coupling_limits), W(set_coupling_enabled), W(coupling_state)}},
+      W(set_coupling_target), W(set_coupling_gains), W(set_coupling_limits), W(set_coupling_enabled),
+      W(coupling_state)}},
     {on_arrays,
      {"sadmm_array_columns", "sadmm_array_is_settable", W(array_rows), W(get_array), W(set_array), W(body_index),
       W(shape_index), W(joint_index), W(coupling_index), W(device_array), W(dynamic_bodies)}},
@@ -539,8 +595,8 @@ static const struct {
     {on_gears,
      {W(add_gear), W(remove_gear), W(gear_count), W(gear_at), W(gear_def_sized), W(set_gear_enabled), W(gear_state)}},
     {on_queries,
-     {W(cast_ray), W(cast_ray_all), W(cast_rays), W(overlap_box), W(overlap_shape),
-      W(closest_points), W(closest_to_shape)}},
+     {W(cast_ray), W(cast_ray_all), W(cast_rays), W(overlap_box), W(overlap_shape), W(closest_points),
+      W(closest_to_shape)}},
     {on_events, {W(record_events), W(event_capacity), W(event_count), W(take_events), W(sensor_overlaps)}},
     {on_steps,
      {W(step), W(step_async), W(wait), W(report_sized), W(contact_count), W(contacts), W(contact_errors), W(state_hash),
@@ -557,20 +613,25 @@ static const struct {
      {"sadmm_mesh_create", "sadmm_heightfield_create", "sadmm_mesh_destroy", "sadmm_mesh_triangle_count",
       "sadmm_mesh_left_out", "sadmm_mesh_open_edges", "sadmm_mesh_bytes", "sadmm_mesh_bounds",
       "sadmm_mesh_vertex_count", "sadmm_mesh_vertex_at", "sadmm_mesh_triangle_at", "sadmm_mesh_grid"}},
+    {on_environments,
+     {"sadmm_world_replicate", "sadmm_environments_destroy", "sadmm_environments_message", "sadmm_environments_count",
+      "sadmm_environments_memory", "sadmm_environments_step", "sadmm_environments_set_settings",
+      "sadmm_environments_settings_sized", "sadmm_environments_reset", "sadmm_environments_keep",
+      "sadmm_environments_save", "sadmm_environments_rows", "sadmm_environments_get", "sadmm_environments_set",
+      "sadmm_environments_bind", "sadmm_environments_marked", "sadmm_environments_mark"}},
     {on_mesh_files,
      {"sadmm_mesh_file_read", "sadmm_mesh_file_destroy", "sadmm_mesh_file_vertex_count",
       "sadmm_mesh_file_triangle_count", "sadmm_mesh_file_vertices", "sadmm_mesh_file_triangles",
       "sadmm_mesh_file_describe_sized"}},
-    {on_masses,
-     {"sadmm_shape_mass", "sadmm_mass_sum", "sadmm_mass_pose_in_body", "sadmm_mass_pose_of_body"}},
+    {on_masses, {"sadmm_shape_mass", "sadmm_mass_sum", "sadmm_mass_pose_in_body", "sadmm_mass_pose_of_body"}},
     {on_others, {"sadmm_backend_query_sized", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {on_defaults,
      {"sadmm_settings_init", W(def_init), "sadmm_body_def_init", "sadmm_shape_def_init", "sadmm_hull_def_init",
       "sadmm_joint_def_init", "sadmm_coupling_def_init", "sadmm_gear_def_init", "sadmm_mesh_def_init",
       "sadmm_heightfield_def_init", "sadmm_mesh_file_def_init", "sadmm_query_filter_init"}},
     {NULL,
-     {"sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_version_number", "sadmm_build_commit",
-      "sadmm_build_compiler"}},
+     {"sadmm_array_name", "sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_version_number",
+      "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };
 

@@ -1,8 +1,9 @@
 /* World level: states of many objects in one call, for learning loops, viewers and bindings.
  *
- * An array has a row for each body, joint or coupling, in the order of sadmm_world_body_at (joint_at, coupling_at), and
- * a fixed number of columns; doubles, row-major. sadmm_world_body_at gives the id of a row, sadmm_world_body_index the
- * row of an id. Rows stay the same until something is added or removed. For contacts see sadmm_world_contacts.
+ * An array has a row for each body, shape, joint or coupling, in the order of sadmm_world_body_at (shape_at, joint_at,
+ * coupling_at), or one for the world, and a fixed number of columns; doubles, row-major. sadmm_world_body_at gives the
+ * id of a row, sadmm_world_body_index the row of an id. Rows stay the same until something is added or removed. For
+ * contacts see sadmm_world_contacts; for arrays of many copies of a world see environments.h.
  *
  * Threads and errors: as world.h says.
  */
@@ -19,31 +20,57 @@ extern "C" {
 
 typedef enum sadmm_array {
     /* A row a body. */
-    SADMM_ARRAY_BODY_STATE = 0,     /* 13 columns: position (m), orientation (w x y z), linear velocity (m/s), angular
+    SADMM_ARRAY_BODY_STATE = 0,      /* 13 columns: position (m), orientation (w x y z), linear velocity (m/s), angular
                                        velocity (rad/s), as in sadmm_body_state. Set: as sadmm_world_set_body_state;
                                        unchanged rows of static bodies cost nothing */
-    SADMM_ARRAY_BODY_WRENCH,        /* 6: external force (N) and torque (N m), world; 0 of bodies that are not dynamic.
+    SADMM_ARRAY_BODY_WRENCH,         /* 6: external force (N) and torque (N m), world; 0 of bodies that are not dynamic.
                                        Set: as sadmm_world_set_body_wrench */
     SADMM_ARRAY_BODY_CONTACT_WRENCH, /* 6: as sadmm_world_body_contact_wrench; 0 of static bodies, and before the first
                                        step. Read only. UNAVAILABLE where settings.recover_wrenches is false */
-    SADMM_ARRAY_BODY_INERTIA,       /* 4: mass (kg), principal moments (kg m^2); 0 of bodies that are not dynamic. Set:
+    SADMM_ARRAY_BODY_INERTIA,        /* 4: mass (kg), principal moments (kg m^2); 0 of bodies that are not dynamic. Set:
                                        as sadmm_world_set_body_mass */
     /* A row a joint, a column a coordinate (joint.h): m or rad, m/s or rad/s, N or N m. */
-    SADMM_ARRAY_JOINT_POSITION,     /* 6: sadmm_joint_state.position. Read only, as are the next three */
-    SADMM_ARRAY_JOINT_SPEED,        /* 6: sadmm_joint_state.speed */
-    SADMM_ARRAY_JOINT_DRIVE_FORCE,  /* 6: sadmm_joint_state.drive_force */
-    SADMM_ARRAY_JOINT_WRENCH,       /* 6: sadmm_joint_state.wrench_b, world */
+    SADMM_ARRAY_JOINT_POSITION,        /* 6: sadmm_joint_state.position. Read only, as are the next three */
+    SADMM_ARRAY_JOINT_SPEED,           /* 6: sadmm_joint_state.speed */
+    SADMM_ARRAY_JOINT_DRIVE_FORCE,     /* 6: sadmm_joint_state.drive_force */
+    SADMM_ARRAY_JOINT_WRENCH,          /* 6: sadmm_joint_state.wrench_b, world */
     SADMM_ARRAY_JOINT_TARGET_POSITION, /* 6: target_position of the drives; 0 for locked coordinates, and must be 0
                                           there. Set: as sadmm_world_set_joint_coordinate */
-    SADMM_ARRAY_JOINT_TARGET_SPEED, /* 6: likewise target_speed */
+    SADMM_ARRAY_JOINT_TARGET_SPEED,    /* 6: likewise target_speed */
     /* A row a coupling. */
-    SADMM_ARRAY_COUPLING_TARGET,    /* 13: target's position, orientation, velocity (linear, angular), in the units of
+    SADMM_ARRAY_COUPLING_TARGET,   /* 13: target's position, orientation, velocity (linear, angular), in the units of
                                        SADMM_ARRAY_BODY_STATE. Set: as sadmm_world_set_coupling_target */
-    SADMM_ARRAY_COUPLING_REACTION,  /* 6: reaction_force (N), reaction_torque (N m) of sadmm_coupling_state. Read
+    SADMM_ARRAY_COUPLING_REACTION, /* 6: reaction_force (N), reaction_torque (N m) of sadmm_coupling_state. Read
                                        only */
+    /* A row a body. */
+    SADMM_ARRAY_BODY_GRAVITY_SCALE, /* 1: scale of gravity; 0 of bodies that are not dynamic. Set: as
+                                       sadmm_world_set_body_gravity_scale */
+    SADMM_ARRAY_BODY_DAMPING,       /* 2: linear, angular damping (1/s); 0 of bodies that are not dynamic. Set: as
+                                       sadmm_world_set_body_damping */
+    /* A row a joint: members of sadmm_joint_coordinate, 6 each; of locked coordinates the defaults, and must be those
+     * there. Set: as sadmm_world_set_joint_coordinate. */
+    SADMM_ARRAY_JOINT_LOWER,            /* lower, m or rad: of no effect where the coordinate is not `limited` */
+    SADMM_ARRAY_JOINT_UPPER,            /* upper */
+    SADMM_ARRAY_JOINT_DRIVE_STIFFNESS,  /* drive_stiffness, N/m or N m/rad */
+    SADMM_ARRAY_JOINT_DRIVE_DAMPING,    /* drive_damping, N s/m or N m s/rad */
+    SADMM_ARRAY_JOINT_DRIVE_LIMIT,      /* drive_force, the largest, N or N m, may be infinite */
+    SADMM_ARRAY_JOINT_FRICTION,         /* friction, N or N m */
+    SADMM_ARRAY_JOINT_SPRING_STIFFNESS, /* spring_stiffness, N/m or N m/rad */
+    SADMM_ARRAY_JOINT_SPRING_DAMPING,   /* spring_damping, N s/m or N m s/rad */
+    SADMM_ARRAY_JOINT_SPRING_REST,      /* spring_rest, m or rad */
+    SADMM_ARRAY_JOINT_ARMATURE,         /* armature, kg or kg m^2 */
+    /* A row a shape. */
+    SADMM_ARRAY_SHAPE_MATERIAL, /* 2: friction, restitution. Set: as sadmm_world_set_shape_material */
+    /* One row. */
+    SADMM_ARRAY_GRAVITY, /* 3: settings.gravity, m/s^2. Set: as sadmm_world_set_settings */
+    SADMM_ARRAY_REPORT,  /* 8, of the last step: error (m/s, -1: not known), unsolved (-1: no tolerance),
+                                       penetration_max (m), joint_drift (m), contacts, iterations, step, time (s), as in
+                                       sadmm_step_report. Read only */
     SADMM_ARRAY_COUNT
 } sadmm_array;
 
+/* The name of an array, "body_state" for SADMM_ARRAY_BODY_STATE; "" for an unknown one. Thread-safe. */
+SADMM_API const char *sadmm_array_name(sadmm_array array);
 /* Columns of an array; 0 for an unknown one. Thread-safe. */
 SADMM_API int32_t sadmm_array_columns(sadmm_array array);
 /* Whether the array can be set. Thread-safe. */
@@ -71,11 +98,11 @@ SADMM_API sadmm_status sadmm_world_coupling_index(sadmm_world *world, sadmm_coup
 
 /* An array in the memory of the device. Read only. */
 typedef struct sadmm_device_array {
-    const double *values; /* device pointer: column k of row r is values[r * stride + k] */
+    const double *values;  /* device pointer: column k of row r is values[r * stride + k] */
     int64_t rows, columns; /* a row a dynamic body: sadmm_world_dynamic_bodies says which */
-    int64_t stride;       /* doubles from row to row */
-    int device;           /* its index, as in sadmm_world_def */
-    void *stream;         /* CUDA: the stream (cudaStream_t) of the steps. The values are valid at once on every stream,
+    int64_t stride;        /* doubles from row to row */
+    int device;            /* its index, as in sadmm_world_def */
+    void *stream; /* CUDA: the stream (cudaStream_t) of the steps. The values are valid at once on every stream,
                              because the call waits for steps begun */
 } sadmm_device_array;
 

@@ -4,6 +4,7 @@
 
 #include "arrays.h"
 #include "coupling.h"
+#include "environments.h"
 #include "events.h"
 #include "gear.h"
 #include "hull.h"

@@ -3,24 +3,6 @@
 
 #include "common.h"
 
-// In the order of sadmm_array.
-static constexpr const char *array_names[SADMM_ARRAY_COUNT] = {
-    "body_state",
-    "body_wrench",
-    "body_contact_wrench",
-    "body_inertia",
-    "joint_position",
-    "joint_speed",
-    "joint_drive_force",
-    "joint_wrench",
-    "joint_target_position",
-    "joint_target_speed",
-    "coupling_target",
-    "coupling_reaction",
-};
-static_assert(array_names[SADMM_ARRAY_COUNT - 1] != nullptr, "every array has a name");
-NAMES_OF(sadmm_array, array_names, SADMM_ARRAY_COUNT)
-
 using matrix = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
 using out_rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using in_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
@@ -165,7 +147,7 @@ void bind_arrays(nb::module_ &m, nb::class_<world> &w)
 {
     nb::list names;
     for (int k = 0; k < SADMM_ARRAY_COUNT; ++k)
-        names.append(nb::make_tuple(array_names[k], sadmm_array_columns((sadmm_array)k),
+        names.append(nb::make_tuple(sadmm_array_names[k], sadmm_array_columns((sadmm_array)k),
                                     sadmm_array_is_settable((sadmm_array)k)));
     m.attr("_arrays") = names;
     m.attr("_contact_members") = contact_members();

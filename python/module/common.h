@@ -262,6 +262,7 @@ NAMES_OF(sadmm_body_type, sadmm_body_type_names, SADMM_BODY_TYPE_COUNT)
 NAMES_OF(sadmm_shape_type, sadmm_shape_type_names, SADMM_SHAPE_TYPE_COUNT)
 NAMES_OF(sadmm_joint_kind, sadmm_joint_kind_names, SADMM_JOINT_KIND_COUNT)
 NAMES_OF(sadmm_drive, sadmm_drive_names, SADMM_DRIVE_COUNT)
+NAMES_OF(sadmm_array, sadmm_array_names, SADMM_ARRAY_COUNT)
 
 // The value with that name, or ValueError.
 template <class E> E named(const char *what, const std::string &name)

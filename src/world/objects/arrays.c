@@ -1,5 +1,5 @@
-/* Many numbers in one call: a row a body, joint or coupling. A kind of array says how wide it is, what its rows are of,
- * and how one of them is read, checked and set; the rest is the same for all. */
+/* Many numbers in one call: a row a body, shape, joint or coupling, or one. A kind says how wide it is, what its rows
+ * are of, and how one of them is read, checked and set; the rest is the same for all. */
 #include "subadmm/arrays.h"
 
 #include <string.h>
@@ -7,13 +7,14 @@
 #include "body_check.h"
 #include "core/base/check.h"
 #include "core/base/definition_fields.h"
+#include "core/base/names.h"
 #include "core/solve/resident.h"
 #include "coupling.h"
 #include "joint.h"
 #include "world/resident/resident.h"
 #include "world/state/ids.h"
 
-enum owner { OF_BODY, OF_JOINT, OF_COUPLING };
+enum owner { OF_BODY, OF_SHAPE, OF_JOINT, OF_COUPLING, OF_WORLD };
 enum { MOST_COLUMNS = 13 };
 
 struct array_kind {
@@ -129,6 +130,68 @@ static sadmm_status set_inertia(sadmm_world *world, size_t slot, const double *r
                                 : SADMM_OK;
 }
 
+static sadmm_status get_gravity_scale(sadmm_world *world, size_t slot, double *row)
+{
+    row[0] = dynamic(world, slot) ? world->bodies[slot].rigid.gravity_scale : 0;
+    return SADMM_OK;
+}
+
+static sadmm_status check_gravity_scale(const sadmm_world *world, size_t slot, const double *row,
+                                        struct sadmm_error *error)
+{
+    return dynamic(world, slot) ? sadmm_numbers_check(SADMM_BODY_FIELD(gravity_scale), row, "column 0", error)
+                                : check_none(world, slot, row, 1, error);
+}
+
+static sadmm_status set_gravity_scale(sadmm_world *world, size_t slot, const double *row)
+{
+    return dynamic(world, slot) ? sadmm_world_set_body_gravity_scale(world, sadmm_world_body_id(world, slot), row[0])
+                                : SADMM_OK;
+}
+
+static sadmm_status get_damping(sadmm_world *world, size_t slot, double *row)
+{
+    for (int k = 0; k < 2; ++k) row[k] = dynamic(world, slot) ? world->bodies[slot].rigid.damping[k] : 0;
+    return SADMM_OK;
+}
+
+static sadmm_status check_damping(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    if (!dynamic(world, slot)) return check_none(world, slot, row, 2, error);
+    TRY(sadmm_numbers_check(SADMM_BODY_FIELD(linear_damping), row, "column 0", error));
+    return sadmm_numbers_check(SADMM_BODY_FIELD(angular_damping), row + 1, "column 1", error);
+}
+
+static sadmm_status set_damping(sadmm_world *world, size_t slot, const double *row)
+{
+    return dynamic(world, slot) ? sadmm_world_set_body_damping(world, sadmm_world_body_id(world, slot), row[0], row[1])
+                                : SADMM_OK;
+}
+
+/* ---- shapes ------------------------------------------------------------------------------------------------------ */
+
+static sadmm_status get_material(sadmm_world *world, size_t slot, double *row)
+{
+    row[0] = world->shapes[slot].friction;
+    row[1] = world->shapes[slot].restitution;
+    return SADMM_OK;
+}
+
+static sadmm_status check_material(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    (void)world;
+    (void)slot;
+    TRY(sadmm_numbers_check(SADMM_SHAPE_FIELD(friction), row, "column 0", error));
+    return sadmm_numbers_check(SADMM_SHAPE_FIELD(restitution), row + 1, "column 1", error);
+}
+
+static sadmm_status set_material(sadmm_world *world, size_t slot, const double *row)
+{
+    const struct sadmm_shape *shape = &world->shapes[slot];
+    if (row[0] == shape->friction && row[1] == shape->restitution) return SADMM_OK;
+    return sadmm_world_set_shape_material(world, sadmm_world_shape_id(world, slot), row[0], row[1]);
+}
+
 /* ---- joints ------------------------------------------------------------------------------------------------------ */
 
 #define GET_OF_JOINT(name, member)                                                      \
@@ -141,38 +204,48 @@ static sadmm_status set_inertia(sadmm_world *world, size_t slot, const double *r
     }
 GET_OF_JOINT(get_joint_position, position)
 GET_OF_JOINT(get_joint_speed, speed)
-GET_OF_JOINT(get_drive_force, drive_force)
+GET_OF_JOINT(get_joint_drive_force, drive_force)
 GET_OF_JOINT(get_joint_wrench, wrench_b)
 
-#define TARGET_OF_JOINT(part, member)                                                                        \
-    static sadmm_status get_##part(sadmm_world *world, size_t slot, double *row)                             \
-    {                                                                                                        \
-        for (int k = 0; k < JOINT_COORDINATES; ++k) row[k] = world->joints[slot].def.coordinates[k].member;  \
-        return SADMM_OK;                                                                                     \
-    }                                                                                                        \
-    static sadmm_status check_##part(const sadmm_world *world, size_t slot, const double *row,               \
-                                     struct sadmm_error *error)                                              \
-    {                                                                                                        \
-        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                    \
-            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                      \
-            coordinate.member = row[k];                                                                      \
-            if (row[k] == world->joints[slot].def.coordinates[k].member) continue;                           \
-            TRY(sadmm_world_check_coordinate(&world->joints[slot], k, &coordinate, error));                  \
-        }                                                                                                    \
-        return SADMM_OK;                                                                                     \
-    }                                                                                                        \
-    static sadmm_status set_##part(sadmm_world *world, size_t slot, const double *row)                       \
-    {                                                                                                        \
-        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                    \
-            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                      \
-            if (row[k] == coordinate.member) continue;                                                       \
-            coordinate.member = row[k];                                                                      \
-            TRY(sadmm_world_set_joint_coordinate(world, sadmm_world_joint_id(world, slot), k, &coordinate)); \
-        }                                                                                                    \
-        return SADMM_OK;                                                                                     \
+#define COORDINATES_OF_JOINT(member)                                                                        \
+    static sadmm_status get_##member(sadmm_world *world, size_t slot, double *row)                          \
+    {                                                                                                       \
+        for (int k = 0; k < JOINT_COORDINATES; ++k) row[k] = world->joints[slot].def.coordinates[k].member; \
+        return SADMM_OK;                                                                                    \
+    }                                                                                                       \
+    static sadmm_status check_##member(const sadmm_world *world, size_t slot, const double *row,            \
+                                       struct sadmm_error *error)                                           \
+    {                                                                                                       \
+        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                   \
+            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                     \
+            if (row[k] == coordinate.member) continue;                                                      \
+            coordinate.member = row[k];                                                                     \
+            TRY(sadmm_world_check_coordinate(&world->joints[slot], k, &coordinate, error));                 \
+        }                                                                                                   \
+        return SADMM_OK;                                                                                    \
+    }                                                                                                       \
+    static sadmm_status set_##member(sadmm_world *world, size_t slot, const double *row)                    \
+    {                                                                                                       \
+        struct sadmm_world_joint *joint = &world->joints[slot];                                             \
+        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                   \
+            if (row[k] == joint->def.coordinates[k].member) continue;                                       \
+            joint->def.coordinates[k].member = row[k];                                                      \
+            TRY(sadmm_world_take_update(world, joint, (enum sadmm_joint_update)k));                         \
+        }                                                                                                   \
+        return SADMM_OK;                                                                                    \
     }
-TARGET_OF_JOINT(target_position, target_position)
-TARGET_OF_JOINT(target_speed, target_speed)
+COORDINATES_OF_JOINT(target_position)
+COORDINATES_OF_JOINT(target_speed)
+COORDINATES_OF_JOINT(lower)
+COORDINATES_OF_JOINT(upper)
+COORDINATES_OF_JOINT(drive_stiffness)
+COORDINATES_OF_JOINT(drive_damping)
+COORDINATES_OF_JOINT(drive_force)
+COORDINATES_OF_JOINT(friction)
+COORDINATES_OF_JOINT(spring_stiffness)
+COORDINATES_OF_JOINT(spring_damping)
+COORDINATES_OF_JOINT(spring_rest)
+COORDINATES_OF_JOINT(armature)
 
 /* ---- couplings --------------------------------------------------------------------------------------------------- */
 
@@ -201,7 +274,44 @@ static sadmm_status get_reaction(sadmm_world *world, size_t slot, double *row)
     return SADMM_OK;
 }
 
+/* ---- the world --------------------------------------------------------------------------------------------------- */
+
+static sadmm_status get_gravity(sadmm_world *world, size_t slot, double *row)
+{
+    (void)slot;
+    memcpy(row, world->def.settings.gravity, 3 * sizeof *row);
+    return SADMM_OK;
+}
+
+static sadmm_status check_gravity(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    sadmm_settings settings = world->def.settings;
+    (void)slot;
+    memcpy(settings.gravity, row, sizeof settings.gravity);
+    return sadmm_settings_validate(&settings, error);
+}
+
+static sadmm_status set_gravity(sadmm_world *world, size_t slot, const double *row)
+{
+    (void)slot;
+    memcpy(world->def.settings.gravity, row, sizeof world->def.settings.gravity);
+    return SADMM_OK;
+}
+
+static sadmm_status get_report(sadmm_world *world, size_t slot, double *row)
+{
+    const sadmm_step_report *report = &world->report;
+    (void)slot;
+    TRY(sadmm_world_synchronise(world));
+    const double numbers[] = {report->error,    (double)report->unsolved, report->penetration_max, report->joint_drift,
+                              report->contacts, report->iterations,       (double)report->step,    report->time};
+    memcpy(row, numbers, sizeof numbers);
+    return SADMM_OK;
+}
+
 /* ---- all --------------------------------------------------------------------------------------------------------- */
+
+#define COORDINATE_KIND(member) {6, OF_JOINT, get_##member, check_##member, set_##member}
 
 static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
     [SADMM_ARRAY_BODY_STATE] = {13, OF_BODY, get_state, check_state, set_state},
@@ -210,13 +320,27 @@ static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
     [SADMM_ARRAY_BODY_INERTIA] = {4, OF_BODY, get_inertia, check_inertia, set_inertia},
     [SADMM_ARRAY_JOINT_POSITION] = {6, OF_JOINT, get_joint_position, NULL, NULL},
     [SADMM_ARRAY_JOINT_SPEED] = {6, OF_JOINT, get_joint_speed, NULL, NULL},
-    [SADMM_ARRAY_JOINT_DRIVE_FORCE] = {6, OF_JOINT, get_drive_force, NULL, NULL},
+    [SADMM_ARRAY_JOINT_DRIVE_FORCE] = {6, OF_JOINT, get_joint_drive_force, NULL, NULL},
     [SADMM_ARRAY_JOINT_WRENCH] = {6, OF_JOINT, get_joint_wrench, NULL, NULL},
-    [SADMM_ARRAY_JOINT_TARGET_POSITION] = {6, OF_JOINT, get_target_position, check_target_position,
-                                           set_target_position},
-    [SADMM_ARRAY_JOINT_TARGET_SPEED] = {6, OF_JOINT, get_target_speed, check_target_speed, set_target_speed},
+    [SADMM_ARRAY_JOINT_TARGET_POSITION] = COORDINATE_KIND(target_position),
+    [SADMM_ARRAY_JOINT_TARGET_SPEED] = COORDINATE_KIND(target_speed),
     [SADMM_ARRAY_COUPLING_TARGET] = {13, OF_COUPLING, get_target, check_target, set_target},
     [SADMM_ARRAY_COUPLING_REACTION] = {6, OF_COUPLING, get_reaction, NULL, NULL},
+    [SADMM_ARRAY_BODY_GRAVITY_SCALE] = {1, OF_BODY, get_gravity_scale, check_gravity_scale, set_gravity_scale},
+    [SADMM_ARRAY_BODY_DAMPING] = {2, OF_BODY, get_damping, check_damping, set_damping},
+    [SADMM_ARRAY_JOINT_LOWER] = COORDINATE_KIND(lower),
+    [SADMM_ARRAY_JOINT_UPPER] = COORDINATE_KIND(upper),
+    [SADMM_ARRAY_JOINT_DRIVE_STIFFNESS] = COORDINATE_KIND(drive_stiffness),
+    [SADMM_ARRAY_JOINT_DRIVE_DAMPING] = COORDINATE_KIND(drive_damping),
+    [SADMM_ARRAY_JOINT_DRIVE_LIMIT] = COORDINATE_KIND(drive_force),
+    [SADMM_ARRAY_JOINT_FRICTION] = COORDINATE_KIND(friction),
+    [SADMM_ARRAY_JOINT_SPRING_STIFFNESS] = COORDINATE_KIND(spring_stiffness),
+    [SADMM_ARRAY_JOINT_SPRING_DAMPING] = COORDINATE_KIND(spring_damping),
+    [SADMM_ARRAY_JOINT_SPRING_REST] = COORDINATE_KIND(spring_rest),
+    [SADMM_ARRAY_JOINT_ARMATURE] = COORDINATE_KIND(armature),
+    [SADMM_ARRAY_SHAPE_MATERIAL] = {2, OF_SHAPE, get_material, check_material, set_material},
+    [SADMM_ARRAY_GRAVITY] = {3, OF_WORLD, get_gravity, check_gravity, set_gravity},
+    [SADMM_ARRAY_REPORT] = {8, OF_WORLD, get_report, NULL, NULL},
 };
 
 static const struct array_kind *kind_of(sadmm_array array)
@@ -224,20 +348,35 @@ static const struct array_kind *kind_of(sadmm_array array)
     return (unsigned)array < SADMM_ARRAY_COUNT ? &kinds[array] : NULL;
 }
 
+const char *sadmm_array_name(sadmm_array array) { return kind_of(array) ? sadmm_array_names[array] : ""; }
 int32_t sadmm_array_columns(sadmm_array array) { return kind_of(array) ? kind_of(array)->columns : 0; }
 bool sadmm_array_is_settable(sadmm_array array) { return kind_of(array) && kind_of(array)->set; }
 
+/* Whose objects have the rows; NULL: it is one row, of the world. */
 static const struct sadmm_id_pool *ids_of(const sadmm_world *world, const struct array_kind *kind)
 {
-    return kind->owner == OF_BODY    ? &world->body_ids
-           : kind->owner == OF_JOINT ? &world->joint_ids
-                                     : &world->coupling_ids;
+    switch (kind->owner) {
+    case OF_BODY: return &world->body_ids;
+    case OF_SHAPE: return &world->shape_ids;
+    case OF_JOINT: return &world->joint_ids;
+    case OF_COUPLING: return &world->coupling_ids;
+    case OF_WORLD: break;
+    }
+    return NULL;
+}
+
+/* The slot of a row; of the row after that of `slot`. */
+static size_t slot_of(const struct sadmm_id_pool *ids, int32_t row) { return ids ? sadmm_ids_at(ids, row) : 0; }
+static size_t slot_after(const struct sadmm_id_pool *ids, size_t slot)
+{
+    return ids ? sadmm_ids_from(ids, slot + 1) : slot + 1;
 }
 
 int32_t sadmm_world_array_rows(const sadmm_world *world, sadmm_array array)
 {
     const struct array_kind *kind = kind_of(array);
-    return kind && world ? ids_of(world, kind)->count : 0;
+    if (!kind || !world) return 0;
+    return kind->owner == OF_WORLD ? 1 : ids_of(world, kind)->count;
 }
 
 /* The array, its range and its numbers, and all that is needed from a device. */
@@ -262,8 +401,8 @@ sadmm_status sadmm_world_get_array(sadmm_world *world, sadmm_array array, int32_
     TRY(begin(world, array, first, count, values));
     const struct array_kind *kind = &kinds[array];
     const struct sadmm_id_pool *ids = ids_of(world, kind);
-    size_t slot = count > 0 ? sadmm_ids_at(ids, first) : 0;
-    for (int32_t row = 0; row < count; ++row, slot = sadmm_ids_from(ids, slot + 1))
+    size_t slot = count > 0 ? slot_of(ids, first) : 0;
+    for (int32_t row = 0; row < count; ++row, slot = slot_after(ids, slot))
         TRY(kind->get(world, slot, values + (size_t)row * (size_t)kind->columns));
     return SADMM_OK;
 }
@@ -286,8 +425,8 @@ sadmm_status sadmm_world_set_array(sadmm_world *world, sadmm_array array, int32_
         return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "array = %d: must be one that can be set",
                           (int)array);
     for (int setting = 0; setting < 2; ++setting) {
-        size_t slot = count > 0 ? sadmm_ids_at(ids, first) : 0;
-        for (int32_t row = 0; row < count; ++row, slot = sadmm_ids_from(ids, slot + 1)) {
+        size_t slot = count > 0 ? slot_of(ids, first) : 0;
+        for (int32_t row = 0; row < count; ++row, slot = slot_after(ids, slot)) {
             const double *given = values + (size_t)row * (size_t)kind->columns;
             const sadmm_status status =
                 setting ? kind->set(world, slot, given) : kind->check(world, slot, given, &world->error);

@@ -1,0 +1,119 @@
+/* World level: environments, many copies of one world that do not know of each other, for learning loops and parameter
+ * studies.
+ *
+ * Each environment makes the same steps, to the last bit, as a world of its own would that began as the template and
+ * was given the same numbers, whatever the others do, on however many threads, in whatever order. All have the bodies,
+ * shapes, joints, gears and couplings of the template; what steps change is stored once an environment, and numbers
+ * that differ from the template's only where there is an array of them. There is no spacing: every environment is at
+ * the template's place.
+ *
+ * Arrays are those of arrays.h with one more dimension: environments x rows x columns. An environment whose step fails
+ * (a velocity that is not finite, a number in an input array that is out of range) is left as it was before that step,
+ * is marked, makes no further steps until it is reset, and does not keep the others from making theirs.
+ *
+ * On the CPU only. Threads: use environments from one thread at a time; steps use settings.threads of the template's
+ * (0: all cores), and its `tasks`. Errors that every call has besides its own: INVALID_ARGUMENT where a pointer is NULL
+ * that must not be.
+ */
+#ifndef SUBADMM_ENVIRONMENTS_H
+#define SUBADMM_ENVIRONMENTS_H
+
+#include <stddef.h>
+
+#include "arrays.h"
+#include "world.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct sadmm_environments sadmm_environments;
+
+/* `count` copies, in [1, 2^20], of the template `world` as it is now, impulses for warm starting included. The world
+ * does not change, and may be destroyed. Errors: INVALID_ARGUMENT (count), UNAVAILABLE (the world's backend is CUDA),
+ * OUT_OF_MEMORY; those of steps begun (world.h). The message is the world's. */
+SADMM_API sadmm_status sadmm_world_replicate(sadmm_world *world, int32_t count, sadmm_environments **out);
+SADMM_API void sadmm_environments_destroy(sadmm_environments *environments); /* NULL is fine */
+/* The message of the last failed call, "" when none failed or environments is NULL; valid until the next call. */
+SADMM_API const char *sadmm_environments_message(const sadmm_environments *environments);
+SADMM_API int32_t sadmm_environments_count(const sadmm_environments *environments); /* of NULL: 0 */
+/* Bytes of all that is stored an environment: states, and its share of the arrays. Of NULL: 0. */
+SADMM_API size_t sadmm_environments_memory(const sadmm_environments *environments);
+
+/* `steps` time steps, >= 1, of settings.dt each, in every environment that is not marked. Input arrays are read once,
+ * before the first of them; output arrays are written once, after the last. Errors: INVALID_ARGUMENT (steps),
+ * OUT_OF_MEMORY, LIMIT (of any environment, which is marked; the others have made their steps). */
+SADMM_API sadmm_status sadmm_environments_step(sadmm_environments *environments, int32_t steps);
+
+/* The settings of all; gravity is that of an input array where there is one, and no more threads than the template's
+ * settings asked for. Errors: INVALID_ARGUMENT (nothing changes). */
+SADMM_API sadmm_status sadmm_environments_set_settings(sadmm_environments *environments,
+                                                       const sadmm_settings *settings);
+SADMM_API void sadmm_environments_settings_sized(const sadmm_environments *environments, sadmm_settings *settings,
+                                                 size_t size);
+static inline sadmm_settings sadmm_environments_settings(const sadmm_environments *environments)
+{
+    sadmm_settings settings;
+    sadmm_environments_settings_sized(environments, &settings, sizeof settings);
+    return settings;
+}
+
+/* ---- states -------------------------------------------------------------------------------------------------- */
+
+/* State 0 is the template's. `which`: `count` environments, each at most once; NULL: all, and count is ignored. */
+
+/* Each of these begins again with a state: states[k], or 0 where states is NULL. All that steps change is as it was,
+ * warm start and the report included, so that the same steps follow, bit for bit; what input arrays have stays. Marks
+ * are taken away. Errors: INVALID_ARGUMENT (range; an environment twice; nothing changes), OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_environments_reset(sadmm_environments *environments, const int32_t *which, int32_t count,
+                                                const int32_t *states);
+/* Keep the state of an environment to reset to; *state: its number. Errors: INVALID_ARGUMENT (range; it is marked),
+ * OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_environments_keep(sadmm_environments *environments, int32_t environment, int32_t *state);
+/* As sadmm_world_save of the environment as it is now, to restore into a world: to look at it, to query it, to know its
+ * contacts. Errors: those of sadmm_world_save, INVALID_ARGUMENT (range). */
+SADMM_API sadmm_status sadmm_environments_save(sadmm_environments *environments, int32_t environment, void *buffer,
+                                               size_t capacity, size_t *size);
+
+/* ---- arrays -------------------------------------------------------------------------------------------------- */
+
+/* Rows and columns of an array are those of arrays.h: sadmm_environments_rows of them, sadmm_array_columns. */
+SADMM_API int32_t sadmm_environments_rows(const sadmm_environments *environments, sadmm_array array); /* NULL: 0 */
+
+/* An array is one of three kinds. State: BODY_STATE and COUPLING_TARGET, which steps change; set them by
+ * sadmm_environments_set. Input: all others that can be set; neither steps nor sadmm_environments_reset change it.
+ * Output: those that are read only. */
+
+/* Rows of the environments `which`, into or from `values` (count x rows x columns). Set: an input array is one from
+ * then on, as by sadmm_environments_bind. Errors: INVALID_ARGUMENT (range; set: those of sadmm_world_set_array, with
+ * the environment in the message; nothing changes), UNAVAILABLE (as sadmm_world_get_array), OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_environments_get(sadmm_environments *environments, sadmm_array array, const int32_t *which,
+                                              int32_t count, double *values);
+SADMM_API sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_array array, const int32_t *which,
+                                              int32_t count, const double *values);
+
+/* An array in the memory of the environments. */
+typedef struct sadmm_environments_array {
+    void *values; /* environments x rows x columns, row-major, without gaps */
+    int64_t environments, rows, columns;
+    sadmm_precision precision; /* F64: double, F32: float */
+} sadmm_environments_array;
+
+/* *out stays valid until the environments are destroyed, at the same place. Output and state: the numbers after each
+ * call that steps, resets or sets; do not write to it. Input: write to it between calls; environments have it from the
+ * next step on. It begins with what they have now. An input array has one precision, that of the first call. Errors:
+ * INVALID_ARGUMENT (array, precision; an input array that has the other precision), UNAVAILABLE (as
+ * sadmm_world_get_array), OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_array array,
+                                               sadmm_precision precision, sadmm_environments_array *out);
+
+/* Which are marked: count bytes, 1 or 0, one an environment, valid until the environments are destroyed; NULL of
+ * NULL. */
+SADMM_API const uint8_t *sadmm_environments_marked(const sadmm_environments *environments);
+/* Why an environment is marked, "" where it is not, or out of range; valid until the next call. */
+SADMM_API const char *sadmm_environments_mark(const sadmm_environments *environments, int32_t environment);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

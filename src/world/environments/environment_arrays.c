@@ -1,0 +1,239 @@
+/* Arrays of environments: those of worlds, with one dimension more. */
+#include "environment_arrays.h"
+
+#include <string.h>
+
+#include "core/base/check.h"
+#include "core/base/memory.h"
+
+/* Numbers of an environment. */
+static size_t numbers_of(const struct sadmm_environments *environments, sadmm_array array)
+{
+    return (size_t)sadmm_environments_rows(environments, array) * (size_t)sadmm_array_columns(array);
+}
+
+int32_t sadmm_environments_rows(const sadmm_environments *environments, sadmm_array array)
+{
+    return environments ? sadmm_world_array_rows(environments->worker[0].world, array) : 0;
+}
+
+static bool is_input(sadmm_array array)
+{
+    return sadmm_array_is_settable(array) && array != SADMM_ARRAY_BODY_STATE && array != SADMM_ARRAY_COUPLING_TARGET;
+}
+
+static sadmm_status check_array(struct sadmm_environments *environments, sadmm_array array)
+{
+    if ((unsigned)array < SADMM_ARRAY_COUNT) return SADMM_OK;
+    return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "array = %d: must be in [0, %d)", (int)array,
+                      SADMM_ARRAY_COUNT);
+}
+
+/* The first that is bound of an array, in any precision where it is -1; NULL: none. */
+static struct sadmm_bound_array *bound_of(const struct sadmm_environments *environments, sadmm_array array,
+                                          int precision)
+{
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        struct sadmm_bound_array *bound = &environments->bound[k];
+        if (bound->array == array && (precision < 0 || (int)bound->precision == precision)) return bound;
+    }
+    return NULL;
+}
+
+static void load_numbers(const struct sadmm_bound_array *bound, int32_t environment, double *out)
+{
+    const size_t n = bound->numbers, first = n * (size_t)environment;
+    if (bound->precision == SADMM_F64) memcpy(out, (const double *)bound->values + first, n * sizeof *out);
+    else
+        for (size_t k = 0; k < n; ++k) out[k] = (double)((const float *)bound->values)[first + k];
+}
+
+static void store_numbers(const struct sadmm_bound_array *bound, int32_t environment, const double *numbers)
+{
+    const size_t n = bound->numbers, first = n * (size_t)environment;
+    if (bound->precision == SADMM_F64) memcpy((double *)bound->values + first, numbers, n * sizeof *numbers);
+    else
+        for (size_t k = 0; k < n; ++k) ((float *)bound->values)[first + k] = (float)numbers[k];
+}
+
+static sadmm_status get_all(sadmm_world *world, sadmm_array array, double *values)
+{
+    return sadmm_world_get_array(world, array, 0, sadmm_world_array_rows(world, array), values);
+}
+
+static sadmm_status set_all(sadmm_world *world, sadmm_array array, const double *values)
+{
+    const sadmm_status status = sadmm_world_set_array(world, array, 0, sadmm_world_array_rows(world, array), values);
+    if (status == SADMM_OK) return SADMM_OK;
+    const struct sadmm_error cause = world->error;
+    return sadmm_fail(&world->error, status, "%s: %s", sadmm_array_name(array), cause.message);
+}
+
+/* ---- in steps ---------------------------------------------------------------------------------------------------- */
+
+sadmm_status sadmm_environments_read_inputs(struct sadmm_environments *environments,
+                                            struct sadmm_environment_worker *worker, int32_t environment)
+{
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        const struct sadmm_bound_array *bound = &environments->bound[k];
+        if (!is_input(bound->array)) continue;
+        load_numbers(bound, environment, worker->numbers);
+        TRY(set_all(worker->world, bound->array, worker->numbers));
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environments,
+                                              struct sadmm_environment_worker *worker, int32_t environment)
+{
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        const struct sadmm_bound_array *bound = &environments->bound[k];
+        if (is_input(bound->array)) continue;
+        TRY(get_all(worker->world, bound->array, worker->numbers));
+        store_numbers(bound, environment, worker->numbers);
+    }
+    return SADMM_OK;
+}
+
+/* ---- binding ----------------------------------------------------------------------------------------------------- */
+
+/* What an array has of an environment, whose input arrays are read where it is no input itself. */
+static sadmm_status read_environment(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                     int32_t environment, sadmm_array array, double *values)
+{
+    const struct sadmm_bound_array *bound = is_input(array) ? bound_of(environments, array, -1) : NULL;
+    if (bound) {
+        load_numbers(bound, environment, values);
+        return SADMM_OK;
+    }
+    TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
+    return get_all(worker->world, array, values);
+}
+
+static sadmm_status fill(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                         int32_t environment, int32_t place, void *argument)
+{
+    const struct sadmm_bound_array *bound = (const struct sadmm_bound_array *)argument;
+    (void)place;
+    TRY(read_environment(environments, worker, environment, bound->array, worker->numbers));
+    store_numbers(bound, environment, worker->numbers);
+    return SADMM_OK;
+}
+
+/* *out: the array that is bound, newly or before. */
+static sadmm_status bind(struct sadmm_environments *environments, sadmm_array array, sadmm_precision precision,
+                         struct sadmm_bound_array **out)
+{
+    struct sadmm_error *error = &environments->error;
+    const size_t n = environments->bound_count;
+    const bool input = is_input(array);
+    *out = bound_of(environments, array, input ? -1 : (int)precision);
+    if (*out && (*out)->precision != precision)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "precision = %d: must be %d, which this array has",
+                          (int)precision, (int)(*out)->precision);
+    if (*out) return SADMM_OK;
+    if (!SADMM_GROW(environments->bound, n, n + 1)) return sadmm_fail_memory(error, "an array of environments");
+    struct sadmm_bound_array fresh = {array, precision, numbers_of(environments, array), NULL};
+    fresh.values = sadmm_alloc((size_t)environments->count,
+                               fresh.numbers * (precision == SADMM_F64 ? sizeof(double) : sizeof(float)));
+    if (!fresh.values) return sadmm_fail_memory(error, "an array of environments");
+    const sadmm_status status = sadmm_environments_each(environments, NULL, environments->count, fill, &fresh);
+    if (status != SADMM_OK) {
+        sadmm_free(fresh.values);
+        return status;
+    }
+    environments->bound[n] = fresh;
+    environments->bound_count = n + 1;
+    *out = &environments->bound[n];
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_array array, sadmm_precision precision,
+                                     sadmm_environments_array *out)
+{
+    struct sadmm_bound_array *bound;
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    struct sadmm_error *error = &environments->error;
+    TRY(sadmm_check_given(out, "out", error));
+    TRY(check_array(environments, array));
+    if (precision != SADMM_F32 && precision != SADMM_F64)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "precision = %d: must be SADMM_F32 or SADMM_F64",
+                          (int)precision);
+    TRY(bind(environments, array, precision, &bound));
+    *out = (sadmm_environments_array){.values = bound->values,
+                                      .environments = environments->count,
+                                      .rows = sadmm_environments_rows(environments, array),
+                                      .columns = sadmm_array_columns(array),
+                                      .precision = precision};
+    return SADMM_OK;
+}
+
+/* ---- some environments ------------------------------------------------------------------------------------------- */
+
+struct rows_of {
+    sadmm_array array;
+    size_t numbers;
+    double *out;
+    const double *in;
+    struct sadmm_bound_array *bound; /* NULL: it is a state */
+};
+
+static sadmm_status get_one(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                            int32_t environment, int32_t place, void *argument)
+{
+    const struct rows_of *rows = (const struct rows_of *)argument;
+    return read_environment(environments, worker, environment, rows->array, rows->out + rows->numbers * (size_t)place);
+}
+
+sadmm_status sadmm_environments_get(sadmm_environments *environments, sadmm_array array, const int32_t *which,
+                                    int32_t count, double *values)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(check_array(environments, array));
+    TRY(sadmm_environments_check_which(environments, which, &count));
+    struct rows_of rows = {.array = array, .numbers = numbers_of(environments, array), .out = values};
+    if (rows.numbers > 0 && count > 0) TRY(sadmm_check_given(values, "values", &environments->error));
+    return sadmm_environments_each(environments, which, count, get_one, &rows);
+}
+
+/* Can it be set? The worker's world is left with it. */
+static sadmm_status try_one(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                            int32_t environment, int32_t place, void *argument)
+{
+    const struct rows_of *rows = (const struct rows_of *)argument;
+    TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
+    return set_all(worker->world, rows->array, rows->in + rows->numbers * (size_t)place);
+}
+
+static sadmm_status set_one(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                            int32_t environment, int32_t place, void *argument)
+{
+    const struct rows_of *rows = (const struct rows_of *)argument;
+    if (rows->bound) {
+        store_numbers(rows->bound, environment, rows->in + rows->numbers * (size_t)place);
+        return SADMM_OK;
+    }
+    TRY(try_one(environments, worker, environment, place, argument));
+    TRY(sadmm_environment_state_store(worker->world, &environments->states[environment]));
+    return sadmm_environments_write_outputs(environments, worker, environment);
+}
+
+sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_array array, const int32_t *which,
+                                    int32_t count, const double *values)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(check_array(environments, array));
+    TRY(sadmm_environments_check_which(environments, which, &count));
+    struct rows_of rows = {.array = array, .numbers = numbers_of(environments, array), .in = values};
+    if (rows.numbers > 0 && count > 0) TRY(sadmm_check_given(values, "values", &environments->error));
+    if (!sadmm_array_is_settable(array))
+        return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "array = %d: must be one that can be set",
+                          (int)array);
+    /* From here on every environment has its own, so that what a worker tries is of no other one. */
+    if (is_input(array)) {
+        const struct sadmm_bound_array *before = bound_of(environments, array, -1);
+        TRY(bind(environments, array, before ? before->precision : SADMM_F64, &rows.bound));
+    }
+    TRY(sadmm_environments_each(environments, which, count, try_one, &rows));
+    return sadmm_environments_each(environments, which, count, set_one, &rows);
+}

@@ -1,0 +1,14 @@
+/* Arrays that are bound, in steps. */
+#ifndef SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_ARRAYS_H
+#define SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_ARRAYS_H
+
+#include "environment_work.h"
+
+/* The worker's world, which is an environment already, has what its input arrays have. */
+sadmm_status sadmm_environments_read_inputs(struct sadmm_environments *environments,
+                                            struct sadmm_environment_worker *worker, int32_t environment);
+/* The other arrays that are bound have what the worker's world has. */
+sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environments,
+                                              struct sadmm_environment_worker *worker, int32_t environment);
+
+#endif

@@ -1,0 +1,88 @@
+#include "environment_work.h"
+
+#include <stdatomic.h>
+#include <stdio.h>
+
+/* Environments a thread in one region: threads that come late take part from the next region on. */
+enum { AT_A_TIME = 16 };
+
+struct sharing {
+    struct sadmm_environments *environments;
+    const int32_t *which;
+    int32_t end;
+    _Atomic int32_t next; /* whoever is free takes the next one: results do not depend on who it is */
+    sadmm_environment_work *work;
+    void *argument;
+};
+
+static void share(void *argument, int thread, int threads)
+{
+    struct sharing *sharing = (struct sharing *)argument;
+    struct sadmm_environment_worker *worker = &sharing->environments->worker[thread];
+    (void)threads;
+    for (int32_t k; (k = atomic_fetch_add(&sharing->next, 1)) < sharing->end;) {
+        const sadmm_status status =
+            sharing->work(sharing->environments, worker, sharing->which ? sharing->which[k] : k, k, sharing->argument);
+        if (status == SADMM_OK || (worker->failed_at >= 0 && worker->failed_at < k)) continue;
+        worker->failed_at = k;
+        worker->failed = worker->world->error;
+    }
+}
+
+sadmm_status sadmm_environments_each(struct sadmm_environments *environments, const int32_t *which, int32_t count,
+                                     sadmm_environment_work *work, void *argument)
+{
+    const struct sadmm_environment_worker *first = NULL;
+    for (int t = 0; t < environments->workers; ++t) environments->worker[t].failed_at = -1;
+    const int asked = environments->threads,
+              wanted = asked > 0 && asked < environments->workers ? asked : environments->workers;
+    for (int32_t begin = 0; begin < count;) {
+        const int threads = sadmm_team_threads(&environments->team, wanted, (size_t)(count - begin));
+        struct sharing sharing = {.environments = environments, .which = which, .work = work, .argument = argument};
+        const int32_t most = AT_A_TIME * threads;
+        sharing.end = count - begin > most ? begin + most : count;
+        atomic_init(&sharing.next, begin);
+        sadmm_parallel(&environments->team, threads, share, &sharing);
+        begin = sharing.end;
+    }
+    for (int t = 0; t < environments->workers; ++t) {
+        const struct sadmm_environment_worker *worker = &environments->worker[t];
+        if (worker->failed_at >= 0 && (!first || worker->failed_at < first->failed_at)) first = worker;
+    }
+    if (!first) return SADMM_OK;
+    return sadmm_fail(&environments->error, first->failed.status, "environment %d: %s",
+                      which ? which[first->failed_at] : first->failed_at, first->failed.message);
+}
+
+sadmm_status sadmm_environments_check(struct sadmm_environments *environments, const char *name, int32_t environment)
+{
+    if (environment >= 0 && environment < environments->count) return SADMM_OK;
+    return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "%s = %d: must be in [0, %d)", name,
+                      environment, environments->count);
+}
+
+sadmm_status sadmm_environments_check_which(struct sadmm_environments *environments, const int32_t *which,
+                                            int32_t *count)
+{
+    char name[32];
+    if (!which) {
+        *count = environments->count;
+        return SADMM_OK;
+    }
+    if (*count < 0 || *count > environments->count)
+        return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "count = %d: must be in [0, %d]", *count,
+                          environments->count);
+    const uint32_t call = ++environments->calls;
+    for (int32_t k = 0; k < *count; ++k) {
+        const bool there = which[k] >= 0 && which[k] < environments->count;
+        if (there && environments->seen[which[k]] != call) {
+            environments->seen[which[k]] = call;
+            continue;
+        }
+        snprintf(name, sizeof name, "which[%d]", k);
+        TRY(sadmm_environments_check(environments, name, which[k]));
+        return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "%s = %d: is there twice", name,
+                          which[k]);
+    }
+    return SADMM_OK;
+}

@@ -1,0 +1,55 @@
+/* Environments, and their work shared out over threads. */
+#ifndef SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_WORK_H
+#define SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_WORK_H
+
+#include "environment_state.h"
+#include "subadmm/environments.h"
+
+/* An array that is bound; of an input array, what environments have. */
+struct sadmm_bound_array {
+    sadmm_array array;
+    sadmm_precision precision;
+    size_t numbers; /* an environment: rows x columns */
+    void *values;
+};
+
+/* What one thread works with: a world that becomes one environment after the other. */
+struct sadmm_environment_worker {
+    sadmm_world *world;
+    double *numbers;   /* of the largest array of an environment */
+    int32_t failed_at; /* the first of a call's environments that failed, by its place in the call; -1: none */
+    struct sadmm_error failed;
+};
+
+struct sadmm_environments {
+    struct sadmm_error error;
+    struct sadmm_team team;
+    int32_t count, workers;
+    struct sadmm_environment_worker *worker;
+    struct sadmm_environment_state *states; /* (count) */
+    struct sadmm_environment_state *kept;   /* to reset to; the first is the template's */
+    size_t kept_count;
+    uint8_t *marked; /* (count) */
+    char **marks;    /* (count) why; NULL where it is not marked, or no memory was left to say so */
+    uint32_t *seen;  /* (count) the last call that named it */
+    uint32_t calls;
+    struct sadmm_bound_array *bound;
+    size_t bound_count;
+    int threads; /* settings.threads of all; each worker has 1 */
+};
+
+/* Work of one environment, the `place`-th of a call, by a worker. Its status is the call's where no earlier one
+ * failed. */
+typedef sadmm_status sadmm_environment_work(struct sadmm_environments *environments,
+                                            struct sadmm_environment_worker *worker, int32_t environment, int32_t place,
+                                            void *argument);
+/* The work of `count` environments, of all where `which` is NULL, shared out over threads. */
+sadmm_status sadmm_environments_each(struct sadmm_environments *environments, const int32_t *which, int32_t count,
+                                     sadmm_environment_work *work, void *argument);
+/* Are these environments, none of them twice? NULL: all; *count is their number. Else INVALID_ARGUMENT. */
+sadmm_status sadmm_environments_check_which(struct sadmm_environments *environments, const int32_t *which,
+                                            int32_t *count);
+/* INVALID_ARGUMENT, with the argument's name, of a number that is no environment's. */
+sadmm_status sadmm_environments_check(struct sadmm_environments *environments, const char *name, int32_t environment);
+
+#endif

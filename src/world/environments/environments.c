@@ -1,0 +1,304 @@
+/* Many copies of a world. A thread has one world, its worker, which becomes one environment after the other: the state
+ * of an environment is loaded, its steps are made, its state is stored. So an environment takes no more memory than
+ * what steps change, its steps run in the processor's caches, and no environment can see another one. */
+#include <string.h>
+
+#include "core/base/check.h"
+#include "core/base/definition_fields.h"
+#include "core/base/memory.h"
+#include "core/model/settings.h"
+#include "environment_arrays.h"
+#include "subadmm/save.h"
+
+enum { MOST_ENVIRONMENTS = 1 << 20 };
+
+/* ---- marks ------------------------------------------------------------------------------------------------------- */
+
+static void unmark(struct sadmm_environments *environments, int32_t environment)
+{
+    sadmm_free(environments->marks[environment]);
+    environments->marks[environment] = NULL;
+    environments->marked[environment] = 0;
+}
+
+static void mark(struct sadmm_environments *environments, int32_t environment, const char *why)
+{
+    const size_t size = strlen(why) + 1;
+    unmark(environments, environment);
+    environments->marked[environment] = 1;
+    environments->marks[environment] = (char *)sadmm_alloc(size, 1);
+    if (environments->marks[environment]) memcpy(environments->marks[environment], why, size);
+}
+
+const uint8_t *sadmm_environments_marked(const sadmm_environments *environments)
+{
+    return environments ? environments->marked : NULL;
+}
+
+const char *sadmm_environments_mark(const sadmm_environments *environments, int32_t environment)
+{
+    if (!environments || environment < 0 || environment >= environments->count || !environments->marked[environment])
+        return "";
+    return environments->marks[environment] ? environments->marks[environment] : "no memory is left to say why";
+}
+
+/* ---- creation ---------------------------------------------------------------------------------------------------- */
+
+/* The world of the saved bytes, for one thread and the host. */
+static sadmm_status create_worker(struct sadmm_environment_worker *worker, const void *bytes, size_t size,
+                                  struct sadmm_error *error)
+{
+    const sadmm_world_def def = sadmm_world_def_default();
+    sadmm_status status = sadmm_world_create(&def, &worker->world);
+    if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_last_message());
+    sadmm_world *world = worker->world;
+    status = sadmm_world_restore(world, bytes, size);
+    if (status == SADMM_OK && world->def.backend == SADMM_BACKEND_AUTO)
+        status = sadmm_world_set_backend(world, SADMM_BACKEND_CPU, world->def.precision, 0);
+    if (status != SADMM_OK) return sadmm_fail(error, status, "%s", world->error.message);
+    world->def.settings.threads = 1;
+    size_t most = 1;
+    for (int array = 0; array < SADMM_ARRAY_COUNT; ++array) {
+        const size_t numbers =
+            (size_t)sadmm_world_array_rows(world, (sadmm_array)array) * (size_t)sadmm_array_columns((sadmm_array)array);
+        most = numbers > most ? numbers : most;
+    }
+    worker->numbers = (double *)sadmm_alloc(most, sizeof *worker->numbers);
+    return worker->numbers ? SADMM_OK : sadmm_fail_memory(error, "environments");
+}
+
+static sadmm_status make(struct sadmm_environments *environments, const void *bytes, size_t size,
+                         struct sadmm_error *error)
+{
+    const size_t count = (size_t)environments->count;
+    environments->worker =
+        (struct sadmm_environment_worker *)sadmm_alloc((size_t)environments->workers, sizeof *environments->worker);
+    environments->states = (struct sadmm_environment_state *)sadmm_alloc(count, sizeof *environments->states);
+    environments->marked = (uint8_t *)sadmm_alloc(count, sizeof *environments->marked);
+    environments->marks = (char **)sadmm_alloc(count, sizeof *environments->marks);
+    environments->seen = (uint32_t *)sadmm_alloc(count, sizeof *environments->seen);
+    if (!environments->worker || !environments->states || !environments->marked || !environments->marks ||
+        !environments->seen || !SADMM_GROW(environments->kept, 0, 1))
+        return sadmm_fail_memory(error, "environments");
+    for (int t = 0; t < environments->workers; ++t) TRY(create_worker(&environments->worker[t], bytes, size, error));
+    environments->kept_count = 1;
+    sadmm_world *world = environments->worker[0].world;
+    if (sadmm_environment_state_store(world, &environments->kept[0]) != SADMM_OK)
+        return sadmm_fail_memory(error, "environments");
+    for (size_t i = 0; i < count; ++i)
+        TRY(sadmm_environment_state_copy(&environments->states[i], &environments->kept[0], error));
+    return SADMM_OK;
+}
+
+static sadmm_status save_template(sadmm_world *world, unsigned char **bytes, size_t *size)
+{
+    *bytes = NULL;
+    TRY(sadmm_world_save(world, NULL, 0, size));
+    *bytes = (unsigned char *)sadmm_alloc(*size, 1);
+    if (!*bytes) return sadmm_fail_memory(&world->error, "environments");
+    return sadmm_world_save(world, *bytes, *size, size);
+}
+
+sadmm_status sadmm_world_replicate(sadmm_world *world, int32_t count, sadmm_environments **out)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(out, "out", error));
+    *out = NULL;
+    if (count < 1 || count > MOST_ENVIRONMENTS)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "count = %d: must be in [1, %d]", count,
+                          (int)MOST_ENVIRONMENTS);
+    if (world->def.backend == SADMM_BACKEND_CUDA)
+        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "environments: the world's backend must be CPU or AUTO");
+    unsigned char *bytes;
+    size_t size;
+    sadmm_status status = save_template(world, &bytes, &size);
+    struct sadmm_environments *environments = (struct sadmm_environments *)sadmm_alloc(1, sizeof *environments);
+    if (status == SADMM_OK && !environments) status = sadmm_fail_memory(error, "environments");
+    if (status == SADMM_OK) {
+        environments->team = world->team;
+        environments->count = count;
+        environments->threads = world->def.settings.threads;
+        environments->workers = sadmm_team_threads(&environments->team, environments->threads, (size_t)count);
+        status = make(environments, bytes, size, error);
+    }
+    sadmm_free(bytes);
+    if (status == SADMM_OK) *out = environments;
+    else sadmm_environments_destroy(environments);
+    return status;
+}
+
+void sadmm_environments_destroy(sadmm_environments *environments)
+{
+    if (!environments) return;
+    for (int t = 0; environments->worker && t < environments->workers; ++t) {
+        sadmm_world_destroy(environments->worker[t].world);
+        sadmm_free(environments->worker[t].numbers);
+    }
+    for (int32_t i = 0; environments->states && i < environments->count; ++i)
+        sadmm_environment_state_free(&environments->states[i]);
+    for (int32_t i = 0; environments->marks && i < environments->count; ++i) sadmm_free(environments->marks[i]);
+    for (size_t k = 0; k < environments->kept_count; ++k) sadmm_environment_state_free(&environments->kept[k]);
+    for (size_t k = 0; k < environments->bound_count; ++k) sadmm_free(environments->bound[k].values);
+    void *blocks[] = {environments->worker, environments->states, environments->kept, environments->marked,
+                      environments->marks,  environments->seen,   environments->bound};
+    for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
+    sadmm_free(environments);
+}
+
+const char *sadmm_environments_message(const sadmm_environments *environments)
+{
+    return environments ? environments->error.message : "";
+}
+
+int32_t sadmm_environments_count(const sadmm_environments *environments)
+{
+    return environments ? environments->count : 0;
+}
+
+size_t sadmm_environments_memory(const sadmm_environments *environments)
+{
+    if (!environments) return 0;
+    const size_t count = (size_t)environments->count;
+    size_t bytes = count * (sizeof *environments->states + sizeof *environments->marked + sizeof *environments->marks +
+                            sizeof *environments->seen);
+    for (size_t i = 0; i < count; ++i) bytes += SADMM_ROOM(environments->states[i].bytes);
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        const struct sadmm_bound_array *bound = &environments->bound[k];
+        bytes += count * bound->numbers * (bound->precision == SADMM_F64 ? sizeof(double) : sizeof(float));
+    }
+    return (bytes + count - 1) / count;
+}
+
+/* ---- settings ---------------------------------------------------------------------------------------------------- */
+
+sadmm_status sadmm_environments_set_settings(sadmm_environments *environments, const sadmm_settings *given)
+{
+    sadmm_settings settings;
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_settings_take(&settings, given, &environments->error));
+    environments->threads = settings.threads;
+    settings.threads = 1;
+    for (int t = 0; t < environments->workers; ++t) environments->worker[t].world->def.settings = settings;
+    return SADMM_OK;
+}
+
+void sadmm_environments_settings_sized(const sadmm_environments *environments, sadmm_settings *settings, size_t size)
+{
+    if (!environments) {
+        sadmm_settings_init(settings, size);
+        return;
+    }
+    sadmm_settings own = environments->worker[0].world->def.settings;
+    own.threads = environments->threads;
+    (void)sadmm_growing_give(&sadmm_growing_settings, settings, size, 0, &own, "settings", NULL);
+}
+
+/* ---- steps ------------------------------------------------------------------------------------------------------- */
+
+/* What failed is marked; memory that ran out is the call's affair, too. */
+static sadmm_status take_failure(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                 int32_t environment, sadmm_status status)
+{
+    if (status == SADMM_OK) return SADMM_OK;
+    mark(environments, environment, worker->world->error.message);
+    return status == SADMM_ERROR_NON_FINITE || status == SADMM_ERROR_INVALID_ARGUMENT ? SADMM_OK : status;
+}
+
+static sadmm_status make_steps(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                               int32_t environment, int32_t place, void *argument)
+{
+    const int32_t steps = *(const int32_t *)argument;
+    sadmm_world *world = worker->world;
+    (void)place;
+    if (environments->marked[environment]) return SADMM_OK;
+    TRY(sadmm_environment_state_load(world, &environments->states[environment]));
+    sadmm_status status = sadmm_environments_read_inputs(environments, worker, environment);
+    if (status != SADMM_OK) return take_failure(environments, worker, environment, status);
+    for (int32_t k = 0; k < steps && status == SADMM_OK; ++k) status = sadmm_world_step(world);
+    status = take_failure(environments, worker, environment, status);
+    TRY(take_failure(environments, worker, environment,
+                     sadmm_environment_state_store(world, &environments->states[environment])));
+    TRY(sadmm_environments_write_outputs(environments, worker, environment));
+    return status;
+}
+
+sadmm_status sadmm_environments_step(sadmm_environments *environments, int32_t steps)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    if (steps < 1)
+        return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "steps = %d: must be >= 1", steps);
+    return sadmm_environments_each(environments, NULL, environments->count, make_steps, &steps);
+}
+
+/* ---- states ------------------------------------------------------------------------------------------------------ */
+
+static sadmm_status begin_again(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                int32_t environment, int32_t place, void *argument)
+{
+    const int32_t *states = (const int32_t *)argument;
+    struct sadmm_environment_state *state = &environments->states[environment];
+    TRY(sadmm_environment_state_copy(state, &environments->kept[states ? states[place] : 0], &worker->world->error));
+    unmark(environments, environment);
+    if (environments->bound_count == 0) return SADMM_OK;
+    TRY(sadmm_environment_state_load(worker->world, state));
+    return sadmm_environments_write_outputs(environments, worker, environment);
+}
+
+sadmm_status sadmm_environments_reset(sadmm_environments *environments, const int32_t *which, int32_t count,
+                                      const int32_t *states)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_environments_check_which(environments, which, &count));
+    for (int32_t k = 0; states && k < count; ++k)
+        if (states[k] < 0 || (size_t)states[k] >= environments->kept_count)
+            return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "states[%d] = %d: must be in [0, %d)",
+                              k, states[k], (int)environments->kept_count);
+    return sadmm_environments_each(environments, which, count, begin_again, (void *)states);
+}
+
+sadmm_status sadmm_environments_keep(sadmm_environments *environments, int32_t environment, int32_t *state)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    struct sadmm_error *error = &environments->error;
+    TRY(sadmm_check_given(state, "state", error));
+    TRY(sadmm_environments_check(environments, "environment", environment));
+    if (environments->marked[environment])
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "environment = %d: is marked (%s)", environment,
+                          sadmm_environments_mark(environments, environment));
+    const size_t n = environments->kept_count;
+    if (n >= INT32_MAX || !SADMM_GROW(environments->kept, n, n + 1)) return sadmm_fail_memory(error, "a state");
+    TRY(sadmm_environment_state_copy(&environments->kept[n], &environments->states[environment], error));
+    environments->kept_count = n + 1;
+    *state = (int32_t)n;
+    return SADMM_OK;
+}
+
+/* The first worker's world is an environment, with what its input arrays have. */
+static sadmm_status become(struct sadmm_environments *environments, int32_t environment)
+{
+    struct sadmm_environment_worker *worker = &environments->worker[0];
+    TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
+    return sadmm_environments_read_inputs(environments, worker, environment);
+}
+
+sadmm_status sadmm_environments_save(sadmm_environments *environments, int32_t environment, void *buffer,
+                                     size_t capacity, size_t *size)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    struct sadmm_error *error = &environments->error;
+    TRY(sadmm_environments_check(environments, "environment", environment));
+    TRY(sadmm_check_given(size, "size", error));
+    sadmm_world *world = environments->worker[0].world;
+    sadmm_status status = become(environments, environment);
+    if (status == SADMM_OK) {
+        const size_t kinematic = 6 * (size_t)world->kinematic_count;
+        if (!SADMM_GROW(world->start.kinematic, 0, kinematic)) return sadmm_fail_memory(error, "kinematic bodies");
+        world->start.kinematic_count = world->kinematic_count;
+        world->step_settings = world->def.settings;
+        world->def.settings.threads = environments->threads;
+        status = sadmm_world_save(world, buffer, capacity, size);
+        world->def.settings.threads = 1;
+    }
+    return status == SADMM_OK ? SADMM_OK : sadmm_fail(error, status, "%s", world->error.message);
+}
