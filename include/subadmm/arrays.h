@@ -30,10 +30,14 @@ typedef enum sadmm_array {
     SADMM_ARRAY_BODY_INERTIA,        /* 4: mass (kg), principal moments (kg m^2); 0 of bodies that are not dynamic. Set:
                                        as sadmm_world_set_body_mass */
     /* A row a joint, a column a coordinate (joint.h): m or rad, m/s or rad/s, N or N m. */
-    SADMM_ARRAY_JOINT_POSITION,        /* 6: sadmm_joint_state.position. Read only, as are the next three */
-    SADMM_ARRAY_JOINT_SPEED,           /* 6: sadmm_joint_state.speed */
-    SADMM_ARRAY_JOINT_DRIVE_FORCE,     /* 6: sadmm_joint_state.drive_force */
-    SADMM_ARRAY_JOINT_WRENCH,          /* 6: sadmm_joint_state.wrench_b, world */
+    SADMM_ARRAY_JOINT_POSITION,    /* 6: sadmm_joint_state.position. Set: b and all that is joined to it move along, or,
+                                      where the world holds them, a and what is joined to that; the other joints keep
+                                      their positions and speeds. Locked coordinates are not read, and become 0. Three
+                                      free rotations: at most half a turn. A joint in a loop or one that holds a distance
+                                      can only be set to what it has: INVALID_ARGUMENT */
+    SADMM_ARRAY_JOINT_SPEED,       /* 6: sadmm_joint_state.speed. Set: likewise, velocities alone change */
+    SADMM_ARRAY_JOINT_DRIVE_FORCE, /* 6: sadmm_joint_state.drive_force. Read only */
+    SADMM_ARRAY_JOINT_WRENCH,      /* 6: sadmm_joint_state.wrench_b, world. Read only */
     SADMM_ARRAY_JOINT_TARGET_POSITION, /* 6: target_position of the drives; 0 for locked coordinates, and must be 0
                                           there. Set: as sadmm_world_set_joint_coordinate */
     SADMM_ARRAY_JOINT_TARGET_SPEED,    /* 6: likewise target_speed */

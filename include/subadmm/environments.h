@@ -80,8 +80,8 @@ SADMM_API sadmm_status sadmm_environments_save(sadmm_environments *environments,
 /* Rows and columns of an array are those of arrays.h: sadmm_environments_rows of them, sadmm_array_columns. */
 SADMM_API int32_t sadmm_environments_rows(const sadmm_environments *environments, sadmm_array array); /* NULL: 0 */
 
-/* An array is one of three kinds. State: BODY_STATE and COUPLING_TARGET, which steps change; set them by
- * sadmm_environments_set. Input: all others that can be set; neither steps nor sadmm_environments_reset change it.
+/* An array is one of three kinds. State: BODY_STATE, JOINT_POSITION, JOINT_SPEED and COUPLING_TARGET, which steps
+ * change; set them by sadmm_environments_set. Input: all others that can be set; neither steps nor sadmm_environments_reset change it.
  * Output: those that are read only. */
 
 /* Rows of the environments `which`, into or from `values` (count x rows x columns). Set: an input array is one from

@@ -17,9 +17,12 @@ int32_t sadmm_environments_rows(const sadmm_environments *environments, sadmm_ar
     return environments ? sadmm_world_array_rows(environments->worker[0].world, array) : 0;
 }
 
+/* What steps change is none: it is a state. */
 static bool is_input(sadmm_array array)
 {
-    return sadmm_array_is_settable(array) && array != SADMM_ARRAY_BODY_STATE && array != SADMM_ARRAY_COUPLING_TARGET;
+    const bool is_state = array == SADMM_ARRAY_BODY_STATE || array == SADMM_ARRAY_JOINT_POSITION ||
+                          array == SADMM_ARRAY_JOINT_SPEED || array == SADMM_ARRAY_COUPLING_TARGET;
+    return sadmm_array_is_settable(array) && !is_state;
 }
 
 static sadmm_status check_array(struct sadmm_environments *environments, sadmm_array array)

@@ -11,6 +11,7 @@
 #include "core/solve/resident.h"
 #include "coupling.h"
 #include "joint.h"
+#include "joint_place.h"
 #include "world/resident/resident.h"
 #include "world/state/ids.h"
 
@@ -22,7 +23,7 @@ struct array_kind {
     enum owner owner;
     sadmm_status (*get)(sadmm_world *world, size_t slot, double *row);
     /* NULL: read only. `check`: may the row be set? */
-    sadmm_status (*check)(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error);
+    sadmm_status (*check)(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error);
     sadmm_status (*set)(sadmm_world *world, size_t slot, const double *row);
 };
 
@@ -53,7 +54,7 @@ static sadmm_status get_state(sadmm_world *world, size_t slot, double *row)
     return SADMM_OK;
 }
 
-static sadmm_status check_state(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+static sadmm_status check_state(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
 {
     const sadmm_body_state state = state_of(row);
     double ignored[4];
@@ -78,8 +79,7 @@ static sadmm_status get_wrench(sadmm_world *world, size_t slot, double *row)
 }
 
 /* Of bodies that are not dynamic: 0, as it is read. */
-static sadmm_status check_none(const sadmm_world *world, size_t slot, const double *row, int count,
-                               struct sadmm_error *error)
+static sadmm_status check_none(sadmm_world *world, size_t slot, const double *row, int count, struct sadmm_error *error)
 {
     for (int k = 0; k < count; ++k)
         if (!(row[k] == 0))
@@ -88,7 +88,7 @@ static sadmm_status check_none(const sadmm_world *world, size_t slot, const doub
     return SADMM_OK;
 }
 
-static sadmm_status check_wrench(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+static sadmm_status check_wrench(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
 {
     return dynamic(world, slot) ? sadmm_world_check_wrench(row, row + 3, error)
                                 : check_none(world, slot, row, 6, error);
@@ -118,7 +118,7 @@ static sadmm_status get_inertia(sadmm_world *world, size_t slot, double *row)
     return SADMM_OK;
 }
 
-static sadmm_status check_inertia(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+static sadmm_status check_inertia(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
 {
     return dynamic(world, slot) ? sadmm_world_check_mass(world, row[0], row + 1, error)
                                 : check_none(world, slot, row, 4, error);
@@ -136,8 +136,7 @@ static sadmm_status get_gravity_scale(sadmm_world *world, size_t slot, double *r
     return SADMM_OK;
 }
 
-static sadmm_status check_gravity_scale(const sadmm_world *world, size_t slot, const double *row,
-                                        struct sadmm_error *error)
+static sadmm_status check_gravity_scale(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
 {
     return dynamic(world, slot) ? sadmm_numbers_check(SADMM_BODY_FIELD(gravity_scale), row, "column 0", error)
                                 : check_none(world, slot, row, 1, error);
@@ -155,7 +154,7 @@ static sadmm_status get_damping(sadmm_world *world, size_t slot, double *row)
     return SADMM_OK;
 }
 
-static sadmm_status check_damping(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+static sadmm_status check_damping(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
 {
     if (!dynamic(world, slot)) return check_none(world, slot, row, 2, error);
     TRY(sadmm_numbers_check(SADMM_BODY_FIELD(linear_damping), row, "column 0", error));
@@ -177,7 +176,7 @@ static sadmm_status get_material(sadmm_world *world, size_t slot, double *row)
     return SADMM_OK;
 }
 
-static sadmm_status check_material(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+static sadmm_status check_material(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
 {
     (void)world;
     (void)slot;
@@ -202,37 +201,60 @@ static sadmm_status set_material(sadmm_world *world, size_t slot, const double *
         memcpy(row, state.member, sizeof state.member);                                 \
         return SADMM_OK;                                                                \
     }
-GET_OF_JOINT(get_joint_position, position)
-GET_OF_JOINT(get_joint_speed, speed)
 GET_OF_JOINT(get_joint_drive_force, drive_force)
 GET_OF_JOINT(get_joint_wrench, wrench_b)
 
-#define COORDINATES_OF_JOINT(member)                                                                        \
-    static sadmm_status get_##member(sadmm_world *world, size_t slot, double *row)                          \
-    {                                                                                                       \
-        for (int k = 0; k < JOINT_COORDINATES; ++k) row[k] = world->joints[slot].def.coordinates[k].member; \
-        return SADMM_OK;                                                                                    \
-    }                                                                                                       \
-    static sadmm_status check_##member(const sadmm_world *world, size_t slot, const double *row,            \
-                                       struct sadmm_error *error)                                           \
-    {                                                                                                       \
-        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                   \
-            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                     \
-            if (row[k] == coordinate.member) continue;                                                      \
-            coordinate.member = row[k];                                                                     \
-            TRY(sadmm_world_check_coordinate(&world->joints[slot], k, &coordinate, error));                 \
-        }                                                                                                   \
-        return SADMM_OK;                                                                                    \
-    }                                                                                                       \
-    static sadmm_status set_##member(sadmm_world *world, size_t slot, const double *row)                    \
-    {                                                                                                       \
-        struct sadmm_world_joint *joint = &world->joints[slot];                                             \
-        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                   \
-            if (row[k] == joint->def.coordinates[k].member) continue;                                       \
-            joint->def.coordinates[k].member = row[k];                                                      \
-            TRY(sadmm_world_take_update(world, joint, (enum sadmm_joint_update)k));                         \
-        }                                                                                                   \
-        return SADMM_OK;                                                                                    \
+static sadmm_status get_joint_position(sadmm_world *world, size_t slot, double *row)
+{
+    double speed[6];
+    sadmm_world_read_joint_motion(world, &world->joints[slot], row, speed);
+    return SADMM_OK;
+}
+
+static sadmm_status check_joint_position(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    (void)error; /* the world's */
+    return sadmm_world_check_joint_positions(world, slot, row);
+}
+
+static sadmm_status get_joint_speed(sadmm_world *world, size_t slot, double *row)
+{
+    double position[6];
+    sadmm_world_read_joint_motion(world, &world->joints[slot], position, row);
+    return SADMM_OK;
+}
+
+static sadmm_status check_joint_speed(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    (void)error; /* the world's */
+    return sadmm_world_check_joint_speeds(world, slot, row);
+}
+
+#define COORDINATES_OF_JOINT(member)                                                                                  \
+    static sadmm_status get_##member(sadmm_world *world, size_t slot, double *row)                                    \
+    {                                                                                                                 \
+        for (int k = 0; k < JOINT_COORDINATES; ++k) row[k] = world->joints[slot].def.coordinates[k].member;           \
+        return SADMM_OK;                                                                                              \
+    }                                                                                                                 \
+    static sadmm_status check_##member(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error) \
+    {                                                                                                                 \
+        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                             \
+            sadmm_joint_coordinate coordinate = world->joints[slot].def.coordinates[k];                               \
+            if (row[k] == coordinate.member) continue;                                                                \
+            coordinate.member = row[k];                                                                               \
+            TRY(sadmm_world_check_coordinate(&world->joints[slot], k, &coordinate, error));                           \
+        }                                                                                                             \
+        return SADMM_OK;                                                                                              \
+    }                                                                                                                 \
+    static sadmm_status set_##member(sadmm_world *world, size_t slot, const double *row)                              \
+    {                                                                                                                 \
+        struct sadmm_world_joint *joint = &world->joints[slot];                                                       \
+        for (int32_t k = 0; k < JOINT_COORDINATES; ++k) {                                                             \
+            if (row[k] == joint->def.coordinates[k].member) continue;                                                 \
+            joint->def.coordinates[k].member = row[k];                                                                \
+            TRY(sadmm_world_take_update(world, joint, (enum sadmm_joint_update)k));                                   \
+        }                                                                                                             \
+        return SADMM_OK;                                                                                              \
     }
 COORDINATES_OF_JOINT(target_position)
 COORDINATES_OF_JOINT(target_speed)
@@ -255,7 +277,7 @@ static sadmm_status get_target(sadmm_world *world, size_t slot, double *row)
     return SADMM_OK;
 }
 
-static sadmm_status check_target(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+static sadmm_status check_target(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
 {
     struct sadmm_rigid ignored;
     (void)world;
@@ -283,7 +305,7 @@ static sadmm_status get_gravity(sadmm_world *world, size_t slot, double *row)
     return SADMM_OK;
 }
 
-static sadmm_status check_gravity(const sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+static sadmm_status check_gravity(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
 {
     sadmm_settings settings = world->def.settings;
     (void)slot;
@@ -311,15 +333,19 @@ static sadmm_status get_report(sadmm_world *world, size_t slot, double *row)
 
 /* ---- all --------------------------------------------------------------------------------------------------------- */
 
-#define COORDINATE_KIND(member) {6, OF_JOINT, get_##member, check_##member, set_##member}
+#define COORDINATE_KIND(member)                                 \
+    {                                                           \
+        6, OF_JOINT, get_##member, check_##member, set_##member \
+    }
 
 static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
     [SADMM_ARRAY_BODY_STATE] = {13, OF_BODY, get_state, check_state, set_state},
     [SADMM_ARRAY_BODY_WRENCH] = {6, OF_BODY, get_wrench, check_wrench, set_wrench},
     [SADMM_ARRAY_BODY_CONTACT_WRENCH] = {6, OF_BODY, get_contact_wrench, NULL, NULL},
     [SADMM_ARRAY_BODY_INERTIA] = {4, OF_BODY, get_inertia, check_inertia, set_inertia},
-    [SADMM_ARRAY_JOINT_POSITION] = {6, OF_JOINT, get_joint_position, NULL, NULL},
-    [SADMM_ARRAY_JOINT_SPEED] = {6, OF_JOINT, get_joint_speed, NULL, NULL},
+    [SADMM_ARRAY_JOINT_POSITION] = {6, OF_JOINT, get_joint_position, check_joint_position,
+                                    sadmm_world_set_joint_positions},
+    [SADMM_ARRAY_JOINT_SPEED] = {6, OF_JOINT, get_joint_speed, check_joint_speed, sadmm_world_set_joint_speeds},
     [SADMM_ARRAY_JOINT_DRIVE_FORCE] = {6, OF_JOINT, get_joint_drive_force, NULL, NULL},
     [SADMM_ARRAY_JOINT_WRENCH] = {6, OF_JOINT, get_joint_wrench, NULL, NULL},
     [SADMM_ARRAY_JOINT_TARGET_POSITION] = COORDINATE_KIND(target_position),

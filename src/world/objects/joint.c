@@ -10,6 +10,7 @@
 #include "core/base/memory.h"
 #include "core/math/rigid.h"
 #include "joint.h"
+#include "joint_place.h"
 #include "joint_slots.h"
 #include "world/resident/resident.h"
 #include "world/resident/resident_joints.h"
@@ -345,20 +346,6 @@ sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, c
 
 /* ---- state ------------------------------------------------------------------------------------------------------- */
 
-static void read_motion(const sadmm_world *world, const struct sadmm_world_joint *joint, sadmm_joint_state *state)
-{
-    static const double still[6];
-    const struct joint_geometry geometry = geometry_now(world, joint);
-    const double *v[2];
-    for (int s = 0; s < 2; ++s) v[s] = joint->body[s] >= 0 ? world->bodies[joint->body[s]].rigid.velocity : still;
-    for (int k = 0; k < JOINT_COORDINATES; ++k) {
-        state->position[k] = joint_winds(joint->def.locks, k) ? joint_unwind(geometry.value[k], joint->last.angle[k])
-                                                              : geometry.value[k];
-        state->speed[k] = joint_rate(&geometry, k, v[0], v[1]);
-    }
-    if (joint_is_radial(joint->def.kind) && joint->def.locks & 1) state->position[0] -= joint->def.length;
-}
-
 sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadmm_joint_state *state)
 {
     TRY(sadmm_check_given(world, "world", NULL));
@@ -369,7 +356,7 @@ sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadm
     TRY(sadmm_world_download_joints(world));
     const struct sadmm_joint_memory *last = &joint->last;
     memset(state, 0, sizeof *state);
-    read_motion(world, joint, state);
+    sadmm_world_read_joint_motion(world, joint, state->position, state->speed);
     memcpy(state->point, last->point, sizeof state->point);
     for (int k = 0; k < JOINT_COORDINATES; ++k) {
         state->wrench_b[k] = last->wrench[k];

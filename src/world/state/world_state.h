@@ -141,6 +141,15 @@ struct sadmm_world {
         size_t dirty_joint_count;
     } resident;
 
+    /* Bodies on one side of a joint (joint_place.c). */
+    struct {
+        uint32_t *seen; /* by body slot, `marks` of them: the call that reached it last */
+        size_t marks;
+        uint32_t call;
+        int32_t *bodies; /* slots, `count` of them */
+        size_t count;
+    } placing;
+
     /* What queries search (query_scene.c). */
     struct {
         bool listed;  /* the tree has the world's shapes, and */

@@ -1,0 +1,18 @@
+/* Joints set to positions and speeds: what they hold on one side moves along. */
+#ifndef SADMM_WORLD_OBJECTS_JOINT_PLACE_H
+#define SADMM_WORLD_OBJECTS_JOINT_PLACE_H
+
+#include "world/state/world_state.h"
+
+/* Positions and speeds of a joint, as in sadmm_joint_state. */
+void sadmm_world_read_joint_motion(const sadmm_world *world, const struct sadmm_world_joint *joint, double position[6],
+                                   double speed[6]);
+/* May the joint in a slot be set to these positions? Else INVALID_ARGUMENT; OUT_OF_MEMORY. */
+sadmm_status sadmm_world_check_joint_positions(sadmm_world *world, size_t slot, const double position[6]);
+sadmm_status sadmm_world_check_joint_speeds(sadmm_world *world, size_t slot, const double speed[6]);
+/* It is, where it may be: the others keep their positions and speeds. Of a loop, which may only have what it has:
+ * nothing. */
+sadmm_status sadmm_world_set_joint_positions(sadmm_world *world, size_t slot, const double position[6]);
+sadmm_status sadmm_world_set_joint_speeds(sadmm_world *world, size_t slot, const double speed[6]);
+
+#endif
