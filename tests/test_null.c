@@ -630,8 +630,8 @@ static const struct {
       "sadmm_joint_def_init", "sadmm_coupling_def_init", "sadmm_gear_def_init", "sadmm_mesh_def_init",
       "sadmm_heightfield_def_init", "sadmm_mesh_file_def_init", "sadmm_query_filter_init"}},
     {NULL,
-     {"sadmm_array_name", "sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_version_number",
-      "sadmm_build_commit", "sadmm_build_compiler"}},
+     {"sadmm_array_name", "sadmm_environments_is_input", "sadmm_status_name", "sadmm_last_message", "sadmm_version",
+      "sadmm_version_number", "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };
 

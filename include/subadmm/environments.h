@@ -81,8 +81,9 @@ SADMM_API sadmm_status sadmm_environments_save(sadmm_environments *environments,
 SADMM_API int32_t sadmm_environments_rows(const sadmm_environments *environments, sadmm_array array); /* NULL: 0 */
 
 /* An array is one of three kinds. State: BODY_STATE, JOINT_POSITION, JOINT_SPEED and COUPLING_TARGET, which steps
- * change; set them by sadmm_environments_set. Input: all others that can be set; neither steps nor sadmm_environments_reset change it.
- * Output: those that are read only. */
+ * change; set them by sadmm_environments_set. Input: all others that can be set; neither steps nor
+ * sadmm_environments_reset change it. Output: those that are read only. Thread-safe. */
+SADMM_API bool sadmm_environments_is_input(sadmm_array array);
 
 /* Rows of the environments `which`, into or from `values` (count x rows x columns). Set: an input array is one from
  * then on, as by sadmm_environments_bind. Errors: INVALID_ARGUMENT (range; set: those of sadmm_world_set_array, with

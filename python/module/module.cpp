@@ -96,4 +96,5 @@ NB_MODULE(_core, m)
     bind_queries(w);
     bind_events(m, w);
     bind_scenes(m, w);
+    bind_environments(m);
 }

@@ -52,6 +52,7 @@ from ._core import (
     version,
 )
 from .decomposition import decompose
+from .environments import Environments, replicate
 from .given import indices, numbers, real
 from .importing import load
 
@@ -59,12 +60,13 @@ __version__ = version()
 
 __all__ = [
     "decompose", "load",
-    "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
+    "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Environments", "Error", "FileError",
+    "Gear",
     "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape",
     "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
     "CONTACT_BEGUN", "CONTACT_ENDED", "SENSOR_BEGUN", "SENSOR_ENDED", "event_dtype",
-    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "scene",
+    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "replicate", "scene",
     "scene_from_json",
     "scenes", "sphere",
     "version",

@@ -17,8 +17,7 @@ int32_t sadmm_environments_rows(const sadmm_environments *environments, sadmm_ar
     return environments ? sadmm_world_array_rows(environments->worker[0].world, array) : 0;
 }
 
-/* What steps change is none: it is a state. */
-static bool is_input(sadmm_array array)
+bool sadmm_environments_is_input(sadmm_array array)
 {
     const bool is_state = array == SADMM_ARRAY_BODY_STATE || array == SADMM_ARRAY_JOINT_POSITION ||
                           array == SADMM_ARRAY_JOINT_SPEED || array == SADMM_ARRAY_COUPLING_TARGET;
@@ -79,7 +78,7 @@ sadmm_status sadmm_environments_read_inputs(struct sadmm_environments *environme
 {
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
-        if (!is_input(bound->array)) continue;
+        if (!sadmm_environments_is_input(bound->array)) continue;
         load_numbers(bound, environment, worker->numbers);
         TRY(set_all(worker->world, bound->array, worker->numbers));
     }
@@ -91,7 +90,7 @@ sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environ
 {
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
-        if (is_input(bound->array)) continue;
+        if (sadmm_environments_is_input(bound->array)) continue;
         TRY(get_all(worker->world, bound->array, worker->numbers));
         store_numbers(bound, environment, worker->numbers);
     }
@@ -104,7 +103,8 @@ sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environ
 static sadmm_status read_environment(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
                                      int32_t environment, sadmm_array array, double *values)
 {
-    const struct sadmm_bound_array *bound = is_input(array) ? bound_of(environments, array, -1) : NULL;
+    const struct sadmm_bound_array *bound =
+        sadmm_environments_is_input(array) ? bound_of(environments, array, -1) : NULL;
     if (bound) {
         load_numbers(bound, environment, values);
         return SADMM_OK;
@@ -129,7 +129,7 @@ static sadmm_status bind(struct sadmm_environments *environments, sadmm_array ar
 {
     struct sadmm_error *error = &environments->error;
     const size_t n = environments->bound_count;
-    const bool input = is_input(array);
+    const bool input = sadmm_environments_is_input(array);
     *out = bound_of(environments, array, input ? -1 : (int)precision);
     if (*out && (*out)->precision != precision)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "precision = %d: must be %d, which this array has",
@@ -233,7 +233,7 @@ sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_arra
         return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "array = %d: must be one that can be set",
                           (int)array);
     /* From here on every environment has its own, so that what a worker tries is of no other one. */
-    if (is_input(array)) {
+    if (sadmm_environments_is_input(array)) {
         const struct sadmm_bound_array *before = bound_of(environments, array, -1);
         TRY(bind(environments, array, before ? before->precision : SADMM_F64, &rows.bound));
     }

@@ -1,0 +1,150 @@
+"""Many copies of a world or of a loaded robot, stepped together: replicate()."""
+
+import numpy as np
+
+from . import _core
+from .given import whole
+from .importing.model import Loaded
+
+
+def replicate(template, count):
+    """`count` environments, each a copy of `template` as it is now: a World, or what load() returned. They do not see
+    each other, and make the same steps as worlds of their own, bit for bit, on settings.threads threads (0: all cores).
+    The template does not change. Of a robot (MJCF or URDF) a Robots, else an Environments. On the CPU."""
+    if isinstance(template, Loaded):
+        from .robots import Robots  # needs more of the package
+
+        if hasattr(template, "positions"):
+            return Robots(template, count)
+        template = template.world
+    if not isinstance(template, _core.World):
+        raise TypeError(f"template = {template!r}: must be a subadmm.World or what subadmm.load returned")
+    return Environments(template, count)
+
+
+class Environments:
+    """Copies of a World, numbered from 0 to count - 1.
+
+    Arrays are those of World.get with one dimension more: environments x rows x columns. `array` gives them where they
+    lie, without a copy: output and state arrays are read only and have the numbers after each step and reset; input
+    arrays are written to, and read by each step. An environment whose step fails is marked in `failed` and makes no
+    steps until it is reset; the others go on.
+    """
+
+    def __init__(self, world, count):
+        self._core = _core._replicate(world, count)
+        self._failed = self._core.marked()
+
+    def __repr__(self):
+        return f"<subadmm environments: {self.count}>"
+
+    def __len__(self):
+        return self.count
+
+    @property
+    def count(self):
+        """How many there are."""
+        return self._core.count
+
+    @property
+    def memory(self):
+        """Bytes an environment, states and arrays."""
+        return self._core.memory
+
+    @property
+    def settings(self):
+        """Settings of all: a copy; assign it to change them."""
+        return self._core.settings
+
+    @settings.setter
+    def settings(self, settings):
+        self._core.settings = settings
+
+    @property
+    def failed(self):
+        """Which are marked: bool, count; the array stays the same."""
+        return self._failed
+
+    def reason(self, environment):
+        """Why an environment is marked; '' where it is not."""
+        return self._core.mark(self._one(environment))
+
+    def _one(self, environment):
+        return whole("environment", environment, 0, self.count - 1)
+
+    def _which(self, which):
+        """int32 numbers, of numbers or of a mask; None: all."""
+        if which is None:
+            return None
+        which = np.asarray(which)
+        if which.dtype == bool:
+            if which.shape != (self.count,):
+                raise ValueError(f"which: a mask must have shape ({self.count},), and has {which.shape}")
+            which = np.flatnonzero(which)
+        which = np.atleast_1d(which)
+        if which.size == 0:
+            which = which.astype(np.int32)
+        if which.dtype.kind not in "iu" or which.ndim != 1:
+            raise TypeError(f"which: must be a mask or whole numbers, is {which.dtype} of shape {which.shape}")
+        if which.size and not (which.min() >= -(2**31) and which.max() < 2**31):
+            raise ValueError("which: must be environments")
+        return np.ascontiguousarray(which, np.int32)
+
+    def step(self, steps=1):
+        """Make `steps` time steps of settings.dt in all that are not marked."""
+        self._core.step(steps)
+
+    def reset(self, which=None, states=None):
+        """Environments (numbers, or a mask; None: all) begin again, each with a state: 0 is the template's, others are
+        those that keep() returned; one for all, or one each. The same steps follow, bit for bit. What input arrays have
+        stays."""
+        rows = self._which(which)
+        if states is not None:
+            given = np.asarray(states)
+            if given.dtype.kind not in "iu":
+                raise TypeError(f"states: must be whole numbers, is {given.dtype}")
+            n = self.count if rows is None else len(rows)
+            if given.shape not in ((), (n,)):
+                raise ValueError(f"states: must be one number, or {n}; has shape {given.shape}")
+            if given.size and not (given.min() >= 0 and given.max() < 2**31):
+                raise ValueError("states: must be numbers that keep() returned, or 0")
+            states = np.ascontiguousarray(np.broadcast_to(given, (n,)), np.int32)
+        self._core.reset(rows, states)
+
+    def keep(self, environment=0):
+        """Keep the state of an environment to reset to; its number."""
+        return self._core.keep(self._one(environment))
+
+    def array(self, name, precision="f64"):
+        """An array of all environments where it lies, float64 or ('f32') float32: the same one every time. An input
+        array has one precision."""
+        return self._core.bind(name, precision)
+
+    def get(self, name, which=None):
+        """A copy of an array's numbers: of environments (numbers, or a mask; None: all)."""
+        return self._core.get(name, self._which(which))
+
+    def set(self, name, values, which=None):
+        """Set an array that can be set, in environments (numbers, or a mask; None: all): values of shape environments x
+        rows x columns, or what fits that by NumPy's rules. If anything is refused, nothing is set."""
+        rows = self._which(which)
+        now = self._core.get(name, rows)
+        values = np.asarray(values)
+        if values.dtype.kind not in "iuf":
+            raise TypeError(f"values: must be real numbers, is {values.dtype}")
+        try:
+            values = np.broadcast_to(values, now.shape)
+        except ValueError:
+            raise ValueError(f"values: must have shape {now.shape}, and has {values.shape}") from None
+        self._core.set(name, np.ascontiguousarray(values, np.float64), rows)
+
+    def world(self, environment):
+        """A new World as an environment is now: to look at it, to query it, or to go on with it."""
+        world = _core.World()
+        world.restore(self._core.save(self._one(environment)))
+        return world
+
+    @property
+    def error(self):
+        """How far the last step of each is from the laws, m/s; -1: not known. count numbers, a copy."""
+        return self.array("report")[:, 0, 0].copy()

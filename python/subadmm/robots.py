@@ -1,0 +1,277 @@
+"""Many copies of a loaded robot, in MuJoCo's order of numbers: replicate()."""
+
+import contextlib
+
+import numpy as np
+
+from .environments import Environments
+from .given import numbers
+from .importing.actuators import FORCE_SPEED
+from .importing.model import name_of
+
+# ---- quaternions w x y z in the last axis --------------------------------------------------------------------------
+
+
+def _mul(a, b):
+    """Turn by b, then by a."""
+    w, v, s, u = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
+    return np.concatenate([w * s - (v * u).sum(-1, keepdims=True), w * u + s * v + np.cross(v, u)], -1)
+
+
+def _back(q):
+    return q * np.array([1.0, -1, -1, -1])
+
+
+def _turn(q, v):
+    w, u = q[..., :1], q[..., 1:]
+    t = 2 * np.cross(u, v)
+    return v + w * t + np.cross(u, t)
+
+
+def _of_vector(v):
+    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * v], -1)
+
+
+def _to_vector(q):
+    """A rotation vector of at most half a turn."""
+    q = np.where(q[..., :1] < 0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = np.where(sine > 1e-12, 2 * np.arctan2(sine, q[..., :1]) / sine, 2.0)
+    return scale * q[..., 1:]
+
+
+def _unit(q):
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+class _Free:
+    """A joint of type 'free': where its numbers are, and the bodies that move with it."""
+
+    def __init__(self, loaded, joint, q, qd, rows, ties):
+        self.q, self.qd = slice(q, q + 7), slice(qd, qd + 6)
+        self.body = rows[joint.body]
+        self.place, self.turn = joint._frame
+        self.tree = _joined(self.body, ties)
+
+
+def _joined(body, ties):
+    """Bodies that joints tie to one, that one first."""
+    found, at = [body], 0
+    while at < len(found):
+        found += sorted({b for pair in ties if found[at] in pair for b in pair} - set(found))
+        at += 1
+    return np.array(found)
+
+
+class Robots(Environments):
+    """Copies of a robot. `q`, `qd`: all positions and velocities in MuJoCo's order and frames (count x nq, count x nv);
+    `ctrl`: controls of the actuators (count x nu), which are written to and hold from the next step on; `loaded`: the
+    template."""
+
+    def __init__(self, loaded, count):
+        self._drives = _Drives(loaded)
+        with self._drives.all_on():
+            super().__init__(loaded.world, count)
+        self.loaded = loaded
+        source, world = loaded.source, loaded.world
+        rows = {body: k for k, body in enumerate(world.bodies)}
+        joints = {joint: k for k, joint in enumerate(world.joints)}
+        ties = [(rows[j.body_a], rows[j.body_b]) for j in joints if j.body_a is not None and j.body_b is not None]
+        dynamic = {rows[body] for body in rows if body.type == "dynamic"}
+        ties = [pair for pair in ties if dynamic.issuperset(pair)]
+        self._free, self._balls, hinges = [], [], []
+        for k in range(source.njnt):
+            joint = loaded.joints[name_of(source, "joint", k)]
+            q, qd = int(source.jnt_qposadr[k]), int(source.jnt_dofadr[k])
+            if joint.type == "free":
+                self._free.append(_Free(loaded, joint, q, qd, rows, ties))
+            elif joint.type == "ball":
+                self._balls.append((slice(q, q + 4), slice(qd, qd + 3), joints[joint.joint], joint._turn))
+            else:
+                hinges.append((q, qd, joints[joint.joint], joint.coordinate, joint.sign, joint.offset))
+        self._hinges = [np.array(column) for column in zip(*hinges)] if hinges else [np.zeros(0, int)] * 6
+        self._state = self.array("body_state")
+        self._position, self._speed = self.array("joint_position"), self.array("joint_speed")
+        #: Controls, as MuJoCo's ctrl, of the actuators in `loaded.actuators`.
+        self.ctrl = np.tile(self._drives.start, (count, 1))
+        self._arrays = {name: self.array(name) for name in self._drives.arrays}
+
+    def __repr__(self):
+        return f"<subadmm robots: {self.count}>"
+
+    def step(self, steps=1):
+        """Make `steps` time steps with the controls in `ctrl`, each within its actuator's range. Of an environment with
+        a control that is no number it is said in `failed`."""
+        self._drives.write(self.ctrl, self._arrays)
+        super().step(steps)
+
+    # ---- positions and velocities ----------------------------------------------------------------------------------
+
+    @property
+    def q(self):
+        """Positions, as MuJoCo's qpos: count x nq, a copy."""
+        out = np.zeros((self.count, self.loaded.source.nq))
+        q, _, row, coordinate, sign, offset = self._hinges
+        out[:, q] = sign * self._position[:, row, coordinate] + offset
+        for at, _, row, turn in self._balls:
+            out[:, at] = _of_vector(_turn(turn, self._position[:, row, 3:]))
+        for free in self._free:
+            turned = self._state[:, free.body, 3:7]
+            out[:, free.q] = np.concatenate(
+                [self._state[:, free.body, :3] + _turn(turned, free.place), _mul(turned, free.turn)], -1
+            )
+        return out
+
+    @property
+    def qd(self):
+        """Velocities, as MuJoCo's qvel: count x nv, a copy."""
+        out = np.zeros((self.count, self.loaded.source.nv))
+        _, qd, row, coordinate, sign, _ = self._hinges
+        out[:, qd] = sign * self._speed[:, row, coordinate]
+        for _, at, row, turn in self._balls:
+            file = _of_vector(_turn(turn, self._position[:, row, 3:]))
+            out[:, at] = _turn(_back(file), _turn(turn, self._speed[:, row, 3:]))
+        for free in self._free:
+            turned, linear, angular = np.split(self._state[:, free.body, 3:], (4, 7), -1)
+            out[:, free.qd] = np.concatenate(
+                [linear + np.cross(angular, _turn(turned, free.place)), _turn(_back(_mul(turned, free.turn)), angular)],
+                -1,
+            )
+        return out
+
+    def set_positions(self, q, qd=None, which=None):
+        """Positions and velocities (None: 0) in MuJoCo's order, of environments (numbers, or a mask; None: all): one row
+        for all, or one each. What moves with the bodies does so; contacts begin anew. If anything is refused, nothing is
+        set."""
+        rows = self._which(which)
+        n = self.count if rows is None else len(rows)
+        source = self.loaded.source
+        q = self._rows("q", q, n, source.nq)
+        qd = self._rows("qd", np.zeros(source.nv) if qd is None else qd, n, source.nv)
+        before = self._core.get("body_state", rows)
+        try:
+            self._place(rows, q, qd)
+        except Exception:
+            self._core.set("body_state", before, rows)
+            raise
+
+    @staticmethod
+    def _rows(name, values, n, columns):
+        values = numbers(name, np.atleast_2d(values), columns)
+        if len(values) not in (1, n):
+            raise ValueError(f"{name}: must have 1 row or {n}, and has {len(values)}")
+        if not np.isfinite(values).all():
+            raise ValueError(f"{name}: must be finite numbers")
+        return np.broadcast_to(values, (n, columns))
+
+    def _place(self, rows, q, qd):
+        core = self._core
+        position, speed = core.get("joint_position", rows), core.get("joint_speed", rows)
+        at, of, row, coordinate, sign, offset = self._hinges
+        position[:, row, coordinate] = sign * (q[:, at] - offset)
+        speed[:, row, coordinate] = sign * qd[:, of]
+        for at, of, row, turn in self._balls:
+            file = _unit(q[:, at])
+            position[:, row, 3:] = _turn(_back(np.asarray(turn)), _to_vector(file))
+            speed[:, row, 3:] = _turn(_back(np.asarray(turn)), _turn(file, qd[:, of]))
+        if position.shape[1]:
+            core.set("joint_position", position, rows)
+            core.set("joint_speed", speed, rows)
+        state = core.get("body_state", rows)
+        for free in self._free:
+            self._move(state, free, q[:, free.q], qd[:, free.qd])
+        if self._free:
+            core.set("body_state", state, rows)
+
+    @staticmethod
+    def _move(state, free, q, qd):
+        """What is joined to a free joint's body moves with it, as a rigid body."""
+        old = state[:, free.body].copy()
+        turned = _unit(q[:, 3:])
+        orientation = _mul(turned, _back(np.asarray(free.turn)))
+        center = q[:, :3] - _turn(orientation, free.place)
+        angular = _turn(turned, qd[:, 3:])
+        linear = qd[:, :3] - np.cross(angular, q[:, :3] - center)
+        turn = _mul(orientation, _back(old[:, 3:7]))[:, None]
+        tree = state[:, free.tree]
+        arm = tree[..., :3] - old[:, None, :3]
+        relative = tree[..., 7:10] - old[:, None, 7:10] - np.cross(old[:, None, 10:], arm)
+        spin = tree[..., 10:] - old[:, None, 10:]
+        arm = _turn(turn, arm)
+        tree[..., :3] = center[:, None] + arm
+        tree[..., 3:7] = _unit(_mul(turn, tree[..., 3:7]))
+        tree[..., 7:10] = linear[:, None] + np.cross(angular[:, None], arm) + _turn(turn, relative)
+        tree[..., 10:] = angular[:, None] + _turn(turn, spin)
+        state[:, free.tree] = tree
+
+
+class _Drives:
+    """What controls are to drives of joints (importing/actuators.py), for many robots at once."""
+
+    def __init__(self, loaded):
+        world = loaded.world
+        joints = {joint: k for k, joint in enumerate(world.joints)}
+        actuators = list(loaded.actuators.values())
+        drives = list(dict.fromkeys(d for a in actuators for d in (a._drives[joint] for joint, _ in a.parts)))
+        index = {id(a): k for k, a in enumerate(actuators)}
+        self.drives = drives
+        self.start = np.array([a.control for a in actuators])
+        self.range = np.array([a.control_range for a in actuators]).reshape(-1, 2)
+        self.gain = np.array([a.gain for a in actuators])
+        self.constant = np.array([a.constant for a in actuators])
+        motor = np.array([a.stiffness == 0 and a.damping == 0 for a in actuators], bool)
+        force = np.array([a.force_range for a in actuators]).reshape(-1, 2)
+        self.force_range = np.where(motor[:, None], force, (-np.inf, np.inf)) if actuators else force
+        self.share = np.zeros((len(actuators), len(drives)))  # of an input in a drive's force
+        kinds = {"stiff": [], "damped": [], "force": []}
+        for column, drive in enumerate(drives):
+            for actuator, factor in drive.actuators:
+                self.share[index[id(actuator)], column] += factor
+            stiffness = sum(f * f * a.stiffness for a, f in drive.actuators)
+            damping = sum(f * f * a.damping for a, f in drive.actuators)
+            joint = drive.joint
+            kind, scale = (("stiff", 1 / stiffness) if stiffness > 0 else ("damped", 1 / damping) if damping > 0
+                           else ("force", 1.0))
+            kinds[kind].append((column, joints[joint.joint], joint.coordinate, joint.sign, joint.offset, scale))
+        self.kinds = {kind: [np.array(column) for column in zip(*parts)] for kind, parts in kinds.items() if parts}
+        self.arrays = []
+        if "stiff" in self.kinds:
+            self.arrays.append("joint_target_position")
+        if "damped" in self.kinds or "force" in self.kinds:
+            self.arrays.append("joint_target_speed")
+        if "force" in self.kinds:
+            self.arrays.append("joint_drive_damping")
+
+    @contextlib.contextmanager
+    def all_on(self):
+        """A force of 0 is no drive: here it is one, since it may be another force in some environment."""
+        off = []
+        for drive in self.drives:
+            joint, k = drive.joint.joint, drive.joint.coordinate
+            c = joint.coordinate(k)
+            if c.drive == "off":
+                off.append((joint, k, joint.coordinate(k)))
+                c.drive, c.drive_force = "position", drive.limit
+                joint.set_coordinate(k, c)
+        try:
+            yield
+        finally:
+            for joint, k, c in off:
+                joint.set_coordinate(k, c)
+
+    def write(self, ctrl, arrays):
+        if not self.start.size:
+            return
+        inputs = np.clip(np.clip(ctrl, *self.range.T) * self.gain + self.constant, *self.force_range.T)
+        forces = inputs @ self.share
+        for kind, (column, row, coordinate, sign, offset, scale) in self.kinds.items():
+            force = forces[:, column]
+            if kind == "stiff":
+                arrays["joint_target_position"][:, row, coordinate] = sign * (force * scale - offset)
+            elif kind == "damped":
+                arrays["joint_target_speed"][:, row, coordinate] = sign * force * scale
+            else:
+                arrays["joint_drive_damping"][:, row, coordinate] = np.abs(force) / FORCE_SPEED
+                arrays["joint_target_speed"][:, row, coordinate] = sign * np.sign(force) * FORCE_SPEED
