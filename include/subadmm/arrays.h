@@ -33,8 +33,8 @@ typedef enum sadmm_array {
     SADMM_ARRAY_JOINT_POSITION,    /* 6: sadmm_joint_state.position. Set: b and all that is joined to it move along, or,
                                       where the world holds them, a and what is joined to that; the other joints keep
                                       their positions and speeds. Locked coordinates are not read, and become 0. Three
-                                      free rotations: at most half a turn. A joint in a loop or one that holds a distance
-                                      can only be set to what it has: INVALID_ARGUMENT */
+                                      free rotations: at most half a turn. A joint in a loop, or one that holds a
+                                      distance, can only be set to what it has: INVALID_ARGUMENT */
     SADMM_ARRAY_JOINT_SPEED,       /* 6: sadmm_joint_state.speed. Set: likewise, velocities alone change */
     SADMM_ARRAY_JOINT_DRIVE_FORCE, /* 6: sadmm_joint_state.drive_force. Read only */
     SADMM_ARRAY_JOINT_WRENCH,      /* 6: sadmm_joint_state.wrench_b, world. Read only */
