@@ -62,6 +62,7 @@ enum { SHUT = 1 << 16 };
 struct region {
     sadmm_parallel_function *function;
     void *argument;
+    bool open;              /* its members begin as they come */
     struct sadmm_word door; /* members; + SHUT */
 };
 
@@ -79,14 +80,15 @@ static void join_region(void *argument)
     } while (!atomic_compare_exchange_weak(&region->door.value, &door, door + 1));
     sadmm_word_wake(&region->door);
     const int thread = (int)door;
-    while (!(door & SHUT)) door = sadmm_word_wait(&region->door, door);
+    while (!region->open && !(door & SHUT)) door = sadmm_word_wait(&region->door, door);
+    if (region->open) door = SHUT; /* how many there are is not known */
     region->function(region->argument, thread, (int)(door - SHUT));
 }
 
-static int run_region(const sadmm_tasks *tasks, int threads, bool wait_for_all, sadmm_parallel_function *function,
-                      void *argument)
+static int run_region(const sadmm_tasks *tasks, int threads, bool wait_for_all, bool open,
+                      sadmm_parallel_function *function, void *argument)
 {
-    struct region region = {.function = function, .argument = argument, .door = {.value = 1}};
+    struct region region = {.function = function, .argument = argument, .open = open, .door = {.value = 1}};
     void *names[SADMM_MOST_THREADS];
     const bool outer = hands_out;
     unsigned count = 0, door = 1;
@@ -97,13 +99,14 @@ static int run_region(const sadmm_tasks *tasks, int threads, bool wait_for_all, 
     }
     hands_out = outer;
     while (wait_for_all && door <= count) door = sadmm_word_wait(&region.door, door);
-    for (int spin = 0; spin < SADMM_SPINS && door <= count; ++spin) {
+    if (open) function(argument, 0, 0);
+    for (int spin = 0; !open && spin < SADMM_SPINS && door <= count; ++spin) {
         sadmm_pause();
         door = atomic_load_explicit(&region.door.value, memory_order_relaxed);
     }
     const int members = (int)atomic_fetch_or(&region.door.value, SHUT);
     sadmm_word_wake(&region.door);
-    function(argument, 0, members);
+    if (!open) function(argument, 0, members);
     for (unsigned i = 0; i < count; ++i) tasks->wait(tasks->user, names[i]);
     return members;
 }
@@ -121,16 +124,26 @@ static bool are_here(const struct sadmm_team *team)
     return atomic_compare_exchange_strong(&own_forks, &never, now) || never == now;
 }
 
-int sadmm_parallel(struct sadmm_team *team, int threads, sadmm_parallel_function *function, void *argument)
+static int run(struct sadmm_team *team, int threads, bool open, sadmm_parallel_function *function, void *argument)
 {
     const bool hosts = team && team->tasks.enqueue;
     int ran = 1;
     if (threads > 1 && are_here(team)) {
         if (!hosts) sadmm_workers_gather(threads - 1);
-        ran = run_region(hosts ? &team->tasks : &own, threads, forced && !hosts, function, argument);
+        ran = run_region(hosts ? &team->tasks : &own, threads, forced && !hosts, open, function, argument);
     } else {
-        function(argument, 0, 1);
+        function(argument, 0, open ? 0 : 1);
     }
     if (team && ran > team->ran) team->ran = ran;
     return ran;
+}
+
+int sadmm_parallel(struct sadmm_team *team, int threads, sadmm_parallel_function *function, void *argument)
+{
+    return run(team, threads, false, function, argument);
+}
+
+int sadmm_parallel_open(struct sadmm_team *team, int threads, sadmm_parallel_function *function, void *argument)
+{
+    return run(team, threads, true, function, argument);
 }

@@ -1,4 +1,5 @@
-/* Work by several threads: every parallel region of the library is one call of sadmm_parallel.
+/* Work by several threads: every parallel region of the library is one call of sadmm_parallel or
+ * sadmm_parallel_open.
  *
  * The threads are OpenMP's (workers.h), or come as tasks from the host's pool (subadmm/tasks.h). The calling
  * thread waits for them some microseconds. From then on the number of members is known, and those that come late go
@@ -43,6 +44,11 @@ typedef void sadmm_parallel_function(void *argument, int thread, int threads);
  * many they were. The function may wait at barriers (barrier.h); it begins no region. `team`: NULL for OpenMP's
  * threads. */
 int sadmm_parallel(struct sadmm_team *team, int threads, sadmm_parallel_function *function, void *argument);
+
+/* The same for work that is taken piece by piece, whoever is free the next one: threads take part as they come, also
+ * late, as long as the calling one is at it. `threads` of the function is 0: nobody knows how many come. It waits at no
+ * barriers, and returns when no piece is left. */
+int sadmm_parallel_open(struct sadmm_team *team, int threads, sadmm_parallel_function *function, void *argument);
 
 /* Share `thread` of `threads` of [0, count): contiguous, sizes differ by at most one. */
 static inline void sadmm_share(size_t count, int thread, int threads, size_t *begin, size_t *end)

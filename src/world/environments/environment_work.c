@@ -3,9 +3,6 @@
 #include <stdatomic.h>
 #include <stdio.h>
 
-/* Environments a thread in one region: threads that come late take part from the next region on. */
-enum { AT_A_TIME = 16 };
-
 struct sharing {
     struct sadmm_environments *environments;
     const int32_t *which;
@@ -36,15 +33,11 @@ sadmm_status sadmm_environments_each(struct sadmm_environments *environments, co
     for (int t = 0; t < environments->workers; ++t) environments->worker[t].failed_at = -1;
     const int asked = environments->threads,
               wanted = asked > 0 && asked < environments->workers ? asked : environments->workers;
-    for (int32_t begin = 0; begin < count;) {
-        const int threads = sadmm_team_threads(&environments->team, wanted, (size_t)(count - begin));
-        struct sharing sharing = {.environments = environments, .which = which, .work = work, .argument = argument};
-        const int32_t most = AT_A_TIME * threads;
-        sharing.end = count - begin > most ? begin + most : count;
-        atomic_init(&sharing.next, begin);
-        sadmm_parallel(&environments->team, threads, share, &sharing);
-        begin = sharing.end;
-    }
+    const int threads = sadmm_team_threads(&environments->team, wanted, (size_t)count);
+    struct sharing sharing = {
+        .environments = environments, .which = which, .end = count, .work = work, .argument = argument};
+    atomic_init(&sharing.next, 0);
+    sadmm_parallel_open(&environments->team, threads, share, &sharing);
     for (int t = 0; t < environments->workers; ++t) {
         const struct sadmm_environment_worker *worker = &environments->worker[t];
         if (worker->failed_at >= 0 && (!first || worker->failed_at < first->failed_at)) first = worker;
