@@ -67,3 +67,13 @@ def test_arm_lifts_cube(mass, lifted, capsys):
     else:
         assert height < 0.01
     assert ("not lifted" in capsys.readouterr().out) != lifted
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_learn_balance(seed):
+    """A pole stays up after some iterations, and the same ones whenever it is learnt, on one thread or two."""
+    pytest.importorskip("gymnasium", minversion="1.1")
+    learn = example("learn_balance").learn
+    curves = [learn(seed, threads, report=lambda line: None) for threads in (1, 2)]
+    assert (curves[0] == curves[1]).all()
+    assert curves[0][-1] == 200 and len(curves[0]) <= 20 and curves[0][0] < 100

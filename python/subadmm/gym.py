@@ -1,0 +1,239 @@
+"""Environments for reinforcement learning: gymnasium's VectorEnv over replicate(). Needs gymnasium 1.1 or later.
+
+    import subadmm.gym
+
+    envs = subadmm.gym.CartPole(64)
+    observations, info = envs.reset(seed=1)
+    observations, rewards, terminated, truncated, info = envs.step(envs.action_space.sample())
+
+A task of your own is a subclass of Task with four short functions. What an environment does depends on its seed, its
+actions and nothing else: not on the others, not on their number, not on the threads.
+"""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+try:
+    import gymnasium
+    from gymnasium.vector import AutoresetMode
+except ImportError as error:
+    raise ImportError("subadmm.gym needs gymnasium 1.1 or later: python -m pip install gymnasium") from error
+
+from .environments import replicate
+from .importing import load
+
+
+def _mixed(x):
+    """Bits of 64-bit integers mixed (splitmix64)."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
+class Task(gymnasium.vector.VectorEnv):
+    """A task for copies of a robot.
+
+    robot: what load() returned; count: how many; decimation: time steps a step of the task; episode: its longest, in
+    steps of the task (0: no limit); autoreset_mode: as gymnasium has it.
+
+    A subclass has `observe() -> (n, k)`, `reward() -> (n,)`, `done() -> (n,)` and `start(which)`, which puts the
+    environments `which`, whose states are the template's by then, where they are to begin; and, if actions are not
+    controls between the actuators' bounds, `act(actions)` and `action_space_of()`. `self.robots` has their numbers (q,
+    qd, ctrl, array); `self.uniform(which, n)` random ones that depend on the environment's seed and episode alone.
+    """
+
+    def __init__(self, robot, count, *, decimation=1, episode=0, autoreset_mode=AutoresetMode.NEXT_STEP):
+        self.robots = replicate(robot, count)
+        self.decimation, self.episode = int(decimation), int(episode)
+        self.num_envs = self.robots.count
+        self.mode = AutoresetMode(autoreset_mode)
+        self.metadata = {"autoreset_mode": self.mode, "render_modes": []}
+        #: Steps of the task since each episode began.
+        self.steps = np.zeros(count, np.int64)
+        self._seeds = np.arange(count, dtype=np.uint64)
+        self._episodes = np.zeros(count, np.uint64)
+        self._draws = np.zeros(count, np.uint64)
+        self._over = np.zeros(count, bool)
+        self._time = self.decimation * robot.world.settings.dt
+        self.single_action_space = self.action_space_of()
+        size = np.asarray(self.observe()).shape
+        if len(size) != 2 or size[0] != count:
+            raise ValueError(f"observe: must give one row each, {count} x n; gave {size}")
+        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, size[1:], np.float64)
+        self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, count)
+        self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, count)
+
+    # ---- what a task says ------------------------------------------------------------------------------------------
+
+    def observe(self):
+        raise NotImplementedError
+
+    def reward(self):
+        raise NotImplementedError
+
+    def done(self):
+        raise NotImplementedError
+
+    def start(self, which):
+        """Left out: episodes begin with the template's state."""
+
+    def act(self, actions):
+        self.robots.ctrl[:] = actions
+
+    def action_space_of(self):
+        """Of one environment: controls between the bounds of the actuators."""
+        bounds = np.array([a.control_range for a in self.robots.loaded.actuators.values()]).reshape(-1, 2)
+        return gymnasium.spaces.Box(bounds[:, 0], bounds[:, 1], dtype=np.float64)
+
+    # ---- what it has -----------------------------------------------------------------------------------------------
+
+    @property
+    def time_step(self):
+        """Of the task, s."""
+        return self._time
+
+    def uniform(self, which, n):
+        """Random numbers in [-1, 1), n for each of these environments."""
+        which = np.asarray(which)
+        first = self._draws[which]
+        self._draws[which] += np.uint64(n)
+        golden = np.uint64(0x9E3779B97F4A7C15)
+        key = _mixed(_mixed(self._seeds[which] * golden + golden) + self._episodes[which] * golden)
+        at = first[:, None] + np.arange(1, n + 1, dtype=np.uint64)
+        return (_mixed(key[:, None] + at * golden) >> np.uint64(11)).astype(np.float64) / 2.0**52 - 1.0
+
+    # ---- gymnasium -------------------------------------------------------------------------------------------------
+
+    def _begin(self, which):
+        self._episodes[which] += np.uint64(1)
+        self._draws[which] = self.steps[which] = 0
+        self._over[which] = False
+        self.robots.reset(which)
+        self.start(which)
+
+    def reset(self, *, seed=None, options=None):
+        """seed: of the first environment, the others have those that follow; or one each. options: {'reset_mask': bool
+        of each} begins those alone."""
+        mask = (options or {}).get("reset_mask")
+        which = np.arange(self.num_envs) if mask is None else np.flatnonzero(np.asarray(mask, bool))
+        if seed is not None:
+            seeds = np.arange(self.num_envs) + seed if np.ndim(seed) == 0 else np.asarray(seed)
+            if seeds.shape != (self.num_envs,):
+                raise ValueError(f"seed: must be one number, or {self.num_envs}")
+            self._seeds[which] = seeds[which].astype(np.uint64)
+            self._episodes[which] = 0
+        self._begin(which)
+        return np.asarray(self.observe(), np.float64).copy(), {}
+
+    def step(self, actions):
+        actions = np.asarray(actions)
+        if actions.shape != self.action_space.shape:
+            raise ValueError(f"actions: must have shape {self.action_space.shape}, and have {actions.shape}")
+        if self.mode == AutoresetMode.DISABLED and self._over.any():
+            raise ValueError("step: environments are over, and must be reset first: reset(options={'reset_mask': ...})")
+        over = self._over.copy()  # with next-step resets: this step begins those again
+        self.act(actions)
+        self.robots.step(self.decimation)
+        self.steps += 1
+        failed = self.robots.failed & ~over
+        rewards = np.where(failed, 0.0, self.reward())
+        terminated = np.asarray(self.done(), bool) | failed
+        truncated = (self.steps >= self.episode) & ~terminated if self.episode else np.zeros_like(terminated)
+        info = {"failed": failed, "_failed": failed} if failed.any() else {}
+        if over.any():
+            self._begin(np.flatnonzero(over))
+            rewards[over] = 0.0
+            terminated[over] = truncated[over] = False
+        self._over = terminated | truncated
+        observations = np.asarray(self.observe(), np.float64).copy()
+        if self.mode == AutoresetMode.SAME_STEP and self._over.any():
+            ended = self._over.copy()
+            final = np.full(self.num_envs, None, dtype=object)
+            for k in np.flatnonzero(ended):
+                final[k] = observations[k].copy()
+            info.update(final_obs=final, _final_obs=ended, final_info={}, _final_info=ended)
+            self._begin(np.flatnonzero(ended))
+            observations = np.asarray(self.observe(), np.float64).copy()
+        return observations, rewards, terminated, truncated, info
+
+
+CARTPOLE = """
+<mujoco model="cartpole">
+  <option timestep="0.01"/>
+  <worldbody>
+    <body name="cart" pos="0 0 1">
+      <joint name="slide" type="slide" axis="1 0 0" damping="0.01"/>
+      <geom type="box" size="0.15 0.1 0.05" mass="1" contype="0" conaffinity="0"/>
+      <body name="pole">
+        <joint name="hinge" axis="0 1 0" damping="0.001"/>
+        <geom type="capsule" size="0.02" fromto="0 0 0 0 0 0.6" mass="0.1" contype="0" conaffinity="0"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="slide" ctrllimited="true" ctrlrange="-10 10"/></actuator>
+</mujoco>
+"""
+
+
+def _load_text(text, **options):
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.xml"
+        path.write_text(text, encoding="utf-8")
+        return load(path, backend="cpu", **options)
+
+
+class CartPole(Task):
+    """A pole on a cart stays up: the action is a force on the cart, N; a reward of 1 a step, until the pole leans by
+    more than 0.2 rad or the cart leaves +-2.4 m. Observation: place, angle and their rates."""
+
+    def __init__(self, count, *, threads=None, episode=500, **options):
+        super().__init__(_load_text(CARTPOLE, threads=threads), count, decimation=2, episode=episode, **options)
+
+    def observe(self):
+        return np.concatenate([self.robots.q, self.robots.qd], axis=1)
+
+    def reward(self):
+        return np.ones(self.num_envs)
+
+    def done(self):
+        place, angle = self.robots.q.T
+        return (np.abs(place) > 2.4) | (np.abs(angle) > 0.2)
+
+    def start(self, which):
+        self.robots.set_positions(*np.split(0.05 * self.uniform(which, 4), 2, axis=1), which)
+
+
+class Ant(Task):
+    """gymnasium's ant walks along x: its model, observation (without contact forces) and reward: speed along x, 1 a step
+    while its torso is between 0.2 and 1 m high, less half the squared actions."""
+
+    def __init__(self, count, *, threads=None, episode=1000, **options):
+        model = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"
+        super().__init__(load(model, backend="cpu", threads=threads), count, decimation=5, episode=episode, **options)
+
+    def observe(self):
+        return np.concatenate([self.robots.q[:, 2:], self.robots.qd], axis=1)
+
+    def act(self, actions):
+        self._from = self.robots.q[:, 0]
+        super().act(actions)
+
+    def _is_healthy(self):
+        height = self.robots.q[:, 2]
+        return (height > 0.2) & (height < 1.0)
+
+    def reward(self):
+        forward = (self.robots.q[:, 0] - self._from) / self.time_step
+        return forward + self._is_healthy() - 0.5 * np.square(self.robots.ctrl).sum(axis=1)
+
+    def done(self):
+        return ~self._is_healthy()
+
+    def start(self, which):
+        source = self.robots.loaded.source
+        noise = 0.1 * self.uniform(which, source.nq + source.nv)
+        q = self.robots.q[which] + noise[:, : source.nq]
+        q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+        self.robots.set_positions(q, noise[:, source.nq :], which)
