@@ -4,6 +4,7 @@ import contextlib
 
 import numpy as np
 
+from .dynamics import Motion, Tree
 from .environments import Environments
 from .given import numbers
 from .importing.actuators import FORCE_SPEED
@@ -81,6 +82,7 @@ class Robots(Environments):
         ties = [(rows[j.body_a], rows[j.body_b]) for j in joints if j.body_a is not None and j.body_b is not None]
         dynamic = {rows[body] for body in rows if body.type == "dynamic"}
         ties = [pair for pair in ties if dynamic.issuperset(pair)]
+        self._tree = Tree(loaded, rows)
         self._free, self._balls, hinges = [], [], []
         for k in range(source.njnt):
             joint = loaded.joints[name_of(source, "joint", k)]
@@ -205,6 +207,44 @@ class Robots(Environments):
         tree[..., 7:10] = linear[:, None] + np.cross(angular[:, None], arm) + _turn(turn, relative)
         tree[..., 10:] = angular[:, None] + _turn(turn, spin)
         state[:, free.tree] = tree
+
+
+    # ---- dynamics --------------------------------------------------------------------------------------------------
+
+    def _motion(self, rows):
+        pick = slice(None) if rows is None else rows
+        return Motion(self._tree, self.q[pick], self.qd[pick])
+
+    def _armature(self):
+        return self.loaded.source.dof_armature
+
+    def mass_matrix(self, which=None):
+        """n x nv x nv of environments (numbers, or a mask; None: all): kinetic energy is qd M qd / 2. By the masses and
+        inertias that each has."""
+        rows = self._which(which)
+        return self._motion(rows).mass_matrix(self._core.get("body_inertia", rows), self._armature())
+
+    def inverse_dynamics(self, qdd, which=None):
+        """n x nv: generalised forces that accelerations qdd (n x nv, or one row for all) take: M qdd and those of
+        gravity and velocities. Damping, springs, friction, loops and contacts are left out."""
+        rows = self._which(which)
+        motion = self._motion(rows)
+        qdd = self._rows("qdd", qdd, *motion.qd.shape)
+        get = lambda name: self._core.get(name, rows)  # noqa: E731
+        return motion.forces(get("body_inertia"), get("gravity")[:, 0], get("body_gravity_scale")[..., 0],
+                             self._armature(), qdd)
+
+    def bias(self, which=None):
+        """n x nv: generalised forces of gravity and velocities, as MuJoCo's qfrc_bias."""
+        return self.inverse_dynamics(np.zeros(self.loaded.source.nv), which)
+
+    def jacobian(self, body, point=(0.0, 0.0, 0.0), which=None):
+        """n x 6 x nv: times qd the velocity of a point of a body of the file (by name; in its frame, m) and its angular
+        velocity, in the world's axes."""
+        names = [name_of(self.loaded.source, "body", k) for k in range(self.loaded.source.nbody)]
+        if body not in names:
+            raise KeyError(f"body: the file has none of the name {body!r}")
+        return self._motion(self._which(which)).jacobian(names.index(body), np.asarray(point, np.float64))
 
 
 class _Drives:

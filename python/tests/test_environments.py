@@ -223,3 +223,52 @@ def test_what_is_refused(robot):
     robots.settings = settings
     assert robots.settings.dt == 0.001 and robot.world.settings.dt == 0.004
     assert len(robots) == 3 and repr(robots) == "<subadmm robots: 3>" and robots.memory > 1000
+
+
+def test_dynamics_are_mujocos(robot):
+    """Mass matrix, bias and Jacobians of random states, and inverse dynamics by both; with masses of one's own the
+    energy is that of the bodies."""
+    import mujoco
+
+    robots = subadmm.replicate(robot, 4)
+    source, rng = robot.source, np.random.default_rng(5)
+    q, qd, qdd = rng.uniform(-1, 1, (4, source.nq)), rng.uniform(-2, 2, (4, source.nv)), rng.uniform(-5, 5, (4, source.nv))
+    for at in (3, 7):
+        q[:, at : at + 4] /= np.linalg.norm(q[:, at : at + 4], axis=1, keepdims=True)
+    robots.set_positions(q, qd)
+    q = robots.q  # of all joints: free ones have a unit quaternion now
+    mass, bias, inverse = robots.mass_matrix(), robots.bias(), robots.inverse_dynamics(qdd)
+    point = np.array([0.03, -0.02, 0.05])
+    jacobian = robots.jacobian("hand", point)
+    for e in range(4):
+        data = mujoco.MjData(source)
+        data.qpos[:], data.qvel[:] = q[e], robots.qd[e]
+        mujoco.mj_forward(source, data)
+        full = np.zeros((source.nv, source.nv))
+        mujoco.mj_fullM(source, full, data.qM) if hasattr(data, "qM") else mujoco.mj_fullM(source, data, full)
+        np.testing.assert_allclose(mass[e], full, atol=1e-10)
+        np.testing.assert_allclose(bias[e], data.qfrc_bias, atol=1e-9)
+        np.testing.assert_allclose(inverse[e], full @ qdd[e] + data.qfrc_bias, atol=1e-8)
+        linear, angular = np.zeros((3, source.nv)), np.zeros((3, source.nv))
+        at = data.xpos[source.body("hand").id] + data.xmat[source.body("hand").id].reshape(3, 3) @ point
+        mujoco.mj_jac(source, data, linear, angular, at, source.body("hand").id)
+        np.testing.assert_allclose(jacobian[e], np.concatenate([linear, angular]), atol=1e-12)
+    inertia = robots.array("body_inertia")
+    inertia[:] *= rng.uniform(0.5, 2, (4, 1, 1))
+    state = robots.array("body_state")
+    named = [robot.world.bodies.index(body) for body in set(robot.bodies.values())]  # no carriers between two hinges
+    turned = np.zeros((4, state.shape[1], 3))
+    for e in range(4):
+        for b in named:
+            w, x, y, z = state[e, b, 3:7]
+            matrix = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                               [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                               [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+            turned[e, b] = matrix.T @ state[e, b, 10:]
+    energy = inertia[..., 0] * (state[..., 7:10] ** 2).sum(-1) + (inertia[..., 1:] * turned**2).sum(-1)
+    velocity = robots.qd
+    np.testing.assert_allclose(np.einsum("ni,nij,nj->n", velocity, robots.mass_matrix(), velocity), energy[:, named].sum(-1),
+                               rtol=1e-9)
+    assert robots.mass_matrix([2]).shape == (1, source.nv, source.nv)
+    with pytest.raises(KeyError, match="nobody"):
+        robots.jacobian("nobody")
