@@ -1,5 +1,6 @@
 /* Arrays of a world: the same numbers as one call a body, joint or coupling reads and sets, whatever was removed; what
  * may not be set is refused as a whole. */
+#include <math.h>
 #include <stdint.h>
 
 #include "fixed_work.h"
@@ -217,8 +218,8 @@ START_TEST(arrays_set_what_single_calls_set)
             sadmm_coupling_id id;
             MUST(twin.world, sadmm_world_coupling_at(twin.world, i, &id));
             aim[13 * i] += 0.02;
-            MUST(twin.world, sadmm_world_set_coupling_target(twin.world, id, aim + 13 * i, aim + 13 * i + 3,
-                                                             aim + 13 * i + 7));
+            MUST(twin.world,
+                 sadmm_world_set_coupling_target(twin.world, id, aim + 13 * i, aim + 13 * i + 3, aim + 13 * i + 7));
         }
         MUST(m.world, sadmm_world_set_array(m.world, SADMM_ARRAY_BODY_STATE, 0, m.bodies, state));
         MUST(m.world, sadmm_world_set_array(m.world, SADMM_ARRAY_BODY_WRENCH, 0, m.bodies, wrench));
@@ -371,6 +372,31 @@ START_TEST(ids_and_rows_are_each_others)
 }
 END_TEST
 
+/* A machine that moves: what velocities change by in a step, over its length. */
+START_TEST(accelerations_are_changes_of_velocity)
+{
+    struct machine m = build_machine();
+    double before[MOST], after[MOST], acceleration[MOST];
+    const double dt = sadmm_world_settings(m.world).dt;
+    MUST(m.world, sadmm_world_get_array(m.world, SADMM_ARRAY_BODY_ACCELERATION, 0, m.bodies, acceleration));
+    for (int k = 0; k < 6 * m.bodies; ++k) ck_assert(acceleration[k] == 0);
+    step_world(m.world, 3);
+    MUST(m.world, sadmm_world_get_array(m.world, SADMM_ARRAY_BODY_STATE, 0, m.bodies, before));
+    step_world(m.world, 1);
+    MUST(m.world, sadmm_world_get_array(m.world, SADMM_ARRAY_BODY_STATE, 0, m.bodies, after));
+    MUST(m.world, sadmm_world_get_array(m.world, SADMM_ARRAY_BODY_ACCELERATION, 0, m.bodies, acceleration));
+    double largest = 0;
+    for (int i = 0; i < m.bodies; ++i)
+        for (int k = 0; k < 6; ++k) {
+            const double own = acceleration[6 * i + k], change = after[13 * i + 7 + k] - before[13 * i + 7 + k];
+            ck_assert_double_eq_tol(own * dt, change, 1e-15 + 1e-12 * fabs(change)); /* rounding */
+            largest = fmax(largest, fabs(own));
+        }
+    ck_assert_double_gt(largest, 1);
+    sadmm_world_destroy(m.world);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("arrays");
@@ -380,6 +406,7 @@ int main(void)
     tcase_add_test(cases, bad_rows_are_refused_with_all_others);
     tcase_add_test(cases, bad_arguments_are_refused);
     tcase_add_test(cases, ids_and_rows_are_each_others);
+    tcase_add_test(cases, accelerations_are_changes_of_velocity);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

@@ -51,6 +51,9 @@ typedef enum sadmm_array {
                                        sadmm_world_set_body_gravity_scale */
     SADMM_ARRAY_BODY_DAMPING,       /* 2: linear, angular damping (1/s); 0 of bodies that are not dynamic. Set: as
                                        sadmm_world_set_body_damping */
+    SADMM_ARRAY_BODY_ACCELERATION,  /* 6: change of the linear and angular velocity in the last (sub-)step over its
+                                       length (m/s^2, rad/s^2), world; 0 of bodies that are not dynamic, and before the
+                                       first step. Read only */
     /* A row a joint: members of sadmm_joint_coordinate, 6 each; of locked coordinates the defaults, and must be those
      * there. Set: as sadmm_world_set_joint_coordinate. */
     SADMM_ARRAY_JOINT_LOWER,            /* lower, m or rad: of no effect where the coordinate is not `limited` */

@@ -209,6 +209,45 @@ class Robots(Environments):
         state[:, free.tree] = tree
 
 
+    # ---- sensors ---------------------------------------------------------------------------------------------------
+
+    def _named(self, body):
+        names = [name_of(self.loaded.source, "body", k) for k in range(self.loaded.source.nbody)]
+        if body not in names:
+            raise KeyError(f"body: the file has none of the name {body!r}")
+        return names.index(body)
+
+    def frame(self, body, place=(0.0, 0.0, 0.0), turn=(1.0, 0.0, 0.0, 0.0)):
+        """Where a frame on a body of the file is (by name; place, m, and turn, w x y z, in the body's frame): positions
+        (count x 3, world), orientations (count x 4, w x y z)."""
+        row, inner, _ = self._mounted(body, place, turn)
+        x, o = self._state[:, row, :3], self._state[:, row, 3:7]
+        return x + _turn(o, inner[0]), _mul(o, np.broadcast_to(inner[1], o.shape))
+
+    def _mounted(self, body, place, turn):
+        """The row of the world's body that has a frame, its pose there, and the row's orientation."""
+        index = self._named(body)
+        group = self.loaded.groups[index]
+        if group.body is None or group.kind == "static":
+            raise ValueError(f"body: {body!r} does not move")
+        turn = np.asarray(turn, np.float64)
+        outer = group.frame_in_body(index)
+        inner = outer[0] + _turn(outer[1], np.asarray(place, np.float64)), _mul(outer[1], turn / np.linalg.norm(turn))
+        row = self.loaded.world.bodies.index(group.body)
+        return row, inner, self._state[:, row, 3:7]
+
+    def imu(self, body, place=(0.0, 0.0, 0.0), turn=(1.0, 0.0, 0.0, 0.0)):
+        """What an inertial sensor in a frame on a body of the file reads (place, m, and turn, w x y z, in the body's
+        frame): angular velocity (count x 3, rad/s) and acceleration less gravity (count x 3, m/s^2), in the sensor's
+        axes. The acceleration is the mean of the last (sub-)step."""
+        row, inner, o = self._mounted(body, place, turn)
+        acceleration = self.array("body_acceleration")[:, row]
+        spin, arm = self._state[:, row, 10:], _turn(o, inner[0])
+        gravity = self._core.get("gravity", None)[:, 0]
+        there = acceleration[:, :3] + np.cross(acceleration[:, 3:], arm) + np.cross(spin, np.cross(spin, arm)) - gravity
+        back = _back(_mul(o, np.broadcast_to(inner[1], o.shape)))
+        return _turn(back, spin), _turn(back, there)
+
     # ---- dynamics --------------------------------------------------------------------------------------------------
 
     def _motion(self, rows):
@@ -241,10 +280,7 @@ class Robots(Environments):
     def jacobian(self, body, point=(0.0, 0.0, 0.0), which=None):
         """n x 6 x nv: times qd the velocity of a point of a body of the file (by name; in its frame, m) and its angular
         velocity, in the world's axes."""
-        names = [name_of(self.loaded.source, "body", k) for k in range(self.loaded.source.nbody)]
-        if body not in names:
-            raise KeyError(f"body: the file has none of the name {body!r}")
-        return self._motion(self._which(which)).jacobian(names.index(body), np.asarray(point, np.float64))
+        return self._motion(self._which(which)).jacobian(self._named(body), np.asarray(point, np.float64))
 
 
 class _Drives:

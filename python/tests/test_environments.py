@@ -272,3 +272,30 @@ def test_dynamics_are_mujocos(robot):
     assert robots.mass_matrix([2]).shape == (1, source.nv, source.nv)
     with pytest.raises(KeyError, match="nobody"):
         robots.jacobian("nobody")
+
+
+def test_sensors(robot):
+    """At rest an accelerometer reads gravity upwards; while it falls 0; on a turning arm the centripetal acceleration.
+    Frames are those of the loaded robot."""
+    robots = subadmm.replicate(robot, 2)
+    for body in ("trunk", "hand", "lid"):
+        place, turn = robots.frame(body)
+        own = robot.frame(body)
+        np.testing.assert_allclose(place, np.broadcast_to(own[0], (2, 3)), atol=1e-12)
+        np.testing.assert_allclose(np.abs((turn * own[1]).sum(axis=1)), 1, atol=1e-12)
+    robots.step(3)  # all but the post fall
+    gyro, acceleration = robots.imu("crate", place=(0.3, 0.2, 0.1))
+    np.testing.assert_allclose(gyro, 0, atol=1e-9)
+    np.testing.assert_allclose(acceleration, [[0, 0, 9.81]] * 2, atol=1e-6)  # the crate stands on the plane
+    q, qd = robots.q, np.zeros((2, robot.source.nv))
+    q[:, 2] = 3.0
+    qd[:, 3:6] = [[0, 0, 2.0], [0, 0, 0]]  # one turns about its axis as it falls
+    robots.set_positions(q, qd)
+    robots.step(1)
+    gyro, acceleration = robots.imu("trunk", place=(0.5, 0, 0))
+    assert abs(gyro[0, 2] - 2) < 0.1 and np.linalg.norm(acceleration[1]) < 1  # its arms pull a little
+    assert acceleration[0, 0] - acceleration[1, 0] == pytest.approx(-2, abs=0.5)  # the turning one: -2^2 x 0.5
+    with pytest.raises(KeyError):
+        robots.imu("nobody")
+    with pytest.raises(ValueError, match="does not move"):
+        robots.frame("world")

@@ -72,6 +72,7 @@ extern "C" {
     F(X, SADMM_ARRAY_COUPLING_REACTION, "coupling_reaction")           \
     F(X, SADMM_ARRAY_BODY_GRAVITY_SCALE, "body_gravity_scale")         \
     F(X, SADMM_ARRAY_BODY_DAMPING, "body_damping")                     \
+    F(X, SADMM_ARRAY_BODY_ACCELERATION, "body_acceleration")           \
     F(X, SADMM_ARRAY_JOINT_LOWER, "joint_lower")                       \
     F(X, SADMM_ARRAY_JOINT_UPPER, "joint_upper")                       \
     F(X, SADMM_ARRAY_JOINT_DRIVE_STIFFNESS, "joint_drive_stiffness")   \

@@ -167,6 +167,14 @@ static sadmm_status set_damping(sadmm_world *world, size_t slot, const double *r
                                 : SADMM_OK;
 }
 
+static sadmm_status get_acceleration(sadmm_world *world, size_t slot, double *row)
+{
+    const struct sadmm_extrapolation *last = &world->bodies[slot].extrapolation;
+    const double dt = last->dt;
+    for (int k = 0; k < 6; ++k) row[k] = dynamic(world, slot) && dt > 0 ? last->change[k] / dt : 0;
+    return SADMM_OK;
+}
+
 /* ---- shapes ------------------------------------------------------------------------------------------------------ */
 
 static sadmm_status get_material(sadmm_world *world, size_t slot, double *row)
@@ -354,6 +362,7 @@ static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
     [SADMM_ARRAY_COUPLING_REACTION] = {6, OF_COUPLING, get_reaction, NULL, NULL},
     [SADMM_ARRAY_BODY_GRAVITY_SCALE] = {1, OF_BODY, get_gravity_scale, check_gravity_scale, set_gravity_scale},
     [SADMM_ARRAY_BODY_DAMPING] = {2, OF_BODY, get_damping, check_damping, set_damping},
+    [SADMM_ARRAY_BODY_ACCELERATION] = {6, OF_BODY, get_acceleration, NULL, NULL},
     [SADMM_ARRAY_JOINT_LOWER] = COORDINATE_KIND(lower),
     [SADMM_ARRAY_JOINT_UPPER] = COORDINATE_KIND(upper),
     [SADMM_ARRAY_JOINT_DRIVE_STIFFNESS] = COORDINATE_KIND(drive_stiffness),
