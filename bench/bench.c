@@ -31,6 +31,7 @@ static const struct {
     {"shapes", bench_shapes, "what the manifold of a pair costs one core, by types of shapes"},
     {"queries", bench_queries, "what rays, overlaps and closest points of a scene cost"},
     {"joints", bench_joints, "motions and reactions of joints against reference tables"},
+    {"environments", bench_environments, "many copies of a scene stepped together: time, error and memory of one"},
     {"stress", bench_stress, "extreme cases judged by physics: pass, or what limits them"},
 };
 
@@ -38,7 +39,7 @@ static void usage(FILE *out)
 {
     fprintf(out, "usage: subadmm-bench COMMAND [options]\n\n");
     for (size_t k = 0; k < sizeof commands / sizeof *commands; ++k)
-        fprintf(out, "  %-11s %s\n", commands[k].name, commands[k].description);
+        fprintf(out, "  %-12s %s\n", commands[k].name, commands[k].description);
     fprintf(out, "\nsubadmm-bench help COMMAND lists the options of one.\n"
                  "Exit status: 0 done; 1 something failed or could not be written; 2 wrong usage; 130 or 143:\n"
                  "interrupted (SIGINT, SIGTERM), with what was measured until then.\n");

@@ -19,6 +19,7 @@ int bench_joints(int argc, char **argv);
 int bench_shapes(int argc, char **argv);
 int bench_queries(int argc, char **argv);
 int bench_stress(int argc, char **argv);
+int bench_environments(int argc, char **argv);
 
 /* Measured bandwidth of memory with that many threads, GB/s (copy, read + write counted). */
 double bench_memory_bandwidth(int threads);

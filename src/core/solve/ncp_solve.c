@@ -29,8 +29,9 @@ static const double MOST_ENERGY = 10;
 /* Contacts that cannot be met miss by more than this share of the speed of corrections: what is nearer is left to the
  * iterations first. */
 static const double CANNOT = 0.1;
-/* How many times larger than those they replace impulses may be that are no solution. */
-static const double MOST_GROWTH = 4;
+/* How many times larger than those they replace impulses may be that are no solution; and than the momentum that is at
+ * hand, if they meet the tolerance alone. */
+static const double MOST_GROWTH = 4, MOST_LOAD = 10;
 /* How often it goes from contacts to rows and back, in all and without coming nearer though no row changed; and passes
  * of the inner rows. */
 enum { MOST_ROUNDS = 40, MOST_IDLE = 4, MOST_PASSES = 6 };
@@ -489,15 +490,18 @@ static double best_energy2(const struct island *s)
     return sum;
 }
 
+static double mass_of(const struct island *s, int32_t number)
+{
+    const double *A = tree_inertia(s, number);
+    return A ? A[0] : 1 / sadmm_ncp_factor(s, number)[0];
+}
+
 /* That of all at the speed of corrections, and with nothing but forces. */
 static double correcting_energy2(const struct island *s)
 {
     const double speed = s->settings->correction_speed;
     double mass = 0;
-    for (int32_t n = 0; n < s->bodies; ++n) {
-        const double *A = tree_inertia(s, n);
-        mass += A ? A[0] : 1 / sadmm_ncp_factor(s, n)[0];
-    }
+    for (int32_t n = 0; n < s->bodies; ++n) mass += mass_of(s, n);
     return speed * speed * mass;
 }
 
@@ -561,6 +565,37 @@ static bool take(struct island *s, int32_t label, bool solved)
     return true;
 }
 
+/* What changes the momentum of the island's bodies, N s: contacts and joints, of each by itself; and drives. */
+static double momentum_at_hand(const struct island *s)
+{
+    double sum = 0, free[6];
+    for (int32_t n = 0; n < s->bodies; ++n) {
+        const double *v = best_velocity(s, n);
+        ldl6_solve(sadmm_ncp_factor(s, n), s->d->bodies[n].b, free);
+        sum += mass_of(s, n) * v3_norm(v3_sub(v3_load(v), v3_load(free)));
+    }
+    for (int32_t k = 0; k < s->parts; ++k) {
+        const struct articulation_view *view = &part_of(s, k)->view;
+        EACH_ARTICULATION_ROW(s->slots, view, r, from)
+        {
+            const struct articulation_row *row = &view->rows[r];
+            (void)from;
+            if (isfinite(row->lo) && isfinite(row->hi)) sum += fabs(articulation_bounded(view, r));
+        }
+    }
+    return sum;
+}
+
+/* A solution that meets the tolerance, but leaves more than rounding does: an impact of light links, say. Impulses that
+ * are much larger than the momentum they change press against each other: they are none, however near they come. */
+static bool is_solution(const struct island *s, double before)
+{
+    double most = 0;
+    if (!(s->best < before && s->best <= s->settings->tolerance)) return false;
+    for (int32_t n = 0; n < 3 * s->contacts; ++n) most = fmax(most, fabs(s->best_lambda[n]));
+    return most <= MOST_LOAD * momentum_at_hand(s);
+}
+
 static bool solve_island(struct island *s, int32_t label)
 {
     struct sadmm_ncp *d = s->d;
@@ -597,7 +632,8 @@ static bool solve_island(struct island *s, int32_t label)
     s->gives = false;
     begin_search(s, d->states);
     search(s, G, d->states, d->states + rows, rows);
-    const bool solved = is_enough(s, s->best), wild = s->best < before && has_too_much_energy(s);
+    const bool wild = s->best < before && has_too_much_energy(s),
+               solved = is_enough(s, s->best) || (!wild && is_solution(s, before));
     if (solved || (!wild && is_nearer(s, before, size_before))) take(s, label, solved);
     if (solved && !wild) return true;
     const double nearest = d->error[label], energy = solved ? best_energy2(s) : HUGE_VAL;
