@@ -483,6 +483,61 @@ START_TEST(single_precision_arrays_are_rounded)
 }
 END_TEST
 
+/* Contacts and rays of each are those of a world of its own; a reset empties the list. */
+START_TEST(contacts_and_rays_are_an_environments_own)
+{
+    struct machine m = build_machine();
+    sadmm_environments *environments = replicate(m.world, FEW);
+    sadmm_world *worlds[FEW];
+    sadmm_ray rays[FEW * 4];
+    sadmm_ray_hit hits[FEW * 4], own[4];
+    double *wrench = array_of(environments, SADMM_ARRAY_BODY_WRENCH);
+    int points = 0;
+    for (int32_t e = 0; e < FEW; ++e) {
+        double *of = wrench + numbers_of(m.world, SADMM_ARRAY_BODY_WRENCH) * (size_t)e;
+        worlds[e] = alone(m.world);
+        vary(m.world, SADMM_ARRAY_BODY_WRENCH, e, 0, of);
+        write_array(worlds[e], SADMM_ARRAY_BODY_WRENCH, of);
+        for (int k = 0; k < 4; ++k)
+            rays[4 * e + k] = (sadmm_ray){{0.3 * k - 0.5, 0.01 * e, 3}, {0, 0, -1}, INFINITY};
+    }
+    MUST_ALL(environments, sadmm_environments_record_contacts(environments, true));
+    for (int step = 0; step < 40; ++step) {
+        MUST_ALL(environments, sadmm_environments_step(environments, 1));
+        MUST_ALL(environments, sadmm_environments_cast_rays(environments, NULL, 0, 4, rays, NULL, hits));
+        for (int32_t e = 0; e < FEW; ++e) {
+            const sadmm_contact *contacts;
+            int32_t count;
+            step_world(worlds[e], 1);
+            MUST_ALL(environments, sadmm_environments_contacts(environments, e, &contacts, &count));
+            ck_assert_int_eq(count, sadmm_world_contact_count(worlds[e]));
+            sadmm_contact *mine = calloc((size_t)count + 1, sizeof *mine);
+            MUST(worlds[e], sadmm_world_contacts(worlds[e], 0, count, mine));
+            if (count > 0) ck_assert_mem_eq(contacts, mine, (size_t)count * sizeof *mine);
+            free(mine);
+            points += count;
+            MUST(worlds[e], sadmm_world_cast_rays(worlds[e], 4, rays + 4 * e, NULL, own));
+            ck_assert_mem_eq(own, hits + 4 * e, sizeof own);
+        }
+    }
+    ck_assert_int_gt(points, 100);
+    const sadmm_contact *contacts;
+    const int32_t two = 2;
+    int32_t count;
+    MUST_ALL(environments, sadmm_environments_reset(environments, &two, 1, NULL));
+    MUST_ALL(environments, sadmm_environments_contacts(environments, 2, &contacts, &count));
+    ck_assert_int_eq(count, 0);
+    MUST_ALL(environments, sadmm_environments_contacts(environments, 1, &contacts, &count));
+    ck_assert_int_gt(count, 0);
+    rays[4 * 3].direction[2] = 0; /* the whole of it is */
+    REFUSED(environments, "environment 3: rays[0].direction",
+            sadmm_environments_cast_rays(environments, NULL, 0, 4, rays, NULL, hits));
+    for (int32_t e = 0; e < FEW; ++e) sadmm_world_destroy(worlds[e]);
+    sadmm_environments_destroy(environments);
+    sadmm_world_destroy(m.world);
+}
+END_TEST
+
 START_TEST(what_is_refused_changes_nothing)
 {
     struct machine m = build_machine();
@@ -593,6 +648,7 @@ int main(void)
     tcase_add_test(cases, kept_states_are_begun_with);
     tcase_add_test(cases, what_goes_wrong_stays_alone);
     tcase_add_test(cases, single_precision_arrays_are_rounded);
+    tcase_add_test(cases, contacts_and_rays_are_an_environments_own);
     tcase_add_test(cases, what_is_refused_changes_nothing);
     tcase_add_test(cases, memory_may_run_out);
     suite_add_tcase(suite, cases);

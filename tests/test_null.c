@@ -103,6 +103,18 @@ static void on_environments(void)
     REFUSES("out", sadmm_environments_bind(environments, SADMM_ARRAY_BODY_STATE, SADMM_F64, NULL));
     ck_assert_ptr_null(sadmm_environments_marked(NULL));
     ck_assert_str_eq(sadmm_environments_mark(NULL, 0), "");
+    const sadmm_contact *contacts;
+    const sadmm_ray ray = {{0, 0, 1}, {0, 0, -1}, 10};
+    sadmm_ray_hit hit;
+    int32_t count;
+    REFUSES("environments", sadmm_environments_record_contacts(NULL, true));
+    ck_assert_int_eq(sadmm_environments_contacts(environments, 0, &contacts, &count), SADMM_ERROR_UNAVAILABLE);
+    REFUSES("environments", sadmm_environments_contacts(NULL, 0, &contacts, &count));
+    REFUSES("contacts", sadmm_environments_contacts(environments, 0, NULL, &count));
+    REFUSES("count", sadmm_environments_contacts(environments, 0, &contacts, NULL));
+    REFUSES("environments", sadmm_environments_cast_rays(NULL, NULL, 0, 1, &ray, NULL, &hit));
+    REFUSES("rays", sadmm_environments_cast_rays(environments, NULL, 0, 1, NULL, NULL, &hit));
+    REFUSES("hits", sadmm_environments_cast_rays(environments, NULL, 0, 1, &ray, NULL, NULL));
     sadmm_environments_destroy(environments);
 }
 
@@ -618,7 +630,8 @@ static const struct {
       "sadmm_environments_memory", "sadmm_environments_step", "sadmm_environments_set_settings",
       "sadmm_environments_settings_sized", "sadmm_environments_reset", "sadmm_environments_keep",
       "sadmm_environments_save", "sadmm_environments_rows", "sadmm_environments_get", "sadmm_environments_set",
-      "sadmm_environments_bind", "sadmm_environments_marked", "sadmm_environments_mark"}},
+      "sadmm_environments_bind", "sadmm_environments_marked", "sadmm_environments_mark",
+      "sadmm_environments_record_contacts", "sadmm_environments_contacts", "sadmm_environments_cast_rays"}},
     {on_mesh_files,
      {"sadmm_mesh_file_read", "sadmm_mesh_file_destroy", "sadmm_mesh_file_vertex_count",
       "sadmm_mesh_file_triangle_count", "sadmm_mesh_file_vertices", "sadmm_mesh_file_triangles",

@@ -21,6 +21,7 @@
 #include <stddef.h>
 
 #include "arrays.h"
+#include "query.h"
 #include "world.h"
 
 #ifdef __cplusplus
@@ -107,6 +108,24 @@ typedef struct sadmm_environments_array {
  * sadmm_world_get_array), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_array array,
                                                sadmm_precision precision, sadmm_environments_array *out);
+
+/* ---- contacts and rays --------------------------------------------------------------------------------------- */
+
+/* From now on keep the contacts of the last step of each sadmm_environments_step, or (false) no more. */
+SADMM_API sadmm_status sadmm_environments_record_contacts(sadmm_environments *environments, bool record);
+/* *contacts: *count contacts of an environment, all that there are, as of sadmm_world_contacts; valid until the next
+ * call that steps, resets or sets, which empties the list of what is reset or set. Ids are those of the template.
+ * Errors: INVALID_ARGUMENT (range), UNAVAILABLE (not recorded). */
+SADMM_API sadmm_status sadmm_environments_contacts(sadmm_environments *environments, int32_t environment,
+                                                   const sadmm_contact **contacts, int32_t *count);
+/* sadmm_world_cast_rays in each of the environments `which`: rays and hits, count x `each`; each: >= 0. Ids in the hits
+ * and in the filter are those of the template. Errors: those of sadmm_world_cast_rays, with the environment in the
+ * message; INVALID_ARGUMENT (range). */
+SADMM_API sadmm_status sadmm_environments_cast_rays(sadmm_environments *environments, const int32_t *which,
+                                                    int32_t count, int32_t each, const sadmm_ray *rays,
+                                                    const sadmm_query_filter *filter, sadmm_ray_hit *hits);
+
+/* ---- marks --------------------------------------------------------------------------------------------------- */
 
 /* Which are marked: count bytes, 1 or 0, one an environment, valid until the environments are destroyed; NULL of
  * NULL. */

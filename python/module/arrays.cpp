@@ -147,7 +147,7 @@ void bind_arrays(nb::module_ &m, nb::class_<world> &w)
 {
     nb::list names;
     for (int k = 0; k < SADMM_ARRAY_COUNT; ++k)
-        names.append(nb::make_tuple(sadmm_array_names[k], sadmm_array_columns((sadmm_array)k),
+        names.append(nb::make_tuple(sadmm_array_name((sadmm_array)k), sadmm_array_columns((sadmm_array)k),
                                     sadmm_array_is_settable((sadmm_array)k)));
     m.attr("_arrays") = names;
     m.attr("_contact_members") = contact_members();

@@ -262,7 +262,6 @@ NAMES_OF(sadmm_body_type, sadmm_body_type_names, SADMM_BODY_TYPE_COUNT)
 NAMES_OF(sadmm_shape_type, sadmm_shape_type_names, SADMM_SHAPE_TYPE_COUNT)
 NAMES_OF(sadmm_joint_kind, sadmm_joint_kind_names, SADMM_JOINT_KIND_COUNT)
 NAMES_OF(sadmm_drive, sadmm_drive_names, SADMM_DRIVE_COUNT)
-NAMES_OF(sadmm_array, sadmm_array_names, SADMM_ARRAY_COUNT)
 
 // The value with that name, or ValueError.
 template <class E> E named(const char *what, const std::string &name)
@@ -271,6 +270,16 @@ template <class E> E named(const char *what, const std::string &name)
     for (int k = 0; k < names_of<E>::count; ++k) {
         if (name == names_of<E>::list[k]) return (E)k;
         all += std::string(k == 0 ? "" : ", ") + "'" + names_of<E>::list[k] + "'";
+    }
+    throw nb::value_error((std::string(what) + " = '" + name + "': must be one of " + all).c_str());
+}
+template <> inline sadmm_array named<sadmm_array>(const char *what, const std::string &name)
+{
+    std::string all;
+    for (int k = 0; k < SADMM_ARRAY_COUNT; ++k) {
+        const char *of = sadmm_array_name((sadmm_array)k);
+        if (name == of) return (sadmm_array)k;
+        all += std::string(k == 0 ? "" : ", ") + "'" + of + "'";
     }
     throw nb::value_error((std::string(what) + " = '" + name + "': must be one of " + all).c_str());
 }

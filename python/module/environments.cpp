@@ -1,5 +1,7 @@
 // Many copies of a world (include/subadmm/environments.h). What is checked of arguments in Python, and how they are
 // called, is in subadmm/environments.py.
+#include <limits>
+
 #include "common.h"
 
 namespace
@@ -88,6 +90,37 @@ void set(environments &e, const std::string &name, in_values values, std::option
     call(e, [&](sadmm_environments *h) { return sadmm_environments_set(h, array, rows, count, values.data()); });
 }
 
+// origins, directions: environments x rays x 3.
+nb::tuple cast_rays(environments &e, in_values origins, in_values directions, double length,
+                    std::optional<which_rows> which, const std::optional<body> &ignore,
+                    const std::vector<std::string> &types)
+{
+    int32_t count;
+    const int32_t *rows = rows_of(which, &count);
+    const size_t n = (size_t)(rows ? count : sadmm_environments_count(e.handle())), each = origins.shape(1);
+    sadmm_query_filter filter = sadmm_query_filter_default();
+    if (ignore) filter.ignored = ignore->id; // ids are the template's
+    if (!types.empty()) filter.body_types = 0;
+    for (const std::string &type : types) filter.body_types |= 1u << named<sadmm_body_type>("types", type);
+    std::vector<sadmm_ray> rays(n * each + 1);
+    std::vector<sadmm_ray_hit> hits(n * each + 1);
+    for (size_t i = 0; i < n * each; ++i) {
+        for (size_t k = 0; k < 3; ++k)
+            rays[i].origin[k] = origins.data()[3 * i + k], rays[i].direction[k] = directions.data()[3 * i + k];
+        rays[i].length = length;
+    }
+    call(e, [&](sadmm_environments *h) {
+        return sadmm_environments_cast_rays(h, rows, count, (int32_t)each, rays.data(), &filter, hits.data());
+    });
+    std::vector<double> distances(n * each), points(3 * n * each), normals(3 * n * each);
+    for (size_t i = 0; i < n * each; ++i) {
+        distances[i] = hits[i].shape.slot != 0 ? hits[i].distance : std::numeric_limits<double>::infinity();
+        for (size_t k = 0; k < 3; ++k) points[3 * i + k] = hits[i].point[k], normals[3 * i + k] = hits[i].normal[k];
+    }
+    return nb::make_tuple(numpy_of(std::move(distances), {n, each}), numpy_of(std::move(points), {n, each, 3}),
+                          numpy_of(std::move(normals), {n, each, 3}));
+}
+
 } // namespace
 
 void bind_environments(nb::module_ &m)
@@ -154,6 +187,26 @@ void bind_environments(nb::module_ &m)
                 return std::string(sadmm_environments_mark(e.handle(), environment));
             },
             "environment"_a)
+        .def("record_contacts",
+             [](environments &e, bool record) {
+                 call(e, [&](sadmm_environments *h) { return sadmm_environments_record_contacts(h, record); });
+             },
+             "record"_a)
+        .def("contacts",
+             [](environments &e, int32_t environment) {
+                 std::vector<sadmm_contact> all;
+                 call(e, [&](sadmm_environments *h) {
+                     const sadmm_contact *contacts;
+                     int32_t count;
+                     const sadmm_status status = sadmm_environments_contacts(h, environment, &contacts, &count);
+                     if (status == SADMM_OK) all.assign(contacts, contacts + count);
+                     return status;
+                 });
+                 return nb::bytes((const char *)all.data(), all.size() * sizeof(sadmm_contact));
+             },
+             "environment"_a)
+        .def("cast_rays", &cast_rays, "origins"_a, "directions"_a, "length"_a, "which"_a.none(), "ignore"_a.none(),
+             "types"_a)
         .def_prop_rw(
             "settings",
             [](environments &e) {

@@ -52,9 +52,10 @@ from ._core import (
     version,
 )
 from .decomposition import decompose
-from .environments import Environments, replicate
+from .environments import Environments
 from .given import indices, numbers, real
 from .importing import load
+from .copies import replicate
 
 __version__ = version()
 

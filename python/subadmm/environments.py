@@ -1,25 +1,9 @@
-"""Many copies of a world or of a loaded robot, stepped together: replicate()."""
+"""Many copies of a world, stepped together."""
 
 import numpy as np
 
 from . import _core
 from .given import whole
-from .importing.model import Loaded
-
-
-def replicate(template, count):
-    """`count` environments, each a copy of `template` as it is now: a World, or what load() returned. They do not see
-    each other, and make the same steps as worlds of their own, bit for bit, on settings.threads threads (0: all cores).
-    The template does not change. Of a robot (MJCF or URDF) a Robots, else an Environments. On the CPU."""
-    if isinstance(template, Loaded):
-        from .robots import Robots  # needs more of the package
-
-        if hasattr(template, "positions"):
-            return Robots(template, count)
-        template = template.world
-    if not isinstance(template, _core.World):
-        raise TypeError(f"template = {template!r}: must be a subadmm.World or what subadmm.load returned")
-    return Environments(template, count)
 
 
 class Environments:
@@ -143,6 +127,37 @@ class Environments:
         world = _core.World()
         world.restore(self._core.save(self._one(environment)))
         return world
+
+    def record_contacts(self, record=True):
+        """Keep the contacts of each environment's last step from now on, or (False) no more."""
+        self._core.record_contacts(record)
+
+    def contacts(self, environment):
+        """Contacts of an environment's last step, all of them: an array of subadmm.contact_dtype, a copy; its ids are
+        those of the template's bodies and shapes. After record_contacts()."""
+        from . import contact_dtype
+
+        return np.frombuffer(self._core.contacts(self._one(environment)), dtype=contact_dtype)
+
+    def cast_rays(self, origins, directions, length=np.inf, which=None, *, ignore=None, types=()):
+        """What rays hit in environments (numbers, or a mask; None: all): origins and directions of shape environments x
+        rays x 3, or what fits that by NumPy's rules (m, world); how far to search (m). Distances (infinite: nothing),
+        points and normals. ignore: a Body of the template; types: of bodies, like ("static",) for heights of terrain."""
+        rows = self._which(which)
+        n = self.count if rows is None else len(rows)
+        origins, directions = np.asarray(origins), np.asarray(directions)
+        for name, given in (("origins", origins), ("directions", directions)):
+            if given.dtype.kind not in "iuf" or given.ndim < 1 or given.shape[-1] != 3:
+                raise TypeError(f"{name}: must be real numbers, 3 in the last axis; is {given.dtype} of {given.shape}")
+        try:
+            shape = np.broadcast_shapes(origins.shape, directions.shape, (n, 1, 3))
+            origins, directions = (np.ascontiguousarray(np.broadcast_to(x, shape), np.float64)
+                                   for x in (origins, directions))
+        except ValueError:
+            shape = ()
+        if len(shape) != 3 or shape[0] != n:
+            raise ValueError(f"origins, directions: must have shape ({n}, rays, 3)")
+        return self._core.cast_rays(origins, directions, length, rows, ignore, list(types))
 
     @property
     def error(self):

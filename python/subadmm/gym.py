@@ -21,8 +21,8 @@ try:
 except ImportError as error:
     raise ImportError("subadmm.gym needs gymnasium 1.1 or later: python -m pip install gymnasium") from error
 
-from .environments import replicate
 from .importing import load
+from .copies import replicate
 
 
 def _mixed(x):

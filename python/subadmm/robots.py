@@ -1,4 +1,4 @@
-"""Many copies of a loaded robot, in MuJoCo's order of numbers: replicate()."""
+"""Many copies of a loaded robot, in MuJoCo's order of numbers."""
 
 import contextlib
 

@@ -201,6 +201,30 @@ def test_one_that_fails_is_alone(robot):
     assert not robots.failed.any() and (state[1] == other[1]).all()
 
 
+def test_contacts_and_rays(robot):
+    robots = subadmm.replicate(robot, 3)
+    with pytest.raises(subadmm.Unavailable):
+        robots.contacts(0)
+    robots.record_contacts()
+    robots.step(200)
+    one = robots.contacts(1)
+    assert len(one) >= 4 and (one["separation"] < 0.02).all()
+    lifted = sum(one["force"][one["force"][:, 2] > 0, 2])
+    assert lifted > 9.81  # the crate alone weighs so much
+    # A scan of heights: the plane is below everything, what is above it nearer.
+    grid = np.stack(np.meshgrid([-1.0, 0, 3], [0.5, 4]), -1).reshape(-1, 2)
+    origins = np.concatenate([grid, np.full((6, 1), 2.0)], axis=1)
+    distance, point, normal = robots.cast_rays(origins, [0, 0, -1.0], types=("static",))
+    assert distance.shape == (3, 6) and point.shape == normal.shape == (3, 6, 3)
+    np.testing.assert_allclose(distance, 2, atol=1e-12)
+    np.testing.assert_allclose(normal, np.broadcast_to([0, 0, 1.0], normal.shape), atol=1e-12)
+    onto, _, _ = robots.cast_rays(origins, [0, 0, -1.0], which=[2])
+    assert onto.shape == (1, 6) and onto[0, 0] == pytest.approx(1.8, abs=1e-3) and onto[0, 2] == pytest.approx(2)
+    assert np.isinf(robots.cast_rays(origins, [0, 0, -1.0], length=0.5)[0]).all()
+    with pytest.raises(ValueError, match="must have shape"):
+        robots.cast_rays(np.zeros((2, 6, 3)), [0, 0, -1.0])
+
+
 def test_what_is_refused(robot):
     robots = subadmm.replicate(robot, 3)
     for given, error, match in ((lambda: subadmm.replicate(robot, 0), ValueError, "count = 0"),

@@ -12,7 +12,6 @@ const char *const sadmm_body_type_names[SADMM_BODY_TYPE_COUNT] = {SADMM_BODY_TYP
 const char *const sadmm_shape_type_names[SADMM_SHAPE_TYPE_COUNT] = {SADMM_SHAPE_TYPES(NAME, )};
 const char *const sadmm_joint_kind_names[SADMM_JOINT_KIND_COUNT] = {SADMM_JOINT_KINDS(NAME, )};
 const char *const sadmm_drive_names[SADMM_DRIVE_COUNT] = {SADMM_DRIVES(NAME, )};
-const char *const sadmm_array_names[SADMM_ARRAY_COUNT] = {SADMM_ARRAYS(NAME, )};
 const int sadmm_shape_sizes[SADMM_SHAPE_TYPE_COUNT] = {SADMM_SHAPE_TYPES(SIZES, )};
 const uint32_t sadmm_joint_locks[SADMM_JOINT_KIND_COUNT] = {SADMM_JOINT_KINDS(LOCKS, )};
 
@@ -26,4 +25,3 @@ _Static_assert(0 SADMM_BODY_TYPES(ONE, ) == SADMM_BODY_TYPE_COUNT, "every type o
 _Static_assert(0 SADMM_SHAPE_TYPES(ONE, ) == SADMM_SHAPE_TYPE_COUNT, "every type of shape is listed");
 _Static_assert(0 SADMM_JOINT_KINDS(ONE, ) == SADMM_JOINT_KIND_COUNT, "every kind of joint is listed");
 _Static_assert(0 SADMM_DRIVES(ONE, ) == SADMM_DRIVE_COUNT, "every drive is listed");
-_Static_assert(0 SADMM_ARRAYS(ONE, ) == SADMM_ARRAY_COUNT, "every array is listed");

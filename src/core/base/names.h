@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-#include "subadmm/arrays.h"
+#include "subadmm/joint.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -57,35 +57,6 @@ extern "C" {
     F(X, SADMM_JOINT_SPRING, "spring", 0, "all; 0 is the distance", "spring, rope, actuator between two points")       \
     F(X, SADMM_JOINT_LINK, "link", SADMM_LOCK_X + SADMM_LOCK_Z, "all but the distance and translation 2",              \
       "rod with a hinge at a and a ball joint at b")
-#define SADMM_ARRAYS(F, X)                                             \
-    F(X, SADMM_ARRAY_BODY_STATE, "body_state")                         \
-    F(X, SADMM_ARRAY_BODY_WRENCH, "body_wrench")                       \
-    F(X, SADMM_ARRAY_BODY_CONTACT_WRENCH, "body_contact_wrench")       \
-    F(X, SADMM_ARRAY_BODY_INERTIA, "body_inertia")                     \
-    F(X, SADMM_ARRAY_JOINT_POSITION, "joint_position")                 \
-    F(X, SADMM_ARRAY_JOINT_SPEED, "joint_speed")                       \
-    F(X, SADMM_ARRAY_JOINT_DRIVE_FORCE, "joint_drive_force")           \
-    F(X, SADMM_ARRAY_JOINT_WRENCH, "joint_wrench")                     \
-    F(X, SADMM_ARRAY_JOINT_TARGET_POSITION, "joint_target_position")   \
-    F(X, SADMM_ARRAY_JOINT_TARGET_SPEED, "joint_target_speed")         \
-    F(X, SADMM_ARRAY_COUPLING_TARGET, "coupling_target")               \
-    F(X, SADMM_ARRAY_COUPLING_REACTION, "coupling_reaction")           \
-    F(X, SADMM_ARRAY_BODY_GRAVITY_SCALE, "body_gravity_scale")         \
-    F(X, SADMM_ARRAY_BODY_DAMPING, "body_damping")                     \
-    F(X, SADMM_ARRAY_BODY_ACCELERATION, "body_acceleration")           \
-    F(X, SADMM_ARRAY_JOINT_LOWER, "joint_lower")                       \
-    F(X, SADMM_ARRAY_JOINT_UPPER, "joint_upper")                       \
-    F(X, SADMM_ARRAY_JOINT_DRIVE_STIFFNESS, "joint_drive_stiffness")   \
-    F(X, SADMM_ARRAY_JOINT_DRIVE_DAMPING, "joint_drive_damping")       \
-    F(X, SADMM_ARRAY_JOINT_DRIVE_LIMIT, "joint_drive_limit")           \
-    F(X, SADMM_ARRAY_JOINT_FRICTION, "joint_friction")                 \
-    F(X, SADMM_ARRAY_JOINT_SPRING_STIFFNESS, "joint_spring_stiffness") \
-    F(X, SADMM_ARRAY_JOINT_SPRING_DAMPING, "joint_spring_damping")     \
-    F(X, SADMM_ARRAY_JOINT_SPRING_REST, "joint_spring_rest")           \
-    F(X, SADMM_ARRAY_JOINT_ARMATURE, "joint_armature")                 \
-    F(X, SADMM_ARRAY_SHAPE_MATERIAL, "shape_material")                 \
-    F(X, SADMM_ARRAY_GRAVITY, "gravity")                               \
-    F(X, SADMM_ARRAY_REPORT, "report")
 #define SADMM_DRIVES(F, X)           \
     F(X, SADMM_DRIVE_OFF, "off")     \
     F(X, SADMM_DRIVE_SPEED, "speed") \
@@ -112,7 +83,6 @@ extern const char *const sadmm_body_type_names[SADMM_BODY_TYPE_COUNT];
 extern const char *const sadmm_shape_type_names[SADMM_SHAPE_TYPE_COUNT];
 extern const char *const sadmm_joint_kind_names[SADMM_JOINT_KIND_COUNT];
 extern const char *const sadmm_drive_names[SADMM_DRIVE_COUNT];
-extern const char *const sadmm_array_names[SADMM_ARRAY_COUNT];
 extern const int sadmm_shape_sizes[SADMM_SHAPE_TYPE_COUNT];
 extern const uint32_t sadmm_joint_locks[SADMM_JOINT_KIND_COUNT]; /* of CUSTOM: 0, they are the definition's */
 

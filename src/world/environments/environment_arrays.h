@@ -7,8 +7,10 @@
 /* The worker's world, which is an environment already, has what its input arrays have. */
 sadmm_status sadmm_environments_read_inputs(struct sadmm_environments *environments,
                                             struct sadmm_environment_worker *worker, int32_t environment);
-/* The other arrays that are bound have what the worker's world has. */
+/* The other arrays that are bound, and contacts where they are recorded, are those of the worker's world. */
 sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environments,
                                               struct sadmm_environment_worker *worker, int32_t environment);
+/* No contacts are recorded any more. */
+void sadmm_environments_free_contacts(struct sadmm_environments *environments);
 
 #endif

@@ -13,6 +13,12 @@ struct sadmm_bound_array {
     void *values;
 };
 
+/* Contacts that are kept of an environment. */
+struct sadmm_environment_contacts {
+    sadmm_contact *list; /* a growable block */
+    int32_t count;
+};
+
 /* What one thread works with: a world that becomes one environment after the other. */
 struct sadmm_environment_worker {
     sadmm_world *world;
@@ -35,6 +41,7 @@ struct sadmm_environments {
     uint32_t calls;
     struct sadmm_bound_array *bound;
     size_t bound_count;
+    struct sadmm_environment_contacts *contacts; /* (count) where they are recorded; else NULL */
     int threads; /* settings.threads of all; each worker has 1 */
 };
 

@@ -138,6 +138,7 @@ void sadmm_environments_destroy(sadmm_environments *environments)
     for (int32_t i = 0; environments->states && i < environments->count; ++i)
         sadmm_environment_state_free(&environments->states[i]);
     for (int32_t i = 0; environments->marks && i < environments->count; ++i) sadmm_free(environments->marks[i]);
+    sadmm_environments_free_contacts(environments);
     for (size_t k = 0; k < environments->kept_count; ++k) sadmm_environment_state_free(&environments->kept[k]);
     for (size_t k = 0; k < environments->bound_count; ++k) sadmm_free(environments->bound[k].values);
     void *blocks[] = {environments->worker, environments->states, environments->kept, environments->marked,
@@ -240,7 +241,7 @@ static sadmm_status begin_again(struct sadmm_environments *environments, struct 
     struct sadmm_environment_state *state = &environments->states[environment];
     TRY(sadmm_environment_state_copy(state, &environments->kept[states ? states[place] : 0], &worker->world->error));
     unmark(environments, environment);
-    if (environments->bound_count == 0) return SADMM_OK;
+    if (environments->bound_count == 0 && !environments->contacts) return SADMM_OK;
     TRY(sadmm_environment_state_load(worker->world, state));
     return sadmm_environments_write_outputs(environments, worker, environment);
 }

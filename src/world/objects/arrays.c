@@ -7,7 +7,6 @@
 #include "body_check.h"
 #include "core/base/check.h"
 #include "core/base/definition_fields.h"
-#include "core/base/names.h"
 #include "core/solve/resident.h"
 #include "coupling.h"
 #include "joint.h"
@@ -19,6 +18,7 @@ enum owner { OF_BODY, OF_SHAPE, OF_JOINT, OF_COUPLING, OF_WORLD };
 enum { MOST_COLUMNS = 13 };
 
 struct array_kind {
+    const char *name;
     int32_t columns;
     enum owner owner;
     sadmm_status (*get)(sadmm_world *world, size_t slot, double *row);
@@ -341,41 +341,40 @@ static sadmm_status get_report(sadmm_world *world, size_t slot, double *row)
 
 /* ---- all --------------------------------------------------------------------------------------------------------- */
 
-#define COORDINATE_KIND(member)                                 \
-    {                                                           \
-        6, OF_JOINT, get_##member, check_##member, set_##member \
-    }
+#define COORDINATE_KIND(name, member) {name, 6, OF_JOINT, get_##member, check_##member, set_##member}
 
 static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
-    [SADMM_ARRAY_BODY_STATE] = {13, OF_BODY, get_state, check_state, set_state},
-    [SADMM_ARRAY_BODY_WRENCH] = {6, OF_BODY, get_wrench, check_wrench, set_wrench},
-    [SADMM_ARRAY_BODY_CONTACT_WRENCH] = {6, OF_BODY, get_contact_wrench, NULL, NULL},
-    [SADMM_ARRAY_BODY_INERTIA] = {4, OF_BODY, get_inertia, check_inertia, set_inertia},
-    [SADMM_ARRAY_JOINT_POSITION] = {6, OF_JOINT, get_joint_position, check_joint_position,
+    [SADMM_ARRAY_BODY_STATE] = {"body_state", 13, OF_BODY, get_state, check_state, set_state},
+    [SADMM_ARRAY_BODY_WRENCH] = {"body_wrench", 6, OF_BODY, get_wrench, check_wrench, set_wrench},
+    [SADMM_ARRAY_BODY_CONTACT_WRENCH] = {"body_contact_wrench", 6, OF_BODY, get_contact_wrench, NULL, NULL},
+    [SADMM_ARRAY_BODY_INERTIA] = {"body_inertia", 4, OF_BODY, get_inertia, check_inertia, set_inertia},
+    [SADMM_ARRAY_JOINT_POSITION] = {"joint_position", 6, OF_JOINT, get_joint_position, check_joint_position,
                                     sadmm_world_set_joint_positions},
-    [SADMM_ARRAY_JOINT_SPEED] = {6, OF_JOINT, get_joint_speed, check_joint_speed, sadmm_world_set_joint_speeds},
-    [SADMM_ARRAY_JOINT_DRIVE_FORCE] = {6, OF_JOINT, get_joint_drive_force, NULL, NULL},
-    [SADMM_ARRAY_JOINT_WRENCH] = {6, OF_JOINT, get_joint_wrench, NULL, NULL},
-    [SADMM_ARRAY_JOINT_TARGET_POSITION] = COORDINATE_KIND(target_position),
-    [SADMM_ARRAY_JOINT_TARGET_SPEED] = COORDINATE_KIND(target_speed),
-    [SADMM_ARRAY_COUPLING_TARGET] = {13, OF_COUPLING, get_target, check_target, set_target},
-    [SADMM_ARRAY_COUPLING_REACTION] = {6, OF_COUPLING, get_reaction, NULL, NULL},
-    [SADMM_ARRAY_BODY_GRAVITY_SCALE] = {1, OF_BODY, get_gravity_scale, check_gravity_scale, set_gravity_scale},
-    [SADMM_ARRAY_BODY_DAMPING] = {2, OF_BODY, get_damping, check_damping, set_damping},
-    [SADMM_ARRAY_BODY_ACCELERATION] = {6, OF_BODY, get_acceleration, NULL, NULL},
-    [SADMM_ARRAY_JOINT_LOWER] = COORDINATE_KIND(lower),
-    [SADMM_ARRAY_JOINT_UPPER] = COORDINATE_KIND(upper),
-    [SADMM_ARRAY_JOINT_DRIVE_STIFFNESS] = COORDINATE_KIND(drive_stiffness),
-    [SADMM_ARRAY_JOINT_DRIVE_DAMPING] = COORDINATE_KIND(drive_damping),
-    [SADMM_ARRAY_JOINT_DRIVE_LIMIT] = COORDINATE_KIND(drive_force),
-    [SADMM_ARRAY_JOINT_FRICTION] = COORDINATE_KIND(friction),
-    [SADMM_ARRAY_JOINT_SPRING_STIFFNESS] = COORDINATE_KIND(spring_stiffness),
-    [SADMM_ARRAY_JOINT_SPRING_DAMPING] = COORDINATE_KIND(spring_damping),
-    [SADMM_ARRAY_JOINT_SPRING_REST] = COORDINATE_KIND(spring_rest),
-    [SADMM_ARRAY_JOINT_ARMATURE] = COORDINATE_KIND(armature),
-    [SADMM_ARRAY_SHAPE_MATERIAL] = {2, OF_SHAPE, get_material, check_material, set_material},
-    [SADMM_ARRAY_GRAVITY] = {3, OF_WORLD, get_gravity, check_gravity, set_gravity},
-    [SADMM_ARRAY_REPORT] = {8, OF_WORLD, get_report, NULL, NULL},
+    [SADMM_ARRAY_JOINT_SPEED] = {"joint_speed", 6, OF_JOINT, get_joint_speed, check_joint_speed,
+                                 sadmm_world_set_joint_speeds},
+    [SADMM_ARRAY_JOINT_DRIVE_FORCE] = {"joint_drive_force", 6, OF_JOINT, get_joint_drive_force, NULL, NULL},
+    [SADMM_ARRAY_JOINT_WRENCH] = {"joint_wrench", 6, OF_JOINT, get_joint_wrench, NULL, NULL},
+    [SADMM_ARRAY_JOINT_TARGET_POSITION] = COORDINATE_KIND("joint_target_position", target_position),
+    [SADMM_ARRAY_JOINT_TARGET_SPEED] = COORDINATE_KIND("joint_target_speed", target_speed),
+    [SADMM_ARRAY_COUPLING_TARGET] = {"coupling_target", 13, OF_COUPLING, get_target, check_target, set_target},
+    [SADMM_ARRAY_COUPLING_REACTION] = {"coupling_reaction", 6, OF_COUPLING, get_reaction, NULL, NULL},
+    [SADMM_ARRAY_BODY_GRAVITY_SCALE] = {"body_gravity_scale", 1, OF_BODY, get_gravity_scale, check_gravity_scale,
+                                        set_gravity_scale},
+    [SADMM_ARRAY_BODY_DAMPING] = {"body_damping", 2, OF_BODY, get_damping, check_damping, set_damping},
+    [SADMM_ARRAY_BODY_ACCELERATION] = {"body_acceleration", 6, OF_BODY, get_acceleration, NULL, NULL},
+    [SADMM_ARRAY_JOINT_LOWER] = COORDINATE_KIND("joint_lower", lower),
+    [SADMM_ARRAY_JOINT_UPPER] = COORDINATE_KIND("joint_upper", upper),
+    [SADMM_ARRAY_JOINT_DRIVE_STIFFNESS] = COORDINATE_KIND("joint_drive_stiffness", drive_stiffness),
+    [SADMM_ARRAY_JOINT_DRIVE_DAMPING] = COORDINATE_KIND("joint_drive_damping", drive_damping),
+    [SADMM_ARRAY_JOINT_DRIVE_LIMIT] = COORDINATE_KIND("joint_drive_limit", drive_force),
+    [SADMM_ARRAY_JOINT_FRICTION] = COORDINATE_KIND("joint_friction", friction),
+    [SADMM_ARRAY_JOINT_SPRING_STIFFNESS] = COORDINATE_KIND("joint_spring_stiffness", spring_stiffness),
+    [SADMM_ARRAY_JOINT_SPRING_DAMPING] = COORDINATE_KIND("joint_spring_damping", spring_damping),
+    [SADMM_ARRAY_JOINT_SPRING_REST] = COORDINATE_KIND("joint_spring_rest", spring_rest),
+    [SADMM_ARRAY_JOINT_ARMATURE] = COORDINATE_KIND("joint_armature", armature),
+    [SADMM_ARRAY_SHAPE_MATERIAL] = {"shape_material", 2, OF_SHAPE, get_material, check_material, set_material},
+    [SADMM_ARRAY_GRAVITY] = {"gravity", 3, OF_WORLD, get_gravity, check_gravity, set_gravity},
+    [SADMM_ARRAY_REPORT] = {"report", 8, OF_WORLD, get_report, NULL, NULL},
 };
 
 static const struct array_kind *kind_of(sadmm_array array)
@@ -383,7 +382,7 @@ static const struct array_kind *kind_of(sadmm_array array)
     return (unsigned)array < SADMM_ARRAY_COUNT ? &kinds[array] : NULL;
 }
 
-const char *sadmm_array_name(sadmm_array array) { return kind_of(array) ? sadmm_array_names[array] : ""; }
+const char *sadmm_array_name(sadmm_array array) { return kind_of(array) ? kind_of(array)->name : ""; }
 int32_t sadmm_array_columns(sadmm_array array) { return kind_of(array) ? kind_of(array)->columns : 0; }
 bool sadmm_array_is_settable(sadmm_array array) { return kind_of(array) && kind_of(array)->set; }
 

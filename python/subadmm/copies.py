@@ -1,0 +1,19 @@
+"""Many copies of a world or of a loaded robot, stepped together."""
+
+from . import _core
+from .environments import Environments
+from .importing.model import Loaded
+from .robots import Robots
+
+
+def replicate(template, count):
+    """`count` environments, each a copy of `template` as it is now: a World, or what load() returned. They do not see
+    each other, and make the same steps as worlds of their own, bit for bit, on settings.threads threads (0: all cores).
+    The template does not change. Of a robot (MJCF or URDF) a Robots, else an Environments. On the CPU."""
+    if isinstance(template, Loaded):
+        if hasattr(template, "positions"):
+            return Robots(template, count)
+        template = template.world
+    if not isinstance(template, _core.World):
+        raise TypeError(f"template = {template!r}: must be a subadmm.World or what subadmm.load returned")
+    return Environments(template, count)
