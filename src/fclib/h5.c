@@ -254,13 +254,16 @@ sadmm_status sadmm_h5_read_value(hid_t file, const char *name, int32_t lo, int32
 static sadmm_status write_dataset(hid_t file, const char *name, hid_t file_type, hid_t memory_type, hid_t space,
                                   const void *data, struct sadmm_error *error)
 {
-    hid_t links = H5Pcreate(H5P_LINK_CREATE), dataset = -1;
-    if (space >= 0 && links >= 0 && H5Pset_create_intermediate_group(links, 1) >= 0)
-        dataset = H5Dcreate2(file, name, file_type, space, links, H5P_DEFAULT, H5P_DEFAULT);
+    hid_t links = H5Pcreate(H5P_LINK_CREATE), storage = H5Pcreate(H5P_DATASET_CREATE), dataset = -1;
+    /* without times: the same problem is the same file */
+    if (space >= 0 && links >= 0 && storage >= 0 && H5Pset_create_intermediate_group(links, 1) >= 0 &&
+        H5Pset_obj_track_times(storage, false) >= 0)
+        dataset = H5Dcreate2(file, name, file_type, space, links, storage, H5P_DEFAULT);
     sadmm_status status = SADMM_OK;
     if (dataset < 0 || (data && H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0))
         status = fail_h5(error, name, "cannot be written");
     if (dataset >= 0 && H5Dclose(dataset) < 0 && status == SADMM_OK) status = fail_h5(error, name, "cannot be written");
+    if (storage >= 0) H5Pclose(storage);
     if (links >= 0) H5Pclose(links);
     if (space >= 0) H5Sclose(space);
     return status;
