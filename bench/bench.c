@@ -24,6 +24,7 @@ static const struct {
     {"convergence", bench_convergence,
      "iterations and time to a tolerance, errors of warm steps: method against method"},
     {"precision", bench_precision, "error against run time of frozen problems, by backend, precision and method"},
+    {"profile", bench_profile, "performance profiles over problem files, beside the solvers of siconos"},
     {"ablation", bench_ablation, "what each thing costs that a step does or leaves out, and what it gives"},
     {"stand", bench_stand, "does a structure stand for many steps, and what does a step cost"},
     {"motion", bench_motion, "total error against run time of scenes in motion, and how deep bodies overlap"},

@@ -11,6 +11,7 @@ int bench_kernels(int argc, char **argv);
 int bench_scaling(int argc, char **argv);
 int bench_convergence(int argc, char **argv);
 int bench_precision(int argc, char **argv);
+int bench_profile(int argc, char **argv);
 int bench_ablation(int argc, char **argv);
 int bench_stand(int argc, char **argv);
 int bench_motion(int argc, char **argv);

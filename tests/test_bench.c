@@ -372,6 +372,8 @@ static const struct {
     {"scaling --device -1", "--device -1: must be"},
     {"scaling here", "unexpected argument \"here\""},
     {"precision --scene moon", "moon"},
+    {"profile --seconds 0", "--seconds 0: must be in (0, 3600]"},
+    {"profile --fly", "unrecognized option '--fly'"},
     {"ablation --repeats 0", "--repeats 0: must be in [1, 1000]"},
     {"precision --limit 0", "--limit 0: must be in [1, 1000000]"},
     {"convergence --method slow", "--method slow: must be paper, fast or both"},
