@@ -224,23 +224,23 @@ class Copies:
             self.free.put(folder)
 
 
-def rows(names=()):
-    """One for each constant, with both factors' figures in one cell."""
+def rows(names=(), factors=FACTORS):
+    """One for each constant, with the factors' figures in one cell."""
     found = constants()
     chosen = [found[name] for name in names] or list(found.values())
-    cores = len(os.sched_getaffinity(0))
+    cores = min(len(os.sched_getaffinity(0)), 1 + len(chosen) * len(factors))
     with tempfile.TemporaryDirectory() as folder:
         copies, pool = Copies(folder, cores), concurrent.futures.ThreadPoolExecutor(cores)
         try:
             bases = {name: pool.submit(copies.figures, [name])
                      for name in FIGURES if any(name in constant.figures for constant in chosen)}
             variants = {constant.name: [pool.submit(copies.figures, constant.figures, constant, factor)
-                                        for factor in FACTORS] for constant in chosen}
+                                        for factor in factors] for constant in chosen}
             base = {name: future.result()[name] for name, future in bases.items()}
             for constant in chosen:
-                half_and_double = [future.result() for future in variants[constant.name]]
+                measured = [future.result() for future in variants[constant.name]]
                 row = {"constant": constant.name, "value": constant.value,
-                       **{name: "/".join(f"{variant[name] / base[name]:.2f}" for variant in half_and_double
+                       **{name: "/".join(f"{variant[name] / base[name]:.2f}" for variant in measured
                                          if name in variant) for name in FIGURES}}
                 print(*row.values(), file=sys.stderr, flush=True)
                 yield row

@@ -6,13 +6,16 @@ of warm steps against the iterations a step, a panel a scene.
     bench/plot_convergence.py convergence.csv docs/convergence
 
 writes docs/convergence_iterations.png, docs/convergence_time.png and docs/convergence_warm.png; what was not
-measured is left out. The CSV of `subadmm-bench precision` has curves, too. Needs matplotlib.
+measured is left out. The CSV of `subadmm-bench precision` has curves, too. That of `subadmm-bench profile` gives
+PREFIX_profile.png: performance profiles, a panel a measure and bound. Needs matplotlib.
 """
 import argparse
 import csv
 import math
 import sys
 from collections import defaultdict
+
+import profiles
 
 COLOURS = {"paper": "tab:red", "fast": "tab:blue"}
 STYLES = ["-", "--", ":", "-."]
@@ -38,15 +41,32 @@ def read_curves(paths, kind, x, y):
     return curves
 
 
-def draw(plt, curves, path, x_label, y_label, columns=5):
+def read_profiles(paths, most=1e4):
+    """{measure and bound: {(solver, ""): [(factor, share)]}}"""
+    rows = []
+    for path in paths:
+        with open(path, newline="") as file:
+            rows += csv.DictReader(line for line in file if not line.startswith("#"))
+    return {f"{measure}, {bound}": {(solver, ""): profiles.curve(values, most) for solver, values in found.items()}
+            for (measure, bound), found in profiles.ratios(rows).items()}
+
+
+def draw(plt, curves, path, x_label, y_label, columns=5, shares=False):
     if not curves:
         print(f"not drawn: {path}: nothing measured")
         return
     rows = -(-len(curves) // columns)
     figure, axes = plt.subplots(rows, columns, figsize=(3.2 * columns, 2.5 * rows), squeeze=False)
     all_series = sorted({series for lines in curves.values() for _, series in lines})
+    methods = list(dict.fromkeys(method for lines in curves.values() for method, _ in lines))
     for axis, (name, lines) in zip(axes.flat, curves.items()):
         for (method, series), points in sorted(lines.items()):
+            if shares:
+                at = methods.index(method)
+                axis.semilogx([x for x, _ in points], [y for _, y in points], STYLES[at // 10 % len(STYLES)],
+                              drawstyle="steps-post", color=f"C{at % 10}", label=method)
+                axis.set_ylim(0, 1.02)
+                continue
             points.sort()
             # What is exact to rounding is drawn at 1e-12.
             axis.loglog([x for x, _ in points], [max(y, 1e-12) for _, y in points],
@@ -58,7 +78,7 @@ def draw(plt, curves, path, x_label, y_label, columns=5):
         axis.tick_params(labelsize="x-small")
         values = sorted({x for points in lines.values() for x, _ in points})
         axis.xaxis.set_minor_formatter(plt.NullFormatter())
-        if len(values) <= 6:
+        if len(values) <= 6 and not shares:
             axis.set_xticks(values, [f"{x:g}" for x in values])
     for axis in axes.flat[len(curves):]:
         axis.set_visible(False)
@@ -76,9 +96,9 @@ def draw(plt, curves, path, x_label, y_label, columns=5):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("csv", nargs="+", help="written by subadmm-bench convergence --csv")
+    parser.add_argument("csv", nargs="+", help="written by subadmm-bench convergence, precision or profile --csv")
     parser.add_argument("prefix", help="of the pictures' paths")
-    parser.add_argument("--only", choices=("iterations", "time", "warm"), help="of the pictures")
+    parser.add_argument("--only", choices=("iterations", "time", "warm", "profile"), help="of the pictures")
     parser.add_argument("--suffix", default="png", help="png (default), svg or pdf")
     arguments = parser.parse_args()
     try:
@@ -88,6 +108,10 @@ def main():
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    if arguments.only == "profile":
+        draw(plt, read_profiles(arguments.csv), f"{arguments.prefix}_profile.{arguments.suffix}",
+             "time over that of the fastest", "share of the problems", columns=3, shares=True)
+        return
     error = "error, m/s"
     for kind, x, x_label, name in (("curve", "iterations", "iterations", "iterations"), ("curve", "ms", "ms", "time"),
                                    ("warm", "iterations", "iterations a step", "warm")):

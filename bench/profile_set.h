@@ -1,6 +1,6 @@
 /* Fifty frozen problems of known names, from 12 to some 3,000 contacts, for `subadmm-bench profile`: built ones that
- * are hard for known reasons, and the steps of scenes whose bodies have no joints, which FCLIB files cannot hold as this
- * library has them. The same on every machine up to the rounding of the build. */
+ * are hard for known reasons, and the steps of scenes whose bodies have no joints, which FCLIB files cannot hold as
+ * this library has them. The same on every machine up to the rounding of the build. */
 #ifndef BENCH_PROFILE_SET_H
 #define BENCH_PROFILE_SET_H
 

@@ -4,6 +4,8 @@
     bench/report.py [NAME...] [--build DIR] [--repeats N]   run what the reports need; results/NAME.csv and the tables
     bench/report.py --tables                                the tables alone, from the CSV files that there are
     bench/report.py --check                                 are the tables those of the CSV files? (part of the tests)
+    bench/report.py --quick [NAME...] [--out DIR]           does every report work? Shortened runs, ten minutes on two
+                                                            cores; CSV files, pictures and tables.md go to DIR
 
 A table stands in a document between the lines `<!-- report: NAME -->` and `<!-- end -->`; no other table has figures
 (tests/test_docs.py). A CSV file says in its first lines on which machine, when, by which version and by which command
@@ -22,12 +24,15 @@ import re
 import statistics
 import subprocess
 import sys
+import time
 import typing
 
 import constants
+import profiles
 
 PROJECT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-RESULTS = os.path.join(PROJECT, "docs", "results")
+DOCS = os.path.join(PROJECT, "docs")
+RESULTS = os.path.join(DOCS, "results")
 ABLATION_SCENES = ["vertical_stacks", "card_houses:1", "pile:300", "ragdolls:4", "hand_demo"]
 PRECISION_SCENES = ["vertical_stacks:12", "oblique_stacks:2", "card_houses:1", "sliding_cubes:500", "pile:200",
                     "settled_pile:1000", "pyramid:30", "chain:20", "ragdolls:4", "grippers:8"]
@@ -37,11 +42,19 @@ ENGINES = ["subadmm", "MuJoCo", "Bullet", "ODE"]
 LARGE = ["settled_pile:100000", "pile:100000"]
 
 
+class Missing(Exception):
+    """What a report needs is not here."""
+
+
 class Tools:
-    def __init__(self, build, repeats):
+    def __init__(self, build, repeats, quick=False):
         self.subadmm = os.path.join(build, "src", "subadmm")
         self.bench = os.path.join(build, "bench", "subadmm-bench")
-        self.repeats = repeats
+        self.repeats = 1 if quick else repeats
+        self.quick = quick
+
+    def choose(self, whole, quick):
+        return quick if self.quick else whole
 
     @staticmethod
     def output(command):
@@ -51,7 +64,13 @@ class Tools:
         return done.stdout
 
     def run(self, scene, *options):
-        return json.loads(self.output([self.subadmm, "run", scene, "--quiet", "--json", "-", *options]))
+        steps = self.choose((), ("--steps", "10"))
+        return json.loads(self.output([self.subadmm, "run", scene, "--quiet", "--json", "-", *options, *steps]))
+
+    def rows(self, *words, quick=("--quick",)):
+        """The CSV of a benchmark."""
+        text = self.output([self.bench, *words, "--csv", "-", *self.choose((), quick)])
+        return csv.DictReader(io.StringIO(text))
 
 
 def time_row(tools, scene, *options):
@@ -78,6 +97,9 @@ def rows_readme(tools):
 
 
 def rows_gpu(tools):
+    backends = json.loads(tools.output([tools.subadmm, "backends", "--json"]))
+    if not any(backend["name"] == "cuda" and (backend["f32"] or backend["f64"]) for backend in backends["backends"]):
+        raise Missing("no GPU, or a build without CUDA")
     for scene in SCENES + LARGE:
         for precision in ("f64", "f32"):
             more = ["--steps", "150"] if scene in LARGE else []
@@ -92,8 +114,8 @@ def rows_scenes(tools):
 
 def rows_motion(tools):
     """The table that the bench prints."""
-    lines = [line for line in tools.output([tools.bench, "motion", "--known", "20", "--precision", "f64"]).splitlines()
-             if line.startswith("| ")]
+    text = tools.output([tools.bench, "motion", "--known", tools.choose("20", "1"), "--precision", "f64"])
+    lines = [line for line in text.splitlines() if line.startswith("| ")]
     titles = [cell.strip() for cell in lines[0].strip("|").split("|")]
     for line in lines[1:]:
         yield dict(zip(titles, (cell.strip() for cell in line.strip("|").split("|"))))
@@ -101,25 +123,28 @@ def rows_motion(tools):
 
 def rows_convergence(tools):
     """All that the bench measures but times, which this is not about."""
-    text = tools.output([tools.bench, "convergence", "--max-seconds", "600", "--csv", "-"])
-    for row in csv.DictReader(io.StringIO(text)):
+    for row in tools.rows("convergence", "--max-seconds", "600"):
         yield {key: row[key] for key in ("kind", "name", "method", "backend", "precision", "contacts", "limit",
                                          "iterations", "tolerance", "ncp_balanced")}
 
 
 def rows_precision(tools):
-    scenes = [word for scene in PRECISION_SCENES for word in ("--scene", scene)]
-    text = tools.output([tools.bench, "precision", "--csv", "-", *scenes])
-    for row in csv.DictReader(io.StringIO(text)):
+    chosen = tools.choose(PRECISION_SCENES, PRECISION_SCENES[:1])
+    for row in tools.rows("precision", *(word for scene in chosen for word in ("--scene", scene))):
         if row["kind"] == "curve":
             yield {key: row[key] for key in ("kind", "name", "method", "backend", "precision", "threads", "contacts",
                                              "iterations", "ms", "ncp_balanced", "distance")}
 
 
-def draw_curves(path, name, *pictures):
+def rows_profile(tools):
+    """Every row, of what is not solved, too."""
+    yield from tools.rows("profile", "--seconds", tools.choose("1", "0.01"))
+
+
+def draw_curves(path, folder, name, *pictures):
     for only in pictures:
         done = subprocess.run([sys.executable, os.path.join(PROJECT, "bench", "plot_convergence.py"), path,
-                               os.path.join(PROJECT, "docs", name), "--only", only], check=False)
+                               os.path.join(folder, name), "--only", only], check=False)
         if done.returncode:
             print("no picture", file=sys.stderr)
 
@@ -144,8 +169,8 @@ def soonest_of(rows):
 
 
 def rows_ablation(tools):
-    scenes = [word for scene in ABLATION_SCENES for word in ("--scene", scene)]
-    yield from csv.DictReader(io.StringIO(tools.output([tools.bench, "ablation", "--csv", "-", *scenes])))
+    words = [word for scene in ABLATION_SCENES for word in ("--scene", scene)]
+    yield from tools.rows("ablation", *words, quick=("--steps", "4", "--repeats", "1"))
 
 
 def times_and_errors_of(rows):
@@ -199,30 +224,37 @@ def times_of(rows):
 
 def rows_standing(tools):
     for scene in ("pyramid:30", "arch", "dry_stone", "kapla_tower"):
-        text = tools.output([tools.bench, "stand", "--scene", scene, "--steps", "600", "--threads", "1"])
+        steps = tools.choose(600, 20)
+        text = tools.output([tools.bench, "stand", "--scene", scene, "--steps", str(steps), "--threads", "1"])
         found = {key: re.search(pattern, text) for key, pattern in (
             ("penetration_m", r"penetration +(\S+) m at most"),
             ("drift_m", r"drift +(\S+) m at most"), ("ncp", r"certificate +ncp (\S+) m/s"))}
-        yield {"scene": scene, "steps": 600, **{key: match.group(1) if match else "" for key, match in found.items()}}
+        yield {"scene": scene, "steps": steps, **{key: match.group(1) if match else "" for key, match in found.items()}}
 
 
 def rows_stress(tools):
     """Every row, those that fail too."""
-    command = [tools.bench, "stress", "--csv", "-"]
+    command = [tools.bench, "stress", "--csv", "-", *tools.choose((), ("--quick",))]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode not in (0, 1) or not done.stdout:
         sys.exit(f"{' '.join(command)}: exit status {done.returncode}\n{done.stderr}")
     yield from csv.DictReader(io.StringIO(done.stdout))
 
 
-def rows_peers(_):
+def rows_peers(tools):
     """Needs the Python package (PYTHONPATH, or installed) and the engines that are to stand in the table."""
-    text = Tools.output([sys.executable, PEERS, "--csv", "-"])
+    command = [sys.executable, PEERS, "--csv", "-", *tools.choose((), ("--quick",))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if "no engine can be had" in done.stderr:
+        raise Missing("no engine: " + done.stderr.splitlines()[0])
+    if done.returncode:
+        sys.exit(f"{' '.join(command)}: exit status {done.returncode}\n{done.stderr}")
+    text = done.stdout
     yield from csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
 
 
-def draw_peers(path):
-    picture = os.path.join(PROJECT, "docs", "peers.png")
+def draw_peers(path, folder):
+    picture = os.path.join(folder, "peers.png")
     if subprocess.run([sys.executable, PEERS, "--rows", path, "--picture", picture], stdout=subprocess.DEVNULL,
                       check=False).returncode:
         print("no picture", file=sys.stderr)
@@ -241,8 +273,8 @@ def side_by_side(rows):
              **{engine: scene.get(engine, "-") for engine in ENGINES}} for scene in scenes.values()]
 
 
-def rows_constants(_):
-    return constants.rows()
+def rows_constants(tools):
+    return constants.rows(*tools.choose((), (["WEIGHT_STAGNATION"], constants.FACTORS[:1])))
 
 
 def columns(**titles):
@@ -253,7 +285,7 @@ class Report(typing.NamedTuple):
     rows: typing.Callable                              # of the CSV file: what measures them
     columns: list = ()                                 # of the table: keys and titles; no document has one without
     view: typing.Callable = lambda rows: rows          # the table's rows, of those of the CSV file
-    draw: typing.Callable = lambda path: None          # pictures, of the CSV file's path
+    draw: typing.Callable = lambda path, folder: None  # pictures, of the CSV file's path; into which folder
 
 
 REPORTS = {
@@ -267,10 +299,14 @@ REPORTS = {
         key: key for key in ("motion", "error by dt", "dt/4", "order", "energy left")}), on_the_plane),
     "convergence": Report(rows_convergence, columns(problem="problem", contacts="contacts", paper="`paper`",
                                                     fast="`fast`"), counts_of,
-                          lambda path: draw_curves(path, "convergence", "iterations", "warm")),
+                          lambda path, folder: draw_curves(path, folder, "convergence", "iterations", "warm")),
     "precision": Report(rows_precision, columns(scene="scene", **{level: f"{level} m/s" for level in
                                                                   ("1e-3", "1e-5", "1e-8")}), soonest_of,
-                        lambda path: draw_curves(path, "precision", "time")),
+                        lambda path, folder: draw_curves(path, folder, "precision", "time")),
+    "profile": Report(rows_profile, columns(solver="solver", **{
+        f"{measure} {bound}": f"{measure} {bound}{unit}" for measure, unit in (("siconos", ""), ("natural map", " m/s"))
+        for bound in ("0.0001", "1e-06", "1e-08")}), profiles.table,
+                      lambda path, folder: draw_curves(path, folder, "solvers", "profile")),
     "ablation": Report(rows_ablation, columns(name="", what="what", **{scene: scene for scene in ABLATION_SCENES}),
                        times_and_errors_of),
     "standing": Report(rows_standing, columns(scene="scene", steps="steps", penetration_m="penetration, m",
@@ -295,19 +331,19 @@ def machine():
     return f"{model}, {os.cpu_count()} cores"
 
 
-def csv_path(name):
-    return os.path.join(RESULTS, name + ".csv")
+def csv_path(name, folder=RESULTS):
+    return os.path.join(folder, name + ".csv")
 
 
-def write_csv(name, rows, tools):
+def write_csv(name, rows, tools, folder=RESULTS):
     rows = list(rows)
-    os.makedirs(RESULTS, exist_ok=True)
-    with open(csv_path(name), "w", encoding="utf-8", newline="") as file:
+    os.makedirs(folder, exist_ok=True)
+    with open(csv_path(name, folder), "w", encoding="utf-8", newline="") as file:
         if name not in SAME_EVERYWHERE:
             device = next((row["device"] for row in rows if row.get("backend") == "cuda"), None)
             version = tools.output([tools.subadmm, "--version"]).split("(")[0].strip()
             file.write(f"# {device or machine()}; {datetime.date.today()}; {version}\n")
-        file.write(f"# bench/report.py {name}\n")
+        file.write(f"# bench/report.py {tools.choose('', '--quick ')}{name}\n")
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
@@ -320,16 +356,17 @@ def is_outdated(name, tools):
     return rows != [{key: str(value) for key, value in row.items()} for row in REPORTS[name].rows(tools)]
 
 
-def table_of(name):
+def table_of(name, folder=RESULTS):
     """The lines of a table, of its CSV file."""
-    with open(csv_path(name), encoding="utf-8") as file:
+    with open(csv_path(name, folder), encoding="utf-8") as file:
         lines = file.read().splitlines()
     notes = [re.sub(r" [0-9-]{10};", "", line[2:]) for line in lines if line.startswith("# ")]  # the date is the file's
     report = REPORTS[name]
+    rows = report.view(list(csv.DictReader(line for line in lines if not line.startswith("# "))))
     yield ""
     yield "| " + " | ".join(title for _, title in report.columns) + " |"
     yield "|" + "---|" * len(report.columns)
-    for row in report.view(list(csv.DictReader(line for line in lines if not line.startswith("# ")))):
+    for row in rows:
         yield "| " + " | ".join(row[key].replace("|", "\\|") for key, _ in report.columns) + " |"
     yield ""
     yield "*" + "; ".join("`" + note + "`" if note.startswith("bench/") else note for note in notes) + "*"
@@ -367,6 +404,28 @@ def put_tables(check):
     return changed
 
 
+def try_all(names, tools, folder):
+    """All reports, shortened, into a folder. Those that cannot be made here are said; returns those that fail."""
+    os.makedirs(folder, exist_ok=True)
+    failed = []
+    with open(os.path.join(folder, "tables.md"), "w", encoding="utf-8") as tables:
+        for name in names:
+            begin = time.monotonic()
+            try:
+                write_csv(name, REPORTS[name].rows(tools), tools, folder)
+                REPORTS[name].draw(csv_path(name, folder), folder)
+                if REPORTS[name].columns:
+                    tables.write("\n".join([f"## {name}", *table_of(name, folder), ""]))
+                said = f"{time.monotonic() - begin:.0f} s"
+            except Missing as reason:
+                said = f"left out: {reason}"
+            except (SystemExit, Exception) as reason:  # whatever it is, the others are tried
+                failed.append(name)
+                said = f"FAILED: {type(reason).__name__}: {reason}"
+            print(f"{name}: {said}", flush=True)
+    return failed
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(REPORTS))
@@ -374,17 +433,29 @@ def main():
     parser.add_argument("--repeats", type=int, default=3, help="of each timed run (default 3)")
     parser.add_argument("--tables", action="store_true", help="write the tables of the CSV files that there are")
     parser.add_argument("--check", action="store_true", help="exit status 1 if a table is not that of its CSV file")
+    parser.add_argument("--quick", action="store_true", help="shortened runs, by default of all reports")
+    parser.add_argument("--out", metavar="DIR", help="of --quick: where to (default quick_results in the build folder)")
     args = parser.parse_args()
     wrong = [name for name in args.names if name not in REPORTS]
     if wrong:
         parser.error(f"no report '{wrong[0]}'; there are {', '.join(REPORTS)}")
-    if not args.names and not args.tables and not args.check:
+    if args.out and not args.quick:
+        parser.error("--out: goes with --quick")
+    if not args.names and not args.tables and not args.check and not args.quick:
         parser.error("which reports? " + ", ".join(REPORTS))
-    tools = Tools(args.build, args.repeats)
+    tools = Tools(args.build, args.repeats, args.quick)
+    if args.quick:
+        folder = args.out or os.path.join(args.build, "quick_results")
+        failed = try_all(args.names or REPORTS, tools, folder)
+        print(f"tables: {os.path.join(folder, 'tables.md')}")
+        sys.exit(f"failed: {', '.join(failed)}" if failed else 0)
     for name in args.names:
         print(name, flush=True)
-        write_csv(name, REPORTS[name].rows(tools), tools)
-        REPORTS[name].draw(csv_path(name))
+        try:
+            write_csv(name, REPORTS[name].rows(tools), tools)
+        except Missing as reason:
+            sys.exit(f"{name}: {reason}")
+        REPORTS[name].draw(csv_path(name), DOCS)
     changed = put_tables(args.check)
     if args.check and os.path.exists(tools.subadmm):
         changed += [name for name in sorted(SAME_EVERYWHERE) if is_outdated(name, tools)]
