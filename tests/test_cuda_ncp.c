@@ -1,5 +1,6 @@
 /* The dense contact solve on the device: islands of worlds with joints are solved to rounding there, without
  * iterations, and as the host solves them. */
+#include "contradictions.h"
 #include "cuda_worlds.h"
 #include "fewer.h"
 #include "grip_worlds.h"
@@ -130,6 +131,32 @@ static void go_to_device(sadmm_world *world, sadmm_precision precision) { use_de
 START_TEST(strong_jaws_stop_at_what_they_grip) { stop_strong_jaws((sadmm_precision)_i, go_to_device); }
 END_TEST
 
+/* As on the host: the island of what contradicts itself is not solved, and one whose joints say the same is. */
+START_TEST(contradictions_are_counted)
+{
+    for (int kind = 0; kind < 2 * CONTRADICTIONS; ++kind) {
+        const bool consistent = kind >= CONTRADICTIONS;
+        for (int points = 0; points <= 64; points += 64) {
+            sadmm_world_def def = sadmm_world_def_default();
+            def.backend = SADMM_BACKEND_CPU, def.precision = (sadmm_precision)_i;
+            def.settings.threads = 1;
+            def.settings.ncp_points = points;
+            sadmm_world *world = contradict(&def, (enum contradiction)(kind % CONTRADICTIONS), consistent);
+            use_device(world, _i, 0);
+            step_world(world, 1); /* the first may be the host's */
+            for (int step = 1; step < 4; ++step) {
+                step_world(world, 1);
+                const sadmm_step_report report = world_report(world);
+                ck_assert_msg(world->resident.loaded && report.unsolved == !consistent &&
+                                  report.converged == consistent,
+                              "%d, ncp_points %d, step %d: %d unsolved", kind, points, step, (int)report.unsolved);
+            }
+            sadmm_world_destroy(world);
+        }
+    }
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("cuda_ncp");
@@ -137,5 +164,6 @@ int main(void)
     ADD_CASE(suite, islands_are_solved_as_by_the_host, 0, CASES * tested_precisions());
     ADD_CASE(suite, what_drives_ask_for_is_done_as_by_the_host, 0, tested_precisions());
     ADD_CASE(suite, strong_jaws_stop_at_what_they_grip, 0, tested_precisions());
+    ADD_CASE(suite, contradictions_are_counted, 0, tested_precisions());
     return run_cuda_suite(suite);
 }

@@ -1,4 +1,5 @@
 /* Default settings: steps are solved to the tolerance, small islands to rounding, and the report says what is not. */
+#include "contradictions.h"
 #include "grip_worlds.h"
 
 static const double g = 9.81;
@@ -164,6 +165,58 @@ END_TEST
 
 /* ---- what cannot be met ---- */
 
+/* Joints that contradict each other are met as well as they can be, and the step says by how much they are not, however
+ * it was solved: no less than the certificate's natural map, which is that of the last sub-step. What is asked for in
+ * vain is 1e-4 m/s or rad/s, or 1e-4 m by at least a tenth of which a step of 5 ms is to close: far more than the
+ * tolerance. The pendulum beside it is solved. Rounding: in single precision of speeds of 1 m/s. */
+START_TEST(contradictions_are_an_error)
+{
+    static const struct {
+        int ncp_points, substeps;
+    } by[] = {{64, 1}, {0, 1}, {64, 3}, {0, 3}};
+    for (size_t k = 0; k < sizeof by / sizeof *by; ++k)
+        for (int kind = 0; kind < CONTRADICTIONS; ++kind) {
+            sadmm_world_def def = sadmm_world_def_default();
+            def.backend = SADMM_BACKEND_CPU, def.precision = (sadmm_precision)_i;
+            def.settings.threads = 1, def.settings.certify = true;
+            def.settings.ncp_points = by[k].ncp_points, def.settings.substeps = by[k].substeps;
+            sadmm_world *world = contradict(&def, (enum contradiction)kind, false);
+            for (int step = 0; step < 20; ++step) {
+                step_world(world, 1);
+                const sadmm_step_report report = world_report(world);
+                ck_assert_msg(report.certificate.ncp_max > 2e-5 &&
+                                  report.error >= report.certificate.ncp_max - 2e-6 &&
+                                  report.error_kind != SADMM_STEP_ERROR_NONE && report.unsolved == 1 &&
+                                  !report.converged,
+                              "contradiction %d, ncp_points %d, %d sub-steps, step %d: natural map %g, error %g (%d), "
+                              "%d unsolved",
+                              kind, by[k].ncp_points, by[k].substeps, step, report.certificate.ncp_max, report.error,
+                              (int)report.error_kind, (int)report.unsolved);
+            }
+            sadmm_world_destroy(world);
+        }
+}
+END_TEST
+
+/* Nor do joints that say the same count as ones that contradict each other. */
+START_TEST(redundant_joints_are_no_error)
+{
+    for (int kind = 0; kind < CONTRADICTIONS; ++kind) {
+        sadmm_world_def def = sadmm_world_def_default();
+        def.backend = SADMM_BACKEND_CPU, def.precision = (sadmm_precision)_i;
+        def.settings.threads = 1;
+        sadmm_world *world = contradict(&def, (enum contradiction)kind, true);
+        for (int step = 0; step < 20; ++step) {
+            step_world(world, 1);
+            const sadmm_step_report report = world_report(world);
+            ck_assert_msg(report.error <= 1e-6 && report.unsolved == 0, "%d, step %d: %g m/s, %d unsolved", kind, step,
+                          report.error, (int)report.unsolved);
+        }
+        sadmm_world_destroy(world);
+    }
+}
+END_TEST
+
 /* A ball of 1 kg in a slot of two walls that is 2 mm too narrow: no velocity meets both contacts. However long it was
  * there, with a wall gone it leaves no faster than errors are corrected. */
 START_TEST(a_ball_in_a_slot_leaves_slowly)
@@ -215,6 +268,8 @@ int main(void)
     tcase_add_test(cases, stacks_are_solved_and_rest);
     tcase_add_loop_test(cases, what_is_not_solved_is_reported, SADMM_F32, SADMM_F64 + 1);
     tcase_add_test(cases, open_joints_are_an_error);
+    tcase_add_loop_test(cases, contradictions_are_an_error, SADMM_F32, SADMM_F64 + 1);
+    tcase_add_loop_test(cases, redundant_joints_are_no_error, SADMM_F32, SADMM_F64 + 1);
     tcase_add_loop_test(cases, a_ball_in_a_slot_leaves_slowly, SADMM_F32, SADMM_F64 + 1);
     suite_add_tcase(suite, cases);
     return run_suite(suite);

@@ -157,7 +157,7 @@ typedef struct sadmm_residual {
 /* What the error of a step is: a velocity, m/s (or rad/s). */
 typedef enum sadmm_step_error {
     SADMM_STEP_ERROR_NONE = 0,
-    SADMM_STEP_ERROR_LAW,      /* contacts, limits, drives miss their laws: the natural map */
+    SADMM_STEP_ERROR_LAW,      /* contacts, joints, limits, drives miss their laws: the natural map */
     SADMM_STEP_ERROR_MOMENTUM, /* bodies do not move as forces and impulses have it: A^-1 (A v - b - J^T lambda) */
     SADMM_STEP_ERROR_LIMITER,  /* ... and the energy limiter has slowed islands down (limited) */
     SADMM_STEP_ERROR_JOINTS,   /* joints are open by more than correction_speed closes in a step: what is beyond it */

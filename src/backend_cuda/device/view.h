@@ -375,6 +375,7 @@ struct ncp_view {
     int32_t *solved;                    /* bodies: at labels of islands */
     int32_t *count, *islands;           /* labels of those that are to be solved */
     int32_t *unsolved;                  /* not 0: some island is left to the iterations */
+    int32_t *missed;                    /* how many others have contacts that give by more than the tolerance */
     double *impulse;                    /* points x 3: of solved islands; their velocities and multipliers are in
                                            joint_view */
     char *memory;                       /* of blocks, */

@@ -346,7 +346,7 @@ static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cu
     double iterations = spared ? 0 : constrained ? args.count : 1;
     if (args.checks > 0) {
         const struct cuda_stop stop = *v.islands.stop;
-        const int32_t unmet = spared ? 0 : stop.unmet[args.checks % CHECKS_KEPT];
+        const int32_t unmet = spared ? *v.ncp.missed : stop.unmet[args.checks % CHECKS_KEPT];
         totals.unmet = unmet > totals.unmet ? unmet : totals.unmet;
         totals.met += unmet == 0;
         totals.most_iterations += spared ? 0 : stop.last;

@@ -126,6 +126,7 @@ struct ncp_island {
     /* of contacts x 3: impulses along their frames */
     double *impulse, *kept; /* kept: with multipliers of rows, a solution that is held against another one */
     double budget; /* multiplications of a thread that are left */
+    bool missed;   /* its contacts give, by more than the tolerance */
     /* the dense problem */
     int32_t laws, numbers, stride; /* stride: of G's rows; odd, as M's: columns are read without conflicts */
     ncp_law *law;

@@ -18,7 +18,7 @@ struct ncp_arrays {
     struct cuda_ncp_node *nodes;
     int32_t *joints, *part_of;
     size_t given;
-    int32_t *number, *solved, *islands, *count, *unsolved; /* the last two side by side */
+    int32_t *number, *solved, *islands, *count, *unsolved, *missed; /* the last three side by side */
     size_t bytes;
 };
 
@@ -36,7 +36,8 @@ static struct ncp_arrays arrays_at(char *at, const struct cuda_step *s)
     a.islands = a.solved + n;
     a.count = a.islands + n;
     a.unsolved = a.count + 1;
-    a.bytes = (size_t)((char *)(a.unsolved + 1) - at);
+    a.missed = a.unsolved + 1;
+    a.bytes = (size_t)((char *)(a.missed + 1) - at);
     return a;
 }
 
@@ -203,6 +204,7 @@ void CUDA(view_ncp)(struct sadmm_context *c)
     v->islands = a.islands;
     v->count = a.count;
     v->unsolved = a.unsolved;
+    v->missed = a.missed;
     v->impulse = buffer<double>(c, BUFFER_NCP_IMPULSE);
     v->memory = buffer<char>(c, BUFFER_NCP_MEMORY);
     v->bytes = c->step->ncp_bytes;

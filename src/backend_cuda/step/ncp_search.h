@@ -282,6 +282,7 @@ static __device__ __noinline__ bool search_all(const cuda_view &v, ncp_island *s
 {
     double energy, expected, given;
     const double left = search(v, s, memory, false, shared);
+    s->missed = false;
     find_energies(v, *s, &energy, &expected);
     const bool wild = !(energy <= NCP_MOST_ENERGY * expected),
                solved = is_enough(v, *s, left) || (!wild && is_solution(v, *s, left, shared));
@@ -290,7 +291,10 @@ static __device__ __noinline__ bool search_all(const cuda_view &v, ncp_island *s
     forget(s);
     const bool gives = is_enough(v, *s, search(v, s, memory, true, shared));
     find_energies(v, *s, &given, &expected);
-    if (gives && !(solved && given > energy / 2)) return true;
+    if (gives && !(solved && given > energy / 2)) {
+        s->missed = !(map_of_all(*s, 0, shared) <= v.model.settings->tolerance);
+        return true;
+    }
     if (solved) take_kept(v, *s);
     return solved;
 }

@@ -104,7 +104,8 @@ static __global__ void __launch_bounds__(BLOCK, EACH)
         if (threadIdx.x > 0) continue;
         v.ncp.solved[s.label] = solved;
         if (!solved) *v.ncp.unsolved = 1;
-        if (solved && args.checks > 0 && v.islands.info[s.label].stopped == 0) /* a check has counted it */
+        if (solved && s.missed) atomicAdd(v.ncp.missed, 1);
+        if (solved && !s.missed && args.checks > 0 && v.islands.info[s.label].stopped == 0) /* a check has counted it */
             atomicAdd(&v.islands.stop->unmet[args.checks % CHECKS_KEPT], -1);
     }
 }
@@ -221,7 +222,7 @@ sadmm_status CUDA(launch_ncp)(struct sadmm_context *c, bool after, struct sadmm_
     struct cuda_partition blocks = {};
     const bool large = has_large_ncp_blocks(c);
     if (!after) {
-        CUDA_CALL(c, cudaMemsetAsync(c->view.ncp.count, 0, 2 * sizeof(int32_t), c->stream), "cudaMemsetAsync(islands)");
+        CUDA_CALL(c, cudaMemsetAsync(c->view.ncp.count, 0, 3 * sizeof(int32_t), c->stream), "cudaMemsetAsync(islands)");
         TRY(CUDA(launch)(c, begin_kernel, "islands to be solved", blocks_for(c->view.model.bodies), &args, error));
     }
     args.count = after;

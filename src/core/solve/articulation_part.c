@@ -271,9 +271,8 @@ static void drop_residuals(const struct articulation_view *v)
 }
 
 /* Iterative refinement: each solve takes away nearly all of what the regularisation has left, but where light bodies
- * between heavy ones pass on a load. Where it does not, they are inconsistent. Have rows stayed in their states?
- */
-static bool refine(const struct articulation_part *part)
+ * between heavy ones pass on a load. Where it does not, they are inconsistent. Have rows stayed in their states? */
+static bool refine(struct articulation_part *part)
 {
     const struct articulation_view *v = &part->view;
     double residual = largest_residual(v), last = HUGE_VAL;
@@ -283,11 +282,14 @@ static bool refine(const struct articulation_part *part)
         solve_rows(v, true);
         residual = largest_residual(v);
     }
-    if (articulation_is_inconsistent(residual, last)) drop_residuals(v);
+    const bool drops = articulation_is_inconsistent(residual, last);
+    if (drops) drop_residuals(v);
+    if (drops) part->missed = HUGE_VAL;
+    else if (part->missed < HUGE_VAL) part->missed = residual;
     return !change_rows(v);
 }
 
-static bool solve_sparse(const struct articulation_part *part, const uint8_t *earlier, bool exact)
+static bool solve_sparse(struct articulation_part *part, const uint8_t *earlier, bool exact)
 {
     const struct articulation_view *v = &part->view;
     bool solved = false;
@@ -384,7 +386,10 @@ static bool solve_tree(struct articulation_part *part)
             last = residual;
             residual = by->solve(&part->tree, v, true);
         }
-        if (last == HUGE_VAL || !change_tree_rows(part, false)) return is_finite(v);
+        if (last == HUGE_VAL || !change_tree_rows(part, false)) {
+            part->missed = residual;
+            return is_finite(v);
+        }
         last = HUGE_VAL;
     }
     return false;
@@ -392,12 +397,22 @@ static bool solve_tree(struct articulation_part *part)
 
 bool sadmm_articulation_part_solve(struct articulation_part *part, const uint8_t *earlier, bool exact)
 {
-    if (!part->by_tree) return solve_sparse(part, earlier, exact);
-    begin_tree_rows(part, earlier);
-    return solve_tree(part);
+    bool solved;
+    part->missed = 0;
+    if (part->by_tree) {
+        begin_tree_rows(part, earlier);
+        solved = solve_tree(part);
+    } else solved = solve_sparse(part, earlier, exact);
+    if (!solved || part->gives) part->missed = HUGE_VAL;
+    return solved;
 }
 
-bool sadmm_articulation_part_solve_on(struct articulation_part *part) { return solve_tree(part); }
+bool sadmm_articulation_part_solve_on(struct articulation_part *part)
+{
+    const bool solved = solve_tree(part);
+    if (!solved) part->missed = HUGE_VAL;
+    return solved;
+}
 
 void sadmm_articulation_part_store(const struct articulation_view *v, const struct sadmm_system *system,
                                    const struct sadmm_row_constraint *slots)

@@ -27,6 +27,8 @@ struct articulation_part {
     bool renewed;            /* it is, but for inertias what the last call has loaded */
     bool gives;              /* rows with bounds do, by a share of their response, while it is loaded; */
     bool gave;               /* ... did in the last solve */
+    double missed;           /* m/s, rad/s: what the last exact solve has left of its rows' laws. HUGE_VAL: not known,
+                                laws were changed so that they can be met, or rows are not solved */
     bool touched;            /* by a contact; */
     int32_t points;          /* by so many points */
     bool for_ncp;            /* its contacts are left to the dense contact solve: no C */
@@ -84,8 +86,8 @@ void sadmm_articulation_part_solve_rows(struct articulation_part *part, bool aga
 void sadmm_articulation_part_put_contacts(const struct articulation_part *part, const double *loads);
 
 /* All of it but loading. earlier: states of a solve of this step, NULL: none. exact: hard rows are refined to rounding,
- * not only where their regularisation leaves much. Is it solved? Rows may still change their states, or numbers are not
- * finite. */
+ * not only where their regularisation leaves much, and `missed` is found. Is it solved? Rows may still change their
+ * states, or numbers are not finite. */
 bool sadmm_articulation_part_solve(struct articulation_part *part, const uint8_t *earlier, bool exact);
 
 /* The same by its tree, with all rows where the last solve of what is loaded has left them, but for other impulses of

@@ -70,7 +70,7 @@ bool sadmm_ncp_has(const struct sadmm_ncp *ncp, int32_t label, const struct sadm
 sadmm_status sadmm_ncp_solve_again(struct sadmm_ncp *ncp, const struct sadmm_ncp_input *input, int32_t *solved,
                                    bool *moved, struct sadmm_error *error);
 
-/* What the last call has left of an island's error, m/s; -1: it has not looked at it. */
+/* What the last call has left of an island's error, joints that contradict each other included, m/s; -1: not known. */
 double sadmm_ncp_error(const struct sadmm_ncp *ncp, int32_t label);
 
 #ifdef __cplusplus

@@ -67,6 +67,7 @@ struct island {
     struct ncp_dense dense;
     double *best_lambda, *best_velocity; /* contacts x 3; bodies x 6 */
     double best, best_hard;              /* natural map, m/s, of what is solved; of contacts that do not give */
+    double best_missed;                  /* what its parts have missed then (articulation_part.h) */
     bool gives;
     bool again;                          /* after the iterations */
     bool fresh;                          /* all are parts, solved by their trees for the impulses that there are */
@@ -107,6 +108,8 @@ bool sadmm_ncp_is_solved(const struct sadmm_ncp *d, int32_t body_a, int32_t body
  * which are given A^-1 b; whether every other one may be solved, too, with no more contacts without joints than one
  * island may have, else those come later: iterations would not be spared. */
 void sadmm_ncp_choose_islands(struct sadmm_ncp *d, const struct sadmm_ncp_input *input);
+/* An island's error, and what a part of it has missed. */
+void sadmm_ncp_add_missed(double *error, double missed);
 /* Islands without joints, when there are iterations. */
 void sadmm_ncp_leave_to_iterations(struct sadmm_ncp *d, const struct sadmm_system *system);
 /* After them: those that miss the tolerance. */

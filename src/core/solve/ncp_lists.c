@@ -1,4 +1,5 @@
 /* The islands of the dense contact solve, and what is kept of them through the iterations. */
+#include <math.h>
 #include <string.h>
 
 #include "core/base/memory.h"
@@ -109,6 +110,12 @@ bool sadmm_ncp_make_lists(struct sadmm_ncp *d, const struct sadmm_ncp_input *inp
     return make_room(d, input->articulations, system, input->settings);
 }
 
+void sadmm_ncp_add_missed(double *error, double missed)
+{
+    if (*error < 0) return;
+    *error = !(missed < HUGE_VAL) ? -1 : missed > *error ? missed : *error;
+}
+
 static void find_solved_without_contacts(struct sadmm_ncp *d, const struct sadmm_ncp_input *input)
 {
     const struct sadmm_articulations *articulations = input->articulations;
@@ -122,7 +129,8 @@ static void find_solved_without_contacts(struct sadmm_ncp *d, const struct sadmm
         if (d->points[label] > 0 || (d->kind[label] & ISLAND_LEFT)) continue;
         if (!(d->kind[label] & ISLAND_SOLVED)) d->error[label] = 0;
         d->kind[label] |= ISLAND_SOLVED;
-        if (articulations->part[i] >= 0 && articulations->parts[articulations->part[i]].gave) d->error[label] = -1;
+        if (articulations->part[i] >= 0)
+            sadmm_ncp_add_missed(&d->error[label], articulations->parts[articulations->part[i]].missed);
         if (articulations->part[i] >= 0 || d->kind[label] & ISLAND_ARTICULATED) continue;
         double A[36], b[6];
         sadmm_system_body(system, input->settings, i, A, b);

@@ -288,12 +288,21 @@ static double map_of(struct island *s)
     return map;
 }
 
+/* The most that its parts have missed in their last solves. */
+static double missed_by_parts(const struct island *s)
+{
+    double most = 0;
+    for (int32_t k = 0; k < s->parts; ++k) most = fmax(most, part_of(s, k)->missed);
+    return most;
+}
+
 static void keep_best(struct island *s)
 {
     const double map = map_of(s);
     if (!(map < s->best)) return;
     s->best = map;
     s->best_hard = ncp_natural_map(&s->dense);
+    s->best_missed = missed_by_parts(s);
     memcpy(s->best_lambda, s->dense.lambda, 3 * (size_t)s->contacts * sizeof *s->best_lambda);
     s->current = true;
 }
@@ -555,13 +564,20 @@ static bool has_too_much_energy(const struct island *s)
     return energy > free && sqrt(energy) > sqrt(free) + sqrt(MOST_ENERGY * (correcting + asked_energy2(s)));
 }
 
+/* Rows that contradict each other are no reason to go on: they are met as well as they can be. */
+static void put_error(const struct island *s, int32_t label, double map, double missed)
+{
+    s->d->error[label] = map;
+    sadmm_ncp_add_missed(&s->d->error[label], missed);
+}
+
 /* The island's state is the best that was found. solved: no iteration can do better. */
 static bool take(struct island *s, int32_t label, bool solved)
 {
     store_best(s);
     if (solved) s->d->kind[label] |= ISLAND_SOLVED;
     if (s->again && !(s->d->kind[label] & ISLAND_ARTICULATED)) s->moved = true;
-    s->d->error[label] = s->best_hard;
+    put_error(s, label, s->best_hard, s->best_missed);
     return true;
 }
 
@@ -620,7 +636,7 @@ static bool solve_island(struct island *s, int32_t label)
     sadmm_ncp_number_nodes(s);
     find_contact_velocities(s);
     const double before = fmax(ncp_natural_map(&s->dense), momentum_residual(s));
-    d->error[label] = before;
+    put_error(s, label, before, missed_by_parts(s));
     if (is_enough(s, before)) {
         d->kind[label] |= ISLAND_SOLVED;
         return false;
@@ -633,10 +649,10 @@ static bool solve_island(struct island *s, int32_t label)
     begin_search(s, d->states);
     search(s, G, d->states, d->states + rows, rows);
     const bool wild = s->best < before && has_too_much_energy(s),
-               solved = is_enough(s, s->best) || (!wild && is_solution(s, before));
-    if (solved || (!wild && is_nearer(s, before, size_before))) take(s, label, solved);
+               solved = is_enough(s, s->best) || (!wild && is_solution(s, before)),
+               taken = (solved || (!wild && is_nearer(s, before, size_before))) && take(s, label, solved);
     if (solved && !wild) return true;
-    const double nearest = d->error[label], energy = solved ? best_energy2(s) : HUGE_VAL;
+    const double nearest = taken ? s->best_hard : before, energy = solved ? best_energy2(s) : HUGE_VAL;
     begin_giving(s, d->states, rows);
     search(s, G, d->states, d->states + rows, rows);
     const double missed = s->best_hard / s->settings->correction_speed;
