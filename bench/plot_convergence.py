@@ -56,7 +56,7 @@ def draw(plt, curves, path, x_label, y_label, columns=5, shares=False):
         print(f"not drawn: {path}: nothing measured")
         return
     rows = -(-len(curves) // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(3.2 * columns, 2.5 * rows), squeeze=False)
+    figure, axes = plt.subplots(rows, columns, figsize=(3.2 * columns + 2 * shares, 2.5 * rows), squeeze=False)
     all_series = sorted({series for lines in curves.values() for _, series in lines})
     methods = list(dict.fromkeys(method for lines in curves.values() for method, _ in lines))
     for axis, (name, lines) in zip(axes.flat, curves.items()):
@@ -88,8 +88,11 @@ def draw(plt, curves, path, x_label, y_label, columns=5, shares=False):
         visible = [axis for axis in axes[:, column] if axis.get_visible()]
         if visible:
             visible[-1].set_xlabel(x_label, fontsize="small")
-    axes[0, 0].legend(fontsize="x-small")
-    figure.tight_layout()
+    if shares:  # too many for a panel
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="center right")
+    else:
+        axes[0, 0].legend(fontsize="x-small")
+    figure.tight_layout(rect=(0, 0, 0.83, 1) if shares else None)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
