@@ -157,6 +157,37 @@ START_TEST(contradictions_are_counted)
 }
 END_TEST
 
+/* Impulses grow by a thousand times in an impact, and what regularises them was chosen by those before. */
+START_TEST(what_comes_down_hard_is_solved)
+{
+    sadmm_world_def def = sadmm_world_def_default();
+    def.backend = SADMM_BACKEND_CPU, def.precision = (sadmm_precision)_i;
+    def.settings.threads = 1, def.settings.certify = true;
+    sadmm_world *world = create_world(&def);
+    add_floor(world, 0.5);
+    const sadmm_body_id boxes[2] = {add_box(world, 0, 0, 0.1, 0.1, 1, 0.5), add_box(world, 0.3, 0, 0.1, 0.1, 1, 0.5)};
+    const double place[3] = {0.15, 0, 0.1}, upright[4] = {1, 0, 0, 0};
+    sadmm_joint_def joint = sadmm_joint_def_default();
+    joint.kind = SADMM_JOINT_SPHERICAL, joint.body_a = boxes[0], joint.body_b = boxes[1];
+    MUST(world, sadmm_world_place_joint(world, &joint, place, upright));
+    MUST(world, sadmm_world_add_joint(world, &joint, NULL));
+    use_device(world, _i, 0);
+    step_world(world, 10);
+    for (int k = 0; k < 2; ++k) {
+        sadmm_body_state state = body_state(world, boxes[k]);
+        state.linear_velocity[2] -= 60;
+        MUST(world, sadmm_world_set_body_state(world, boxes[k], &state));
+    }
+    step_world(world, 1);
+    const sadmm_step_report report = world_report(world);
+    /* the certificate reads the device's impulses and velocities: those of f32 are rounded */
+    ck_assert_msg(world->resident.loaded && report.iterations == 0 && report.unsolved == 0 &&
+                      report.certificate.ncp_max < (_i == SADMM_F32 ? 60 * 1e-5 : 1e-9),
+                  "natural map %g, %d iterations", report.certificate.ncp_max, report.iterations);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("cuda_ncp");
@@ -165,5 +196,6 @@ int main(void)
     ADD_CASE(suite, what_drives_ask_for_is_done_as_by_the_host, 0, tested_precisions());
     ADD_CASE(suite, strong_jaws_stop_at_what_they_grip, 0, tested_precisions());
     ADD_CASE(suite, contradictions_are_counted, 0, tested_precisions());
+    ADD_CASE(suite, what_comes_down_hard_is_solved, 0, tested_precisions());
     return run_cuda_suite(suite);
 }

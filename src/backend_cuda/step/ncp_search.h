@@ -7,11 +7,10 @@
 #include "ncp_response.h"
 
 /* As in core/solve/ncp_solve.c: contacts that cannot be met give by this share of their response; a solution of so many
- * times the energy that is expected is held against that of contacts that give; how many times the momentum at hand
- * impulses may be; the regularisation of contacts, m/s, of the one with the largest load. */
+ * times the energy that is expected is held against that of contacts that give; the regularisation of contacts, m/s, of
+ * the one with the largest load. */
 #define NCP_GIVES 1e-2
 #define NCP_MOST_ENERGY 10
-#define NCP_MOST_LOAD 10
 #define NCP_REGULARISATION 3e-12
 
 /* How often rows that are not met without one get a number, in one solve. */
@@ -160,12 +159,12 @@ static __device__ __noinline__ double map_of_all(const ncp_island &s, double sha
 static __device__ __noinline__ double search(const cuda_view &v, ncp_island *s, const ncp_memory &memory, bool gives,
                                              ncp_shared *shared)
 {
-    const double share = gives ? NCP_GIVES : regularisation_of(*s, shared);
-    double map = INFINITY;
+    double map = INFINITY, share = NCP_GIVES;
     solve_trees(v, *s);
 #pragma unroll 1
     for (int round = 0; round < NCP_ROUNDS; ++round) {
         const bool more = number_rows(s, shared);
+        if (!gives) share = round > 0 ? fmin(share, regularisation_of(*s, shared)) : regularisation_of(*s, shared);
         map = map_of_all(*s, gives ? share : 0, shared);
         if (!(map > NCP_ENOUGH / 10) || s->numbers > NCP_NUMBERS || (round > 0 && !more && !(map > NCP_ENOUGH)))
             return map;
@@ -254,39 +253,16 @@ static __device__ __noinline__ bool is_enough(const cuda_view &v, const ncp_isla
     return map <= NCP_DRIVE_ROUNDING * most;
 }
 
-/* Does it meet the tolerance, if not what rounding leaves, by impulses that are not much larger than the momentum they
- * change? As in core/solve/ncp_solve.c. */
-static __device__ __noinline__ bool is_solution(const cuda_view &v, const ncp_island &s, double map,
-                                                ncp_shared *shared)
-{
-    double own = 0, at_hand = 0;
-    if (!(map <= v.model.settings->tolerance)) return false;
-    each(s.bodies, [&](int32_t n) {
-        ncp_node *node = &s.node[n];
-        const vec3 free = v3_scale(v3_load(node->own.b), 1 / node->own.mass);
-        node->now.p[0] = node->own.mass * v3_norm(v3_sub(v3_load(node->velocity), free));
-    });
-    each(3 * s.contacts, [&](int32_t n) { own = fmax(own, fabs(s.impulse[n])); });
-    const double most = most_of(own, shared);
-    for (int32_t n = 0; n < s.bodies; ++n) at_hand += s.node[n].now.p[0];
-    for (int32_t r = 0; r < s.rows; ++r)
-        if (isfinite(s.row[r].lo) && isfinite(s.row[r].hi)) at_hand += fabs(s.row[r].lambda);
-    __syncthreads();
-    return most <= NCP_MOST_LOAD * at_hand;
-}
-
 /* Is it solved? By impulses, multipliers and velocities as they are then. A solution of much energy, as drives may ask
  * for, stays where contacts that give do not have less than half of it. */
 static __device__ __noinline__ bool search_all(const cuda_view &v, ncp_island *s, const ncp_memory &memory,
                                                ncp_shared *shared)
 {
     double energy, expected, given;
-    const double left = search(v, s, memory, false, shared);
+    const bool solved = is_enough(v, *s, search(v, s, memory, false, shared));
     s->missed = false;
     find_energies(v, *s, &energy, &expected);
-    const bool wild = !(energy <= NCP_MOST_ENERGY * expected),
-               solved = is_enough(v, *s, left) || (!wild && is_solution(v, *s, left, shared));
-    if (solved && !wild) return true;
+    if (solved && energy <= NCP_MOST_ENERGY * expected) return true;
     keep_solution(*s);
     forget(s);
     const bool gives = is_enough(v, *s, search(v, s, memory, true, shared));

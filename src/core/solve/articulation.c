@@ -260,24 +260,44 @@ static double energy2_of(const struct articulation_part *part, int32_t e, const 
     return sum;
 }
 
-/* Twice the energy that its bodies have from forces alone; what its rows ask for, if all of them followed. */
-static void find_energies(const struct solving *s, const struct articulation_part *part, double *free, double *asked)
+/* How a row responds to its multiplier, were its bodies free; as energy2_of. */
+static double response_of(const struct articulation_part *part, int32_t r)
 {
     const struct articulation_view *v = &part->view;
-    struct asked_energy whole = asked_energy_begin();
+    double sum = 0;
+    for (int side = 0; side < 2; ++side) {
+        const int32_t e = v->s.side[2 * (r / SADMM_MAX_ROWS) + side];
+        double L[36];
+        if (e < 0) continue;
+        if (part->by_tree) ldl6_factor(v->factor + 36 * (size_t)e, L);
+        sum += ldl6_inverse_product(part->by_tree ? L : v->factor + 36 * (size_t)e, v->rows[r].jacobian[side]);
+    }
+    return sum;
+}
+
+/* Twice the energy that its bodies have from forces alone. */
+static double free_energy2(const struct solving *s, const struct articulation_part *part, struct asked_energy *whole)
+{
+    const struct articulation_view *v = &part->view;
+    double sum = 0;
     for (int32_t e = 0; e < v->s.bodies; ++e) {
         double A[36], b[6];
         sadmm_system_body(s->system, s->settings, v->s.body[e], A, b);
-        asked_energy_add_body(&whole, A, s->system->rigid[v->s.body[e]].position);
+        asked_energy_add_body(whole, A, s->system->rigid[v->s.body[e]].position);
         ldl6_factor(A, A);
-        *free += ldl6_inverse_product(A, b);
+        sum += ldl6_inverse_product(A, b);
     }
-    EACH_ARTICULATION_ROW(s->slots, v, r, from) {
-        const struct articulation_row *row = &v->rows[r];
-        *asked += asked_energy_of_row(&whole, row->jacobian[0], row->jacobian[1],
-                                      row->gain > 0 ? row->bias / row->gain : 0);
-        (void)from;
-    }
+    return sum;
+}
+
+/* What its rows ask for, if all of them followed. */
+static double asked_energy2(const struct solving *s, const struct articulation_part *part,
+                            const struct asked_energy *whole)
+{
+    double sum = 0;
+    EACH_ARTICULATION_ROW(s->slots, &part->view, r, from)
+        sum += asked_energy_of_row(whole, s->system->rows, (size_t)from, response_of(part, r));
+    return sum;
 }
 
 /* As a dense contact solve's result (ncp_solve.c): rows make no more than ten times the energy that they ask for. */
@@ -286,7 +306,8 @@ static bool has_too_much_energy(const struct solving *s, const struct articulati
     static const double most = 10;
     const struct articulation_view *v = &part->view;
     const double speed = s->settings->correction_speed;
-    double energy = 0, correcting = 0, free = 0, asked = 0;
+    struct asked_energy whole = asked_energy_begin();
+    double energy = 0, correcting = 0;
     if (!s->system->rigid) return false;
     for (int32_t e = 0; e < v->s.bodies; ++e) {
         double velocity[6];
@@ -296,8 +317,8 @@ static bool has_too_much_energy(const struct solving *s, const struct articulati
         correcting += speed * speed * (part->by_tree ? A : 1 / A);
     }
     if (energy <= most * correcting) return false;
-    find_energies(s, part, &free, &asked);
-    return energy > free && sqrt(energy) > sqrt(free) + sqrt(most * (correcting + asked));
+    const double made = sqrt(energy) - sqrt(free_energy2(s, part, &whole));
+    return made > sqrt(most * correcting) && made > sqrt(most * (correcting + asked_energy2(s, part, &whole)));
 }
 
 /* Nothing meets its rows, or only what throws its bodies about: those with bounds give. Impulses are bounded then. */

@@ -6,7 +6,7 @@
  * after the last one; without joints, for which some iterations cost less, where these miss settings->tolerance:
  *
  *     G = J_c (A - rows)^-1 J_c^T, dense: the response of its contacts to each other, with rows in their present states
- *     contacts by semismooth Newton steps, where need be from an interior point (ncp_newton.h)
+ *     contacts by semismooth Newton steps, where need be from an interior point, or by proximal points (ncp_newton.h)
  *     rows again by those impulses; one that changes its state is active from then on: one more number of G
  *
  * until no row changes. Where that ends without a solution, or with one that throws bodies about, contacts give by a

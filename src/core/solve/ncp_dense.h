@@ -34,7 +34,7 @@ struct ncp_dense {
 };
 
 /* Doubles: a matrix, which both searches use, and vectors of each (ncp_newton.c, ncp_interior.c). */
-enum { NCP_NEWTON_VECTORS = 20, NCP_INTERIOR_VECTORS = 26 };
+enum { NCP_NEWTON_VECTORS = 21, NCP_INTERIOR_VECTORS = 26 };
 enum { NCP_VECTORS = NCP_NEWTON_VECTORS + NCP_INTERIOR_VECTORS };
 static inline size_t ncp_work_size(size_t size) { return size * (size + 3 + NCP_VECTORS); }
 

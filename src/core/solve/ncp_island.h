@@ -41,8 +41,8 @@ struct sadmm_ncp {
     struct ncp_contact *contacts;
     struct ncp_law *laws;
     int32_t *parts;            /* of the articulations */
-    double *numbers;           /* lambda, u, G, Newton's work; the best */
-    double *rows;              /* multipliers of the system's rows, the best */
+    double *numbers;           /* lambda, u, G, Newton's work; the best, twice */
+    double *rows;              /* multipliers of the system's rows, the best, twice */
     int32_t *first_node;       /* (parts + 1) of trees (below); the last: of bodies without joints */
     struct ncp_passed *passed; /* of each law (ncp_tree_response.c) */
     const struct ncp_passed **passed_at; /* by node: of one law */
@@ -65,10 +65,12 @@ struct island {
     int32_t bodies, contacts, parts, active;
     struct ncp_active active_row[MOST_ACTIVE];
     struct ncp_dense dense;
-    double *best_lambda, *best_velocity; /* contacts x 3; bodies x 6 */
+    double *best_lambda, *best_velocity, *best_rows;    /* contacts x 3; bodies x 6; the system's rows */
+    double *other_lambda, *other_velocity, *other_rows; /* of another search, or nothing */
     double best, best_hard;              /* natural map, m/s, of what is solved; of contacts that do not give */
     double best_missed;                  /* what its parts have missed then (articulation_part.h) */
     bool gives;
+    bool begins;                         /* states of rows are not known before their next solve */
     bool again;                          /* after the iterations */
     bool fresh;                          /* all are parts, solved by their trees for the impulses that there are */
     bool current;                        /* the best is what bodies and parts have: it is saved before that changes */

@@ -89,10 +89,10 @@ static bool make_room(struct sadmm_ncp *d, const struct sadmm_articulations *art
     return SADMM_GROW(d->bodies, 0, n) && SADMM_GROW(d->contacts, 0, points) &&
            SADMM_GROW(d->laws, 0, points + MOST_ACTIVE) &&
            SADMM_GROW(d->parts, 0, (size_t)articulations->order.parts) &&
-           SADMM_GROW(d->numbers, 0, 3 * size + size * size + ncp_work_size(size) + 6 * n) &&
+           SADMM_GROW(d->numbers, 0, 4 * size + size * size + ncp_work_size(size) + 12 * n) &&
            SADMM_GROW(d->first_node, 0, (size_t)articulations->order.parts + 1) &&
            SADMM_GROW(d->passed, 0, 2 * depth * (points + MOST_ACTIVE)) && SADMM_GROW(d->passed_at, 0, 2 * n) &&
-           SADMM_GROW(d->passed_counts, 0, size) && SADMM_GROW(d->rows, 0, system->rows->row_count) &&
+           SADMM_GROW(d->passed_counts, 0, size) && SADMM_GROW(d->rows, 0, 2 * system->rows->row_count) &&
            SADMM_GROW(d->states, 0, 2 * states + 1);
 }
 

@@ -1,11 +1,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/math/solve_rounding.h"
 #include "ncp_kernels.h"
 #include "ncp_linear.h"
 
 /* Steps from where the iterations are, which is what most problems need, and from an interior point. */
-enum { STEPS_FROM_START = 20, STEPS_FROM_INTERIOR = 200, STEPS_IN_TURN = 50 };
+enum { STEPS_FROM_START = 20, STEPS_FROM_INTERIOR = 100, STEPS_IN_TURN = 50 };
 /* What is added to the diagonal of a step's matrix, whose entries are shares of a law's own response: `share` of the
  * natural map, by the size of velocities, within bounds. It keeps impulses that do the same from running away; along
  * those a step finds rounding / `least`. In turn, since no one of them suits all: a rag doll at rest takes the first,
@@ -14,6 +15,14 @@ static const struct damping {
     double share, least, most;
 } damping[] = {{100, 1e-8, 1e-5}, {1, 1e-10, 1e-3}};
 enum { DAMPINGS = sizeof damping / sizeof *damping };
+/* Laws that give: at first by this share, by so much less each time they are met, by so much more where they are not,
+ * up to the most. With little they are near those that do not: their natural map halves each time, or nothing meets
+ * them. Steps for one share, and in all. */
+static const double GIVE_FIRST = 1e-2, GIVE_LESS = 0.1, GIVE_MORE = 3, GIVE_MOST = 10, GIVE_LITTLE = 1e-5;
+enum { STEPS_GIVING = 25, STEPS_FROM_GIVING = 400 };
+/* Impulses that run away to so many times the size of all take u with them: rounding of what they add to it and take
+ * back again. */
+static const double LOST = 1e6;
 /* m/s: nearer than this the pieces are right, and a step without damping finds, of all impulses that solve, those that
  * the matrix has: the least, by its regularisation, whatever the start. */
 static const double NEAR = 1e-10;
@@ -33,6 +42,7 @@ struct newton {
     double *step, *moved;   /* (size) of lambda; of u by the steps of numbers that their law fixes */
     double *right;          /* (count) right sides, then the steps */
     double *start_lambda, *start_u, *best_lambda, *best_u;
+    double *centre, give;   /* (size); lambda's distance to it costs so much, a share of the responses (below) */
     int32_t *number, count; /* those that are solved for */
     int32_t *pivot;
     struct piece *piece;    /* (laws) where lambda and u are */
@@ -52,13 +62,14 @@ static struct newton newton_of(struct ncp_dense *d)
     s.start_u = s.start_lambda + n;
     s.best_lambda = s.start_u + n;
     s.best_u = s.best_lambda + n;
-    s.number = (int32_t *)(s.best_u + n);
+    s.centre = s.best_u + n;
+    s.number = (int32_t *)(s.centre + n);
     s.pivot = s.number + n;
-    s.piece = (struct piece *)(s.best_u + 2 * n);
+    s.piece = (struct piece *)(s.centre + 2 * n);
     return s;
 }
 
-/* ncp_natural_map, with the pieces. */
+/* ncp_natural_map of what is solved, with the pieces. */
 static double find_pieces(struct newton *s)
 {
     const struct ncp_dense *d = s->d;
@@ -67,6 +78,8 @@ static double find_pieces(struct newton *s)
         struct piece *piece = &s->piece[i];
         double y[3];
         ncp_arrive(d, &d->law[i], y);
+        for (int32_t n = d->law[i].first, k = 0; s->give > 0 && k < d->law[i].count; ++k)
+            y[k] -= s->give * (d->lambda[n + k] - s->centre[n + k]);
         ncp_project(&d->law[i], y, piece->to, piece->D);
         const double map = ncp_law_map(d, &d->law[i], piece->to);
         if (!(map <= most)) most = map;
@@ -127,7 +140,7 @@ static void enter_law(struct newton *s, const struct ncp_law *law, const struct 
         for (int32_t h = 0; h < size; ++h) right -= piece->D[k][h] * softness * s->moved[law->first + h];
         for (int32_t other = begin; other < end; ++other) {
             const int32_t h = s->number[other] - law->first;
-            M[other] += (h == k) - piece->D[k][h];
+            M[other] += (h == k) - (1 - s->give) * piece->D[k][h];
         }
         M[at] += s->proximal;
         s->right[at] = right;
@@ -175,12 +188,71 @@ static double size_of(const struct ncp_dense *d)
     return size;
 }
 
+/* As at the start, but for no impulses. */
+static void forget(const struct newton *s)
+{
+    const struct ncp_dense *d = s->d;
+    copy(d, s->start_lambda, s->start_u, d->lambda, d->u);
+    for (int32_t n = 0; n < d->size; ++n)
+        d->u[n] -= ncp_row_product(d->G + (size_t)n * (size_t)d->size, d->lambda, (size_t)d->size);
+    memset(d->lambda, 0, (size_t)d->size * sizeof *d->lambda);
+}
+
+/* Of laws that give: are they met? From where they are, which is kept otherwise. */
+static bool meet_giving(struct newton *s, double size, int *steps)
+{
+    struct ncp_dense *d = s->d;
+    double map = HUGE_VAL;
+    copy(d, d->lambda, d->u, s->start_lambda, s->start_u);
+    memcpy(s->centre, d->lambda, (size_t)d->size * sizeof *s->centre);
+    for (int step = 0; step < STEPS_GIVING; ++step) {
+        map = find_pieces(s);
+        if (!(map > NEARLY && map < LOST * size && d->budget > 0)) break;
+        s->proximal = map > NEAR ? fmin(damping[0].most, fmax(damping[0].least, damping[0].share * map / size)) : 0;
+        ++*steps;
+        if (!make_step(s)) break;
+    }
+    if (map <= NEARLY) return true;
+    copy(d, s->start_lambda, s->start_u, d->lambda, d->u);
+    return false;
+}
+
+/* Proximal points (Rockafellar, 1976): laws give by a share of their response, from the impulses that the last such
+ * problem was solved by, and from none at first:
+ *
+ *     lambda = Pi(lambda - u/w - give (lambda - centre))
+ *
+ * One that gives much is solved by a few steps, and each leads to the next one. Where impulses come to rest, laws that
+ * do not give are met, redundant or not. Returns the best map so far. */
+static double give_less_and_less(struct newton *s, double size, double best, double enough)
+{
+    struct ncp_dense *d = s->d;
+    double least = 1, last = HUGE_VAL; /* what gave least and was met, and by how much this missed */
+    int steps = 0;
+    forget(s);
+    s->give = GIVE_FIRST;
+    while (best > enough && s->give <= GIVE_MOST && steps < STEPS_FROM_GIVING && d->budget > 0) {
+        const bool met = meet_giving(s, size, &steps);
+        const double map = met ? ncp_natural_map(d) : HUGE_VAL;
+        if (map < best) keep_best(s);
+        best = fmin(map, best);
+        if (met && s->give < least) {
+            if (s->give < GIVE_LITTLE && map > last / 2) break; /* impulses grow for good */
+            least = s->give, last = map;
+        }
+        s->give *= met ? GIVE_LESS : GIVE_MORE;
+    }
+    s->give = 0;
+    copy(d, s->best_lambda, s->best_u, d->lambda, d->u);
+    return best;
+}
+
 /* Full steps: on the way to the right pieces the map may grow. Returns the best map so far. */
 static double take_steps(struct newton *s, int steps, double size, double best, double enough)
 {
     struct ncp_dense *d = s->d;
     double map = find_pieces(s);
-    for (int step = 0; step < steps && best > enough && map < HUGE_VAL && d->budget > 0; ++step) {
+    for (int step = 0; step < steps && best > enough && map < LOST * size && d->budget > 0; ++step) {
         const struct damping *by = &damping[step / STEPS_IN_TURN % DAMPINGS];
         s->proximal = map > NEAR ? fmin(by->most, fmax(by->least, by->share * map / size)) : 0;
         if (!make_step(s)) return best;
@@ -205,6 +277,10 @@ double SADMM_KERNEL(ncp_newton)(struct ncp_dense *d, double enough)
         const double map = SADMM_KERNEL(ncp_interior)(d, enough);
         if (map < best) keep_best(&s);
         best = take_steps(&s, STEPS_FROM_INTERIOR, size, fmin(best, map), enough);
+    }
+    if (best > NCP_ENOUGH) {
+        best = give_less_and_less(&s, size, best, NEAR);
+        best = take_steps(&s, STEPS_FROM_START, size, best, enough);
     }
     copy(d, s.best_lambda, s.best_u, d->lambda, d->u);
     return best;

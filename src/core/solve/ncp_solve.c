@@ -29,9 +29,8 @@ static const double MOST_ENERGY = 10;
 /* Contacts that cannot be met miss by more than this share of the speed of corrections: what is nearer is left to the
  * iterations first. */
 static const double CANNOT = 0.1;
-/* How many times larger than those they replace impulses may be that are no solution; and than the momentum that is at
- * hand, if they meet the tolerance alone. */
-static const double MOST_GROWTH = 4, MOST_LOAD = 10;
+/* How many times larger than those they replace impulses may be that are no solution. */
+static const double MOST_GROWTH = 4;
 /* How often it goes from contacts to rows and back, in all and without coming nearer though no row changed; and passes
  * of the inner rows. */
 enum { MOST_ROUNDS = 40, MOST_IDLE = 4, MOST_PASSES = 6 };
@@ -316,8 +315,16 @@ static void save_best(struct island *s)
         memcpy(s->best_velocity + 6 * (size_t)n, s->d->bodies[n].velocity, 6 * sizeof(double));
     for (int32_t k = 0; k < s->parts; ++k) {
         const struct articulation_view *v = &part_of(s, k)->view;
-        EACH_ARTICULATION_ROW(s->slots, v, r, from) s->d->rows[from] = articulation_bounded(v, r);
+        EACH_ARTICULATION_ROW(s->slots, v, r, from) s->best_rows[from] = articulation_bounded(v, r);
     }
+}
+
+/* With another one, which is kept meanwhile. */
+static void exchange_best(struct island *s)
+{
+    double *const lambda = s->best_lambda, *const velocity = s->best_velocity, *const rows = s->best_rows;
+    s->best_lambda = s->other_lambda, s->best_velocity = s->other_velocity, s->best_rows = s->other_rows;
+    s->other_lambda = lambda, s->other_velocity = velocity, s->other_rows = rows;
 }
 
 static const double *best_velocity(const struct island *s, int32_t n)
@@ -335,6 +342,8 @@ static bool solve_inner_rows(struct island *s, uint8_t *states, uint8_t *next, s
         save_best(s);
         const bool solved = solve_for_impulses(s, next);
         if (solved) keep_best(s);
+        if (s->begins) memcpy(states, next, rows);
+        s->begins = false;
         if (memcmp(states, next, rows) != 0 && !activate(s, states, next, false, &active)) return false;
         if (!active && !solved && !activate(s, states, next, true, &active)) return false;
         if (!active) return solved;
@@ -344,19 +353,35 @@ static bool solve_inner_rows(struct island *s, uint8_t *states, uint8_t *next, s
     return false;
 }
 
-static void find_regularisation(struct island *s)
+/* For the impulses as they are. */
+static double regularisation_of(const struct island *s)
 {
     double most = 0;
     for (int32_t n = 0; n < 3 * s->contacts; ++n)
         most = fmax(most, s->d->laws[n / 3].response * fabs(s->dense.lambda[n]));
-    s->regularisation = REGULARISATION < most ? REGULARISATION / most : 0;
+    return REGULARISATION < most ? REGULARISATION / most : 0;
+}
+
+/* Impulses have grown: in an impact, by a thousand times. What the regularisation leaves of their laws has, too, and
+ * may be too much. */
+static bool is_too_regular(const struct island *s)
+{
+    return !s->gives && s->best > NCP_ENOUGH && regularisation_of(s) < s->regularisation / 2;
+}
+
+static void lower_regularisation(struct island *s, double *G)
+{
+    const double before = s->regularisation;
+    s->regularisation = regularisation_of(s);
+    for (int32_t n = 0; n < 3 * s->contacts; ++n)
+        G[(size_t)n * (size_t)s->dense.size + (size_t)n] += (s->regularisation - before) * s->d->laws[n / 3].response;
 }
 
 /* From where the iterations are, or the last step was. */
 static void begin_search(struct island *s, uint8_t *states)
 {
     take_states(s, states);
-    find_regularisation(s);
+    s->regularisation = regularisation_of(s);
 }
 
 /* Bounds of active rows are not their own. */
@@ -374,7 +399,7 @@ static void begin_giving(struct island *s, uint8_t *states, size_t rows)
     s->active = 0;
     s->dense.laws = s->contacts;
     s->dense.size = 3 * s->contacts;
-    s->gives = true;
+    s->gives = s->begins = true;
     s->current = false;
     s->regularisation = GIVES;
     s->best = HUGE_VAL;
@@ -389,11 +414,12 @@ static void search_with(struct island *s, double *G, uint8_t *states, uint8_t *n
          round < MOST_ROUNDS && idle < MOST_IDLE && s->best > AIM && s->dense.budget > 0; ++round) {
         const double last = s->best;
         if (changed) sadmm_ncp_find_responses(s, G);
+        if (is_too_regular(s)) lower_regularisation(s, G);
         changed = false;
         add_regularisation(s, 1); /* as in the matrix */
         ncp_newton(&s->dense, NEWTON_AIM);
         if (!solve_inner_rows(s, states, next, rows, &changed)) return;
-        if (!changed && s->best > last / 2) return; /* what is left is rounding */
+        if (!changed && s->best > last / 2 && !is_too_regular(s)) return; /* what is left is rounding */
         idle = !changed && s->best > 0.9 * last ? idle + 1 : 0;
     }
 }
@@ -423,7 +449,7 @@ static void store_best(const struct island *s)
     for (int32_t k = 0; k < s->parts; ++k) {
         const struct articulation_view *v = &part_of(s, k)->view;
         EACH_ARTICULATION_ROW(s->slots, v, r, from)
-            s->system->rows->lambda[from] = s->current ? articulation_bounded(v, r) : s->d->rows[from];
+            s->system->rows->lambda[from] = s->current ? articulation_bounded(v, r) : s->best_rows[from];
     }
 }
 
@@ -536,9 +562,14 @@ static double asked_energy2(const struct island *s)
         const struct articulation_view *v = &part_of(s, k)->view;
         EACH_ARTICULATION_ROW(s->slots, v, r, from)
         {
-            sum += asked_energy_of_row(&whole, rows->jacobian_a + 6 * (size_t)from, rows->jacobian_b + 6 * (size_t)from,
-                                       rows->gain[from] > 0 ? rows->bias[from] / rows->gain[from] : 0);
-            (void)r;
+            double response = 0;
+            for (int side = 0; side < 2; ++side) {
+                const int32_t entry = v->s.side[2 * (r / SADMM_MAX_ROWS) + side];
+                const double *row = (side ? rows->jacobian_b : rows->jacobian_a) + 6 * (size_t)from;
+                if (entry >= 0)
+                    response += ldl6_inverse_product(sadmm_ncp_factor(s, s->d->number[v->s.body[entry]]), row);
+            }
+            sum += asked_energy_of_row(&whole, rows, (size_t)from, response);
         }
     }
     return sum;
@@ -560,8 +591,8 @@ static bool has_too_much_energy(const struct island *s)
 {
     const double energy = best_energy2(s), correcting = correcting_energy2(s);
     if (energy <= MOST_ENERGY * correcting) return false;
-    const double free = free_energy2(s);
-    return energy > free && sqrt(energy) > sqrt(free) + sqrt(MOST_ENERGY * (correcting + asked_energy2(s)));
+    const double made = sqrt(energy) - sqrt(free_energy2(s));
+    return made > sqrt(MOST_ENERGY * correcting) && made > sqrt(MOST_ENERGY * (correcting + asked_energy2(s)));
 }
 
 /* Rows that contradict each other are no reason to go on: they are met as well as they can be. */
@@ -581,37 +612,6 @@ static bool take(struct island *s, int32_t label, bool solved)
     return true;
 }
 
-/* What changes the momentum of the island's bodies, N s: contacts and joints, of each by itself; and drives. */
-static double momentum_at_hand(const struct island *s)
-{
-    double sum = 0, free[6];
-    for (int32_t n = 0; n < s->bodies; ++n) {
-        const double *v = best_velocity(s, n);
-        ldl6_solve(sadmm_ncp_factor(s, n), s->d->bodies[n].b, free);
-        sum += mass_of(s, n) * v3_norm(v3_sub(v3_load(v), v3_load(free)));
-    }
-    for (int32_t k = 0; k < s->parts; ++k) {
-        const struct articulation_view *view = &part_of(s, k)->view;
-        EACH_ARTICULATION_ROW(s->slots, view, r, from)
-        {
-            const struct articulation_row *row = &view->rows[r];
-            (void)from;
-            if (isfinite(row->lo) && isfinite(row->hi)) sum += fabs(articulation_bounded(view, r));
-        }
-    }
-    return sum;
-}
-
-/* A solution that meets the tolerance, but leaves more than rounding does: an impact of light links, say. Impulses that
- * are much larger than the momentum they change press against each other: they are none, however near they come. */
-static bool is_solution(const struct island *s, double before)
-{
-    double most = 0;
-    if (!(s->best < before && s->best <= s->settings->tolerance)) return false;
-    for (int32_t n = 0; n < 3 * s->contacts; ++n) most = fmax(most, fabs(s->best_lambda[n]));
-    return most <= MOST_LOAD * momentum_at_hand(s);
-}
-
 static bool solve_island(struct island *s, int32_t label)
 {
     struct sadmm_ncp *d = s->d;
@@ -626,7 +626,10 @@ static bool solve_island(struct island *s, int32_t label)
     s->best_lambda = at, at += size;
     s->dense.G = G = at, at += size * size;
     s->dense.work = at, at += ncp_work_size(size);
-    s->best_velocity = at;
+    s->other_lambda = at, at += size;
+    s->best_velocity = at, at += 6 * (size_t)s->system->body_count;
+    s->other_velocity = at;
+    s->best_rows = d->rows, s->other_rows = d->rows + s->system->rows->row_count;
     s->dense.law = d->laws;
     for (int32_t i = label; i >= 0; i = d->next_body[i]) add_body(s, i);
     for (int32_t p = d->first_pair[label]; p >= 0; p = d->next_pair[p])
@@ -645,22 +648,28 @@ static bool solve_island(struct island *s, int32_t label)
     size_t rows = 0;
     for (int32_t k = 0; k < s->parts; ++k) rows += (size_t)(SADMM_MAX_ROWS * part_of(s, k)->view.s.columns);
     s->best = before;
-    s->gives = false;
+    s->gives = s->begins = false;
     begin_search(s, d->states);
     search(s, G, d->states, d->states + rows, rows);
-    const bool wild = s->best < before && has_too_much_energy(s),
-               solved = is_enough(s, s->best) || (!wild && is_solution(s, before)),
-               taken = (solved || (!wild && is_nearer(s, before, size_before))) && take(s, label, solved);
-    if (solved && !wild) return true;
-    const double nearest = taken ? s->best_hard : before, energy = solved ? best_energy2(s) : HUGE_VAL;
+    const bool solved = is_enough(s, s->best), wild = s->best < before && has_too_much_energy(s),
+               nearer = !solved && !wild && is_nearer(s, before, size_before);
+    if (solved && !wild) return take(s, label, true);
+    const double nearest = nearer ? s->best_hard : before, energy = solved ? best_energy2(s) : HUGE_VAL,
+                 first_hard = s->best_hard, first_missed = s->best_missed;
+    save_best(s);
+    exchange_best(s);
     begin_giving(s, d->states, rows);
     search(s, G, d->states, d->states + rows, rows);
-    const double missed = s->best_hard / s->settings->correction_speed;
     const bool gives = is_enough(s, s->best) &&
                        (solved     ? best_energy2(s) <= energy / 2
                         : s->again ? s->best_hard <= nearest
-                                   : missed > CANNOT);
-    return gives ? take(s, label, true) : nearest < before;
+                                   : s->best_hard > CANNOT * s->settings->correction_speed);
+    if (gives) return take(s, label, true);
+    if (!solved && !nearer) return false;
+    exchange_best(s);
+    s->current = false;
+    s->best_hard = first_hard, s->best_missed = first_missed;
+    return take(s, label, solved);
 }
 
 /* ---- all islands ------------------------------------------------------------------------------------------------- */
