@@ -525,18 +525,15 @@ static double best_energy2(const struct island *s)
     return sum;
 }
 
-static double mass_of(const struct island *s, int32_t number)
-{
-    const double *A = tree_inertia(s, number);
-    return A ? A[0] : 1 / sadmm_ncp_factor(s, number)[0];
-}
-
 /* That of all at the speed of corrections, and with nothing but forces. */
 static double correcting_energy2(const struct island *s)
 {
     const double speed = s->settings->correction_speed;
     double mass = 0;
-    for (int32_t n = 0; n < s->bodies; ++n) mass += mass_of(s, n);
+    for (int32_t n = 0; n < s->bodies; ++n) {
+        const double *A = tree_inertia(s, n);
+        mass += A ? A[0] : 1 / sadmm_ncp_factor(s, n)[0];
+    }
     return speed * speed * mass;
 }
 
