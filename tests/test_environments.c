@@ -101,8 +101,10 @@ static const struct {
               {"pile:12", 0, 80},     {"card_houses:1", 20, 20}, {"vertical_stacks:3", 5, 40},
               {"chain:6", 0, 40},     {"mixed_pile:20", 0, 60}};
 enum { SCENES = sizeof scenes / sizeof *scenes, FEW = 5 };
-static const sadmm_array outputs[] = {SADMM_ARRAY_BODY_STATE,   SADMM_ARRAY_JOINT_POSITION, SADMM_ARRAY_JOINT_SPEED,
-                                      SADMM_ARRAY_JOINT_WRENCH, SADMM_ARRAY_BODY_WRENCH,    SADMM_ARRAY_REPORT};
+static const sadmm_array outputs[] = {
+    SADMM_ARRAY_BODY_STATE,          SADMM_ARRAY_JOINT_POSITION,    SADMM_ARRAY_JOINT_SPEED,
+    SADMM_ARRAY_BODY_CONTACT_WRENCH, SADMM_ARRAY_BODY_ACCELERATION, SADMM_ARRAY_JOINT_DRIVE_FORCE,
+    SADMM_ARRAY_JOINT_WRENCH,        SADMM_ARRAY_BODY_WRENCH,       SADMM_ARRAY_REPORT};
 enum { OUTPUTS = sizeof outputs / sizeof *outputs };
 
 /* Which of the bodies are dynamic: others take no velocity. */
@@ -498,8 +500,7 @@ START_TEST(contacts_and_rays_are_an_environments_own)
         worlds[e] = alone(m.world);
         vary(m.world, SADMM_ARRAY_BODY_WRENCH, e, 0, of);
         write_array(worlds[e], SADMM_ARRAY_BODY_WRENCH, of);
-        for (int k = 0; k < 4; ++k)
-            rays[4 * e + k] = (sadmm_ray){{0.3 * k - 0.5, 0.01 * e, 3}, {0, 0, -1}, INFINITY};
+        for (int k = 0; k < 4; ++k) rays[4 * e + k] = (sadmm_ray){{0.3 * k - 0.5, 0.01 * e, 3}, {0, 0, -1}, INFINITY};
     }
     MUST_ALL(environments, sadmm_environments_record_contacts(environments, true));
     for (int step = 0; step < 40; ++step) {
@@ -538,6 +539,146 @@ START_TEST(contacts_and_rays_are_an_environments_own)
 }
 END_TEST
 
+/* Limits of each, which no other one's bounds fit, whoever was stepped before by the same worker. */
+START_TEST(limits_are_an_environments_own)
+{
+    enum { MANY = 32 };
+    struct machine m = build_machine();
+    sadmm_joint_id hinge;
+    sadmm_joint_def def;
+    MUST(m.world, sadmm_world_joint_at(m.world, 0, &hinge));
+    MUST(m.world, sadmm_world_joint_def(m.world, hinge, &def));
+    def.coordinates[5].limited = true;
+    def.coordinates[5].lower = -1, def.coordinates[5].upper = 1;
+    MUST(m.world, sadmm_world_set_joint_coordinate(m.world, hinge, 5, &def.coordinates[5]));
+    sadmm_environments *environments = replicate(m.world, MANY);
+    const size_t n = numbers_of(m.world, SADMM_ARRAY_JOINT_LOWER);
+    double *lower = array_of(environments, SADMM_ARRAY_JOINT_LOWER), *ends = calloc(MANY * n, sizeof *ends);
+    memcpy(ends, lower, MANY * n * sizeof *ends);
+    for (int e = 0; e < MANY; ++e) ends[n * (size_t)e + 5] = e % 2 ? 0.5 : -3;
+    const int32_t one = 1;
+    /* Against the template's upper ones, while nothing else is there. */
+    MUST_ALL(environments, sadmm_environments_set(environments, SADMM_ARRAY_JOINT_LOWER, NULL, 0, ends));
+    double *upper = array_of(environments, SADMM_ARRAY_JOINT_UPPER);
+    for (int e = 0; e < MANY; ++e) upper[n * (size_t)e + 5] = e % 2 ? 3 : -0.5;
+    for (int step = 0; step < 3; ++step) {
+        MUST_ALL(environments, sadmm_environments_step(environments, 1));
+        for (int e = 0; e < MANY; ++e) ck_assert_str_eq(sadmm_environments_mark(environments, e), "");
+    }
+    ends[5] = 2; /* within its own ones, and beyond those of the one before it */
+    MUST_ALL(environments, sadmm_environments_set(environments, SADMM_ARRAY_JOINT_LOWER, &one, 1, ends));
+    ends[5] = 4;
+    REFUSED(environments, "environment 1: joint_lower",
+            sadmm_environments_set(environments, SADMM_ARRAY_JOINT_LOWER, &one, 1, ends));
+    ck_assert(lower[n + 5] == 2);
+    free(ends);
+    sadmm_environments_destroy(environments);
+    sadmm_world_destroy(m.world);
+}
+END_TEST
+
+/* A worker that has made no step reads what another one has stepped; without wrenches they are 0. */
+START_TEST(any_worker_reads_any_environment)
+{
+    enum { MANY = 64 };
+    struct machine m = build_machine();
+    sadmm_settings settings = sadmm_world_settings(m.world);
+    settings.threads = 2;
+    MUST(m.world, sadmm_world_set_settings(m.world, &settings));
+    sadmm_test_force_threads(true);
+    const size_t n = numbers_of(m.world, SADMM_ARRAY_BODY_CONTACT_WRENCH);
+    double *wrench = calloc(MANY * n, sizeof *wrench), largest = 0;
+    for (int k = 0; k < 5; ++k) {
+        sadmm_environments *environments = replicate(m.world, MANY);
+        sadmm_test_force_threads(false); /* the first one alone */
+        settings.threads = 1;
+        MUST_ALL(environments, sadmm_environments_set_settings(environments, &settings));
+        MUST_ALL(environments, sadmm_environments_step(environments, 40));
+        settings.threads = 2;
+        MUST_ALL(environments, sadmm_environments_set_settings(environments, &settings));
+        sadmm_test_force_threads(true);
+        MUST_ALL(environments, sadmm_environments_get(environments, SADMM_ARRAY_BODY_CONTACT_WRENCH, NULL, 0, wrench));
+        for (size_t i = 0; i < n; ++i) largest = fmax(largest, fabs(wrench[i]));
+        for (int e = 1; e < MANY; ++e) expect_same(wrench, wrench + n * (size_t)e, n, "wrench", e, 40);
+        const double *bound = array_of(environments, SADMM_ARRAY_BODY_CONTACT_WRENCH);
+        settings.recover_wrenches = false;
+        MUST_ALL(environments, sadmm_environments_set_settings(environments, &settings));
+        MUST_ALL(environments, sadmm_environments_step(environments, 1));
+        for (size_t i = 0; i < MANY * n; ++i) ck_assert(bound[i] == 0);
+        settings.recover_wrenches = true;
+        sadmm_environments_destroy(environments);
+    }
+    ck_assert_double_gt(largest, 1);
+    sadmm_test_force_threads(false);
+    free(wrench);
+    sadmm_world_destroy(m.world);
+}
+END_TEST
+
+static void *save_of(sadmm_environments *environments, int32_t environment, size_t *size)
+{
+    MUST_ALL(environments, sadmm_environments_save(environments, environment, NULL, 0, size));
+    void *bytes = malloc(*size);
+    ck_assert_ptr_nonnull(bytes);
+    MUST_ALL(environments, sadmm_environments_save(environments, environment, bytes, *size, size));
+    return bytes;
+}
+
+/* A save says nothing of other environments, and there is one of an environment that is marked. Settings are those of
+ * all, whatever gravity the last one had. */
+START_TEST(saves_and_settings_are_of_one_and_of_all)
+{
+    struct machine m = build_machine();
+    size_t sizes[2];
+    void *bytes[2];
+    for (int k = 0; k < 2; ++k) {
+        sadmm_environments *environments = replicate(m.world, 4);
+        double *wrench = array_of(environments, SADMM_ARRAY_BODY_WRENCH),
+               *gravity = array_of(environments, SADMM_ARRAY_GRAVITY);
+        const size_t n = numbers_of(m.world, SADMM_ARRAY_BODY_WRENCH);
+        for (int e = 0; e < 3; ++e) wrench[n * (size_t)e + 6] = 3 * k + e, gravity[3 * e + 2] = -e - k;
+        MUST_ALL(environments, sadmm_environments_step(environments, 20));
+        bytes[k] = save_of(environments, 3, &sizes[k]);
+        ck_assert(sadmm_environments_settings(environments).gravity[2] == sadmm_settings_default().gravity[2]);
+        wrench[3 * n + 6] = NAN;
+        MUST_ALL(environments, sadmm_environments_step(environments, 1));
+        ck_assert_int_eq(sadmm_environments_marked(environments)[3], 1);
+        size_t size;
+        free(save_of(environments, 3, &size));
+        sadmm_environments_destroy(environments);
+    }
+    ck_assert_uint_eq(sizes[0], sizes[1]);
+    ck_assert_mem_eq(bytes[0], bytes[1], sizes[0]);
+    free(bytes[0]), free(bytes[1]);
+    sadmm_world_destroy(m.world);
+}
+END_TEST
+
+/* Moments a, b and a + b, and the least mass, are not within their ranges once they are rounded to single precision. */
+START_TEST(single_precision_takes_nothing_from_inertia)
+{
+    const sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world *world = create_world(&def);
+    sadmm_body_def body = sadmm_body_def_default();
+    sadmm_environments_array inertia;
+    body.mass = 1e-9;
+    body.inertia[0] = 0.1e-9, body.inertia[1] = 0.2e-9, body.inertia[2] = 0.1e-9 + 0.2e-9;
+    sadmm_body_id id;
+    MUST(world, sadmm_world_add_body(world, &body, &id));
+    sadmm_environments *environments = replicate(world, 3);
+    MUST_ALL(environments, sadmm_environments_bind(environments, SADMM_ARRAY_BODY_INERTIA, SADMM_F32, &inertia));
+    MUST_ALL(environments, sadmm_environments_step(environments, 2));
+    for (int e = 0; e < 3; ++e) ck_assert_str_eq(sadmm_environments_mark(environments, e), "");
+    ((float *)inertia.values)[2] *= 1.01F; /* what is wrong by more is */
+    ((float *)inertia.values)[3] *= 1.05F;
+    MUST_ALL(environments, sadmm_environments_step(environments, 1));
+    ck_assert_int_eq(sadmm_environments_marked(environments)[0], 1);
+    ck_assert_int_eq(sadmm_environments_marked(environments)[1], 0);
+    sadmm_environments_destroy(environments);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 START_TEST(what_is_refused_changes_nothing)
 {
     struct machine m = build_machine();
@@ -554,6 +695,15 @@ START_TEST(what_is_refused_changes_nothing)
     REFUSED(environments, "which[1] = 1: is there twice", sadmm_environments_reset(environments, twice, 2, NULL));
     REFUSED(environments, "which[0] = 3: must be in [0, 3)", sadmm_environments_reset(environments, far, 1, NULL));
     REFUSED(environments, "states[0] = 1: must be in [0, 1)", sadmm_environments_reset(environments, ways, 1, ways));
+    int32_t kept;
+    const size_t memory = sadmm_environments_memory(environments);
+    MUST_ALL(environments, sadmm_environments_keep(environments, 1, &kept));
+    ck_assert_uint_gt(sadmm_environments_memory(environments), memory);
+    MUST_ALL(environments, sadmm_environments_forget(environments, kept));
+    ck_assert_uint_eq(sadmm_environments_memory(environments), memory);
+    REFUSED(environments, "states[0] = 1: was forgotten", sadmm_environments_reset(environments, ways, 1, ways));
+    REFUSED(environments, "state = 1: was forgotten", sadmm_environments_forget(environments, kept));
+    REFUSED(environments, "state = 0: must be one that was kept", sadmm_environments_forget(environments, 0));
     REFUSED(environments, "count = 4: must be in [0, 3]", sadmm_environments_reset(environments, far, 4, NULL));
     REFUSED(environments, "must be one that can be set",
             sadmm_environments_set(environments, SADMM_ARRAY_JOINT_WRENCH, NULL, 0, targets));
@@ -649,6 +799,10 @@ int main(void)
     tcase_add_test(cases, what_goes_wrong_stays_alone);
     tcase_add_test(cases, single_precision_arrays_are_rounded);
     tcase_add_test(cases, contacts_and_rays_are_an_environments_own);
+    tcase_add_test(cases, limits_are_an_environments_own);
+    tcase_add_test(cases, any_worker_reads_any_environment);
+    tcase_add_test(cases, saves_and_settings_are_of_one_and_of_all);
+    tcase_add_test(cases, single_precision_takes_nothing_from_inertia);
     tcase_add_test(cases, what_is_refused_changes_nothing);
     tcase_add_test(cases, memory_may_run_out);
     suite_add_tcase(suite, cases);

@@ -206,6 +206,63 @@ START_TEST(loops_and_distances_are_refused)
 }
 END_TEST
 
+/* What is set is what the caller changes: a distance joint and one that is not enabled, whose rows are as they were
+ * read, stay as they are, though what was set before them moves their bodies. */
+START_TEST(rows_that_do_not_change_are_left_alone)
+{
+    const sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world *world = create_world(&def);
+    sadmm_body_id bodies[3];
+    static const double straight[4] = {1, 0, 0, 0}, pivot[3] = {-0.5, 0, 0};
+    for (int i = 0; i < 3; ++i) {
+        sadmm_body_def body = sadmm_body_def_default();
+        body.mass = 1;
+        body.position[0] = 0.3 * i, body.position[1] = 0.7 * i, body.position[2] = 0.1 * i * i;
+        for (int k = 0; k < 3; ++k) body.inertia[k] = 0.1;
+        MUST(world, sadmm_world_add_body(world, &body, &bodies[i]));
+    }
+    sadmm_joint_def hinge = sadmm_joint_def_default(), rod = hinge, off = hinge;
+    hinge.kind = SADMM_JOINT_REVOLUTE;
+    hinge.body_b = bodies[0];
+    MUST(world, sadmm_world_place_joint(world, &hinge, pivot, straight));
+    rod.kind = SADMM_JOINT_DISTANCE;
+    rod.body_a = bodies[0], rod.body_b = bodies[1];
+    off.kind = SADMM_JOINT_FIXED;
+    off.body_a = bodies[0], off.body_b = bodies[2];
+    off.enabled = false;
+    MUST(world, sadmm_world_add_joint(world, &hinge, NULL));
+    MUST(world, sadmm_world_add_joint(world, &rod, NULL));
+    MUST(world, sadmm_world_add_joint(world, &off, NULL));
+    double position[18], now[18];
+    sadmm_body_state before, after;
+    MUST(world, sadmm_world_body_state(world, bodies[2], &before));
+    for (int k = 0; k < 20; ++k) {
+        read(world, SADMM_ARRAY_JOINT_POSITION, 3, position);
+        position[5] += 0.37;
+        MUST(world, sadmm_world_set_array(world, SADMM_ARRAY_JOINT_POSITION, 0, 3, position));
+        read(world, SADMM_ARRAY_JOINT_POSITION, 3, now);
+        ck_assert_double_eq_tol(now[5], position[5], TOLERANCE);
+        ck_assert_double_eq_tol(now[6], 0, TOLERANCE); /* the rod has its length */
+    }
+    MUST(world, sadmm_world_body_state(world, bodies[2], &after));
+    ck_assert_mem_eq(&before, &after, sizeof before);
+    read(world, SADMM_ARRAY_JOINT_SPEED, 3, position);
+    position[5] = 1;
+    MUST(world, sadmm_world_set_array(world, SADMM_ARRAY_JOINT_SPEED, 0, 3, position));
+    read(world, SADMM_ARRAY_JOINT_SPEED, 3, now);
+    ck_assert_double_eq_tol(now[5], 1, TOLERANCE);
+    rod.kind = SADMM_JOINT_REVOLUTE; /* one that is not enabled is not set */
+    rod.enabled = false;
+    MUST(world, sadmm_world_add_joint(world, &rod, NULL));
+    read(world, SADMM_ARRAY_JOINT_POSITION, 4 - 1, position);
+    double free[6] = {0, 0, 0, 0, 0, 0.4};
+    ck_assert_int_eq(sadmm_world_set_array(world, SADMM_ARRAY_JOINT_POSITION, 3, 1, free),
+                     SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert(strstr(sadmm_world_message(world), "is not enabled") != NULL);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("joint_place");
@@ -213,6 +270,7 @@ int main(void)
     tcase_add_loop_test(cases, joints_have_what_they_are_set_to, 0, 400);
     tcase_add_loop_test(cases, speeds_stay_when_positions_are_set, 0, 200);
     tcase_add_test(cases, loops_and_distances_are_refused);
+    tcase_add_test(cases, rows_that_do_not_change_are_left_alone);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

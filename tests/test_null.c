@@ -91,6 +91,7 @@ static void on_environments(void)
     ck_assert_int_eq(sadmm_environments_reset(environments, NULL, 0, NULL), SADMM_OK); /* all */
     REFUSES("environments", sadmm_environments_keep(NULL, 0, &state));
     REFUSES("state", sadmm_environments_keep(environments, 0, NULL));
+    REFUSES("environments", sadmm_environments_forget(NULL, 1));
     REFUSES("environments", sadmm_environments_save(NULL, 0, bytes, sizeof bytes, &size));
     REFUSES("size", sadmm_environments_save(environments, 0, bytes, sizeof bytes, NULL));
     REFUSES("buffer", sadmm_environments_save(environments, 0, NULL, sizeof bytes, &size));
@@ -626,12 +627,27 @@ static const struct {
       "sadmm_mesh_left_out", "sadmm_mesh_open_edges", "sadmm_mesh_bytes", "sadmm_mesh_bounds",
       "sadmm_mesh_vertex_count", "sadmm_mesh_vertex_at", "sadmm_mesh_triangle_at", "sadmm_mesh_grid"}},
     {on_environments,
-     {"sadmm_world_replicate", "sadmm_environments_destroy", "sadmm_environments_message", "sadmm_environments_count",
-      "sadmm_environments_memory", "sadmm_environments_step", "sadmm_environments_set_settings",
-      "sadmm_environments_settings_sized", "sadmm_environments_reset", "sadmm_environments_keep",
-      "sadmm_environments_save", "sadmm_environments_rows", "sadmm_environments_get", "sadmm_environments_set",
-      "sadmm_environments_bind", "sadmm_environments_marked", "sadmm_environments_mark",
-      "sadmm_environments_record_contacts", "sadmm_environments_contacts", "sadmm_environments_cast_rays"}},
+     {"sadmm_world_replicate",
+      "sadmm_environments_destroy",
+      "sadmm_environments_message",
+      "sadmm_environments_count",
+      "sadmm_environments_memory",
+      "sadmm_environments_step",
+      "sadmm_environments_set_settings",
+      "sadmm_environments_settings_sized",
+      "sadmm_environments_reset",
+      "sadmm_environments_keep",
+      "sadmm_environments_forget",
+      "sadmm_environments_save",
+      "sadmm_environments_rows",
+      "sadmm_environments_get",
+      "sadmm_environments_set",
+      "sadmm_environments_bind",
+      "sadmm_environments_marked",
+      "sadmm_environments_mark",
+      "sadmm_environments_record_contacts",
+      "sadmm_environments_contacts",
+      "sadmm_environments_cast_rays"}},
     {on_mesh_files,
      {"sadmm_mesh_file_read", "sadmm_mesh_file_destroy", "sadmm_mesh_file_vertex_count",
       "sadmm_mesh_file_triangle_count", "sadmm_mesh_file_vertices", "sadmm_mesh_file_triangles",

@@ -32,9 +32,10 @@ typedef enum sadmm_array {
     /* A row a joint, a column a coordinate (joint.h): m or rad, m/s or rad/s, N or N m. */
     SADMM_ARRAY_JOINT_POSITION,    /* 6: sadmm_joint_state.position. Set: b and all that is joined to it move along, or,
                                       where the world holds them, a and what is joined to that; the other joints keep
-                                      their positions and speeds. Locked coordinates are not read, and become 0. Three
-                                      free rotations: at most half a turn. A joint in a loop, or one that holds a
-                                      distance, can only be set to what it has: INVALID_ARGUMENT */
+                                      their positions and speeds. Gears do not matter. Locked coordinates are not read;
+                                      those of a row that changes, or that has 0 for them, become 0. Three free
+                                      rotations: at most half a turn. A joint in a loop, one that holds a distance, and
+                                      one that is not enabled can only be set to what it has: INVALID_ARGUMENT */
     SADMM_ARRAY_JOINT_SPEED,       /* 6: sadmm_joint_state.speed. Set: likewise, velocities alone change */
     SADMM_ARRAY_JOINT_DRIVE_FORCE, /* 6: sadmm_joint_state.drive_force. Read only */
     SADMM_ARRAY_JOINT_WRENCH,      /* 6: sadmm_joint_state.wrench_b, world. Read only */
@@ -82,7 +83,7 @@ SADMM_API const char *sadmm_array_name(sadmm_array array);
 SADMM_API int32_t sadmm_array_columns(sadmm_array array);
 /* Whether the array can be set. Thread-safe. */
 SADMM_API bool sadmm_array_is_settable(sadmm_array array);
-/* Rows of an array: the number of bodies, joints or couplings; 0 for an unknown array or a NULL world. */
+/* Rows of an array: the number of bodies, shapes, joints or couplings, or 1; 0 for an unknown array or a NULL world. */
 SADMM_API int32_t sadmm_world_array_rows(const sadmm_world *world, sadmm_array array);
 
 /* Rows [first, first + count) into `values` (count x columns). Errors: INVALID_ARGUMENT (array, range; values may be

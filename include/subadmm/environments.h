@@ -38,7 +38,8 @@ SADMM_API void sadmm_environments_destroy(sadmm_environments *environments); /* 
 /* The message of the last failed call, "" when none failed or environments is NULL; valid until the next call. */
 SADMM_API const char *sadmm_environments_message(const sadmm_environments *environments);
 SADMM_API int32_t sadmm_environments_count(const sadmm_environments *environments); /* of NULL: 0 */
-/* Bytes of all that is stored an environment: states, and its share of the arrays. Of NULL: 0. */
+/* Bytes of all that is stored, over the number of environments: states, those that are kept, arrays, contacts that are
+ * recorded. Of NULL: 0. */
 SADMM_API size_t sadmm_environments_memory(const sadmm_environments *environments);
 
 /* `steps` time steps, >= 1, of settings.dt each, in every environment that is not marked. Input arrays are read once,
@@ -71,14 +72,18 @@ SADMM_API sadmm_status sadmm_environments_reset(sadmm_environments *environments
 /* Keep the state of an environment to reset to; *state: its number. Errors: INVALID_ARGUMENT (range; it is marked),
  * OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_environments_keep(sadmm_environments *environments, int32_t environment, int32_t *state);
-/* As sadmm_world_save of the environment as it is now, to restore into a world: to look at it, to query it, to know its
- * contacts. Errors: those of sadmm_world_save, INVALID_ARGUMENT (range). */
+/* Forget a state that was kept; its number is not used again. Errors: INVALID_ARGUMENT (range; 0; it was forgotten). */
+SADMM_API sadmm_status sadmm_environments_forget(sadmm_environments *environments, int32_t state);
+/* As sadmm_world_save of the environment as it is now, to restore into a world: to look at it, to query it, to go on
+ * with it. It has no contacts before its next step. Of one that is marked, inputs that are out of range are the
+ * template's. Errors: those of sadmm_world_save, INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_environments_save(sadmm_environments *environments, int32_t environment, void *buffer,
                                                size_t capacity, size_t *size);
 
 /* ---- arrays -------------------------------------------------------------------------------------------------- */
 
-/* Rows and columns of an array are those of arrays.h: sadmm_environments_rows of them, sadmm_array_columns. */
+/* Rows and columns of an array are those of arrays.h: sadmm_environments_rows of them, sadmm_array_columns. Where
+ * sadmm_world_get_array says UNAVAILABLE numbers are 0. */
 SADMM_API int32_t sadmm_environments_rows(const sadmm_environments *environments, sadmm_array array); /* NULL: 0 */
 
 /* An array is one of three kinds. State: BODY_STATE, JOINT_POSITION, JOINT_SPEED and COUPLING_TARGET, which steps
@@ -88,7 +93,7 @@ SADMM_API bool sadmm_environments_is_input(sadmm_array array);
 
 /* Rows of the environments `which`, into or from `values` (count x rows x columns). Set: an input array is one from
  * then on, as by sadmm_environments_bind. Errors: INVALID_ARGUMENT (range; set: those of sadmm_world_set_array, with
- * the environment in the message; nothing changes), UNAVAILABLE (as sadmm_world_get_array), OUT_OF_MEMORY. */
+ * the environment in the message; nothing changes), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_environments_get(sadmm_environments *environments, sadmm_array array, const int32_t *which,
                                               int32_t count, double *values);
 SADMM_API sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_array array, const int32_t *which,
@@ -104,8 +109,7 @@ typedef struct sadmm_environments_array {
 /* *out stays valid until the environments are destroyed, at the same place. Output and state: the numbers after each
  * call that steps, resets or sets; do not write to it. Input: write to it between calls; environments have it from the
  * next step on. It begins with what they have now. An input array has one precision, that of the first call. Errors:
- * INVALID_ARGUMENT (array, precision; an input array that has the other precision), UNAVAILABLE (as
- * sadmm_world_get_array), OUT_OF_MEMORY. */
+ * INVALID_ARGUMENT (array, precision; an input array that has the other precision), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_array array,
                                                sadmm_precision precision, sadmm_environments_array *out);
 
@@ -114,7 +118,7 @@ SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments,
 /* From now on keep the contacts of the last step of each sadmm_environments_step, or (false) no more. */
 SADMM_API sadmm_status sadmm_environments_record_contacts(sadmm_environments *environments, bool record);
 /* *contacts: *count contacts of an environment, all that there are, as of sadmm_world_contacts; valid until the next
- * call that steps, resets or sets, which empties the list of what is reset or set. Ids are those of the template.
+ * call that steps or resets, sets a state, or ends the recording; what is reset or set has none. Ids are those of the template.
  * Errors: INVALID_ARGUMENT (range), UNAVAILABLE (not recorded). */
 SADMM_API sadmm_status sadmm_environments_contacts(sadmm_environments *environments, int32_t environment,
                                                    const sadmm_contact **contacts, int32_t *count);

@@ -127,7 +127,12 @@ void bind_environments(nb::module_ &m)
 {
     nb::class_<environments>(m, "_Environments")
         .def_prop_ro("count", [](environments &e) { return sadmm_environments_count(e.handle()); })
-        .def_prop_ro("memory", [](environments &e) { return sadmm_environments_memory(e.handle()); })
+        .def_prop_ro("memory",
+                     [](environments &e) {
+                         nb::gil_scoped_release release;
+                         std::lock_guard<std::mutex> lock(e.mutex);
+                         return sadmm_environments_memory(e.handle());
+                     })
         .def(
             "step",
             [](environments &e, whole steps) {
@@ -153,6 +158,11 @@ void bind_environments(nb::module_ &m)
                 return state;
             },
             "environment"_a)
+        .def("forget",
+             [](environments &e, int32_t state) {
+                 call(e, [&](sadmm_environments *h) { return sadmm_environments_forget(h, state); });
+             },
+             "state"_a)
         .def(
             "save",
             [](environments &e, int32_t environment) {

@@ -55,6 +55,7 @@ from .decomposition import decompose
 from .environments import Environments
 from .given import indices, numbers, real
 from .importing import load
+from .robots import Robots
 from .copies import replicate
 
 __version__ = version()
@@ -63,7 +64,8 @@ __all__ = [
     "decompose", "load",
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Environments", "Error", "FileError",
     "Gear",
-    "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape",
+    "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Robots",
+    "Settings", "Shape",
     "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
     "CONTACT_BEGUN", "CONTACT_ENDED", "SENSOR_BEGUN", "SENSOR_ENDED", "event_dtype",

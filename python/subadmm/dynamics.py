@@ -41,7 +41,8 @@ class Tree:
     def __init__(self, loaded, rows):
         source = loaded.source
         self.source, self.groups = source, loaded.groups
-        self.bodies = [k for k in range(source.nbody) if loaded.groups[k].root == k and loaded.groups[k].kind == "dynamic"]
+        groups = enumerate(loaded.groups)
+        self.bodies = [k for k, group in groups if group.root == k and group.kind == "dynamic"]
         self.rows = {k: rows[loaded.groups[k].body] for k in self.bodies}
         self.above = {}  # of a body: degrees of freedom that move it
         for k in self.bodies:
@@ -152,7 +153,7 @@ class Motion:
             dofs = self.tree.above[body]
             part = self.twists[:, dofs]
             out[np.ix_(range(n), dofs, dofs)] += np.einsum("nai,nij,nbj->nab", part, inertia, part)
-        out[:, range(nv), range(nv)] += armature
+        out[:, range(nv), range(nv)] += armature  # n x nv
         return out
 
     def forces(self, numbers, gravity, scale, armature, qdd):

@@ -99,6 +99,10 @@ class Environments:
         """Keep the state of an environment to reset to; its number."""
         return self._core.keep(self._one(environment))
 
+    def forget(self, state):
+        """Forget a state that keep() kept."""
+        self._core.forget(whole("state", state, 0, 2**31 - 1))
+
     def array(self, name, precision="f64"):
         """An array of all environments where it lies, float64 or ('f32') float32: the same one every time. An input
         array has one precision."""
@@ -123,7 +127,8 @@ class Environments:
         self._core.set(name, np.ascontiguousarray(values, np.float64), rows)
 
     def world(self, environment):
-        """A new World as an environment is now: to look at it, to query it, or to go on with it."""
+        """A new World as an environment is now: to look at it, to query it, or to go on with it. It has no contacts before
+        its next step: see record_contacts."""
         world = _core.World()
         world.restore(self._core.save(self._one(environment)))
         return world

@@ -23,6 +23,7 @@ except ImportError as error:
 
 from .importing import load
 from .copies import replicate
+from .given import whole
 
 
 def _mixed(x):
@@ -45,8 +46,11 @@ class Task(gymnasium.vector.VectorEnv):
     """
 
     def __init__(self, robot, count, *, decimation=1, episode=0, autoreset_mode=AutoresetMode.NEXT_STEP):
+        if not hasattr(robot, "actuators"):
+            raise TypeError(f"robot = {robot!r}: must be what subadmm.load returned")
         self.robots = replicate(robot, count)
-        self.decimation, self.episode = int(decimation), int(episode)
+        self.decimation = whole("decimation", decimation, 1, 2**31 - 1)
+        self.episode = whole("episode", episode, 0, 2**62)
         self.num_envs = self.robots.count
         self.mode = AutoresetMode(autoreset_mode)
         self.metadata = {"autoreset_mode": self.mode, "render_modes": []}
@@ -117,11 +121,14 @@ class Task(gymnasium.vector.VectorEnv):
         """seed: of the first environment, the others have those that follow; or one each. options: {'reset_mask': bool
         of each} begins those alone."""
         mask = (options or {}).get("reset_mask")
+        if mask is not None and np.shape(mask) != (self.num_envs,):
+            raise ValueError(f"options['reset_mask']: must have shape ({self.num_envs},), has {np.shape(mask)}")
         which = np.arange(self.num_envs) if mask is None else np.flatnonzero(np.asarray(mask, bool))
         if seed is not None:
-            seeds = np.arange(self.num_envs) + seed if np.ndim(seed) == 0 else np.asarray(seed)
-            if seeds.shape != (self.num_envs,):
-                raise ValueError(f"seed: must be one number, or {self.num_envs}")
+            seeds = seed + np.arange(self.num_envs) if np.ndim(seed) == 0 else np.asarray(seed)
+            if seeds.shape != (self.num_envs,) or seeds.dtype.kind not in "iu" or (seeds < 0).any():
+                raise ValueError(f"seed: must be a whole number >= 0, or {self.num_envs} of them")
+            super().reset(seed=int(seeds[0]))
             self._seeds[which] = seeds[which].astype(np.uint64)
             self._episodes[which] = 0
         self._begin(which)

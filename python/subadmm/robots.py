@@ -6,9 +6,12 @@ import numpy as np
 
 from .dynamics import Motion, Tree
 from .environments import Environments
-from .given import numbers
+from .given import numbers, point
 from .importing.actuators import FORCE_SPEED
 from .importing.model import name_of
+
+#: Positions, velocities and accelerations that may be given.
+MOST = 1e9
 
 # ---- quaternions w x y z in the last axis --------------------------------------------------------------------------
 
@@ -50,7 +53,7 @@ def _unit(q):
 class _Free:
     """A joint of type 'free': where its numbers are, and the bodies that move with it."""
 
-    def __init__(self, loaded, joint, q, qd, rows, ties):
+    def __init__(self, joint, q, qd, rows, ties):
         self.q, self.qd = slice(q, q + 7), slice(qd, qd + 6)
         self.body = rows[joint.body]
         self.place, self.turn = joint._frame
@@ -79,7 +82,8 @@ class Robots(Environments):
         source, world = loaded.source, loaded.world
         rows = {body: k for k, body in enumerate(world.bodies)}
         joints = {joint: k for k, joint in enumerate(world.joints)}
-        ties = [(rows[j.body_a], rows[j.body_b]) for j in joints if j.body_a is not None and j.body_b is not None]
+        own = {joint.joint for joint in loaded.joints.values() if joint.joint is not None}  # no loops
+        ties = [(rows[j.body_a], rows[j.body_b]) for j in own if j.body_a is not None and j.body_b is not None]
         dynamic = {rows[body] for body in rows if body.type == "dynamic"}
         ties = [pair for pair in ties if dynamic.issuperset(pair)]
         self._tree = Tree(loaded, rows)
@@ -88,7 +92,7 @@ class Robots(Environments):
             joint = loaded.joints[name_of(source, "joint", k)]
             q, qd = int(source.jnt_qposadr[k]), int(source.jnt_dofadr[k])
             if joint.type == "free":
-                self._free.append(_Free(loaded, joint, q, qd, rows, ties))
+                self._free.append(_Free(joint, q, qd, rows, ties))
             elif joint.type == "ball":
                 self._balls.append((slice(q, q + 4), slice(qd, qd + 3), joints[joint.joint], joint._turn))
             else:
@@ -106,6 +110,9 @@ class Robots(Environments):
     def step(self, steps=1):
         """Make `steps` time steps with the controls in `ctrl`, each within its actuator's range. Of an environment with
         a control that is no number it is said in `failed`."""
+        shape = self.count, self._drives.start.size
+        if np.shape(self.ctrl) != shape:
+            raise ValueError(f"ctrl: must have shape {shape}, has {np.shape(self.ctrl)}")
         self._drives.write(self.ctrl, self._arrays)
         super().step(steps)
 
@@ -152,20 +159,18 @@ class Robots(Environments):
         source = self.loaded.source
         q = self._rows("q", q, n, source.nq)
         qd = self._rows("qd", np.zeros(source.nv) if qd is None else qd, n, source.nv)
-        before = self._core.get("body_state", rows)
-        try:
-            self._place(rows, q, qd)
-        except Exception:
-            self._core.set("body_state", before, rows)
-            raise
+        for at in [free.q.start + 3 for free in self._free] + [ball[0].start for ball in self._balls]:
+            if n and not (np.linalg.norm(q[:, at : at + 4], axis=1) > 1e-6).all():
+                raise ValueError(f"q: numbers {at} to {at + 3} are a quaternion, and must not be 0")
+        self._place(rows, q, qd)
 
     @staticmethod
     def _rows(name, values, n, columns):
         values = numbers(name, np.atleast_2d(values), columns)
         if len(values) not in (1, n):
             raise ValueError(f"{name}: must have 1 row or {n}, and has {len(values)}")
-        if not np.isfinite(values).all():
-            raise ValueError(f"{name}: must be finite numbers")
+        if not (np.abs(values) <= MOST).all():
+            raise ValueError(f"{name}: must be finite numbers within +-{MOST:g}")
         return np.broadcast_to(values, (n, columns))
 
     def _place(self, rows, q, qd):
@@ -230,9 +235,11 @@ class Robots(Environments):
         group = self.loaded.groups[index]
         if group.body is None or group.kind == "static":
             raise ValueError(f"body: {body!r} does not move")
-        turn = np.asarray(turn, np.float64)
+        place, turn = point("place", place), point("turn", turn, 4)
+        if np.linalg.norm(turn) < 1e-6:
+            raise ValueError("turn: must be a quaternion, not 0")
         outer = group.frame_in_body(index)
-        inner = outer[0] + _turn(outer[1], np.asarray(place, np.float64)), _mul(outer[1], turn / np.linalg.norm(turn))
+        inner = outer[0] + _turn(outer[1], place), _mul(outer[1], turn / np.linalg.norm(turn))
         row = self.loaded.world.bodies.index(group.body)
         return row, inner, self._state[:, row, 3:7]
 
@@ -254,14 +261,21 @@ class Robots(Environments):
         pick = slice(None) if rows is None else rows
         return Motion(self._tree, self.q[pick], self.qd[pick])
 
-    def _armature(self):
-        return self.loaded.source.dof_armature
+    def _armature(self, rows):
+        """n x nv: of joints what each has, of free bodies the file's."""
+        now = self._core.get("joint_armature", rows)
+        out = np.tile(self.loaded.source.dof_armature, (len(now), 1))
+        _, qd, row, coordinate, _, _ = self._hinges
+        out[:, qd] = now[:, row, coordinate]
+        for _, at, row, _ in self._balls:
+            out[:, at] = now[:, row, 3:]
+        return out
 
     def mass_matrix(self, which=None):
-        """n x nv x nv of environments (numbers, or a mask; None: all): kinetic energy is qd M qd / 2. By the masses and
-        inertias that each has."""
+        """n x nv x nv of environments (numbers, or a mask; None: all): kinetic energy is qd M qd / 2. By the masses,
+        inertias and armatures that each has."""
         rows = self._which(which)
-        return self._motion(rows).mass_matrix(self._core.get("body_inertia", rows), self._armature())
+        return self._motion(rows).mass_matrix(self._core.get("body_inertia", rows), self._armature(rows))
 
     def inverse_dynamics(self, qdd, which=None):
         """n x nv: generalised forces that accelerations qdd (n x nv, or one row for all) take: M qdd and those of
@@ -271,16 +285,16 @@ class Robots(Environments):
         qdd = self._rows("qdd", qdd, *motion.qd.shape)
         get = lambda name: self._core.get(name, rows)  # noqa: E731
         return motion.forces(get("body_inertia"), get("gravity")[:, 0], get("body_gravity_scale")[..., 0],
-                             self._armature(), qdd)
+                             self._armature(rows), qdd)
 
     def bias(self, which=None):
-        """n x nv: generalised forces of gravity and velocities, as MuJoCo's qfrc_bias."""
+        """n x nv: generalised forces of gravity and velocities: MuJoCo's qfrc_bias, less its gravity compensation."""
         return self.inverse_dynamics(np.zeros(self.loaded.source.nv), which)
 
-    def jacobian(self, body, point=(0.0, 0.0, 0.0), which=None):
+    def jacobian(self, body, place=(0.0, 0.0, 0.0), which=None):
         """n x 6 x nv: times qd the velocity of a point of a body of the file (by name; in its frame, m) and its angular
         velocity, in the world's axes."""
-        return self._motion(self._which(which)).jacobian(self._named(body), np.asarray(point, np.float64))
+        return self._motion(self._which(which)).jacobian(self._named(body), point("place", place))
 
 
 class _Drives:

@@ -130,12 +130,52 @@ def test_positions_and_velocities_are_mujocos(robot):
     robots.set_positions(q[0], which=[1, 3])
     np.testing.assert_allclose(robots.qd[[1, 3]], 0, atol=1e-12)
     assert (state[[0, 2, 4]] == before[[0, 2, 4]]).all()
-    with pytest.raises(ValueError, match="q: must be finite"):
+    with pytest.raises(ValueError, match="q: must be finite numbers"):
         robots.set_positions(q * np.nan)
     with pytest.raises(ValueError, match="1 row or 5, and has 2"):
         robots.set_positions(q[:2])
     with pytest.raises(ValueError, match="columns of real numbers"):
         robots.set_positions(q[:, 1:])
+
+
+def test_refused_positions_change_nothing(robot):
+    """Not even the turns that a joint has made."""
+    robots = subadmm.replicate(robot, 2)
+    q = robots.q
+    q[:, 7 + 4] = 13.0  # the hinge: two turns and some
+    robots.set_positions(q)
+    before, state = robots.q, robots.array("body_state").copy()
+    for wrong in ({"qd": np.full(robot.source.nv, 1e12)}, {"qd": np.full(robot.source.nv, np.nan)}):
+        with pytest.raises(ValueError, match="qd: must be finite numbers within"):
+            robots.set_positions(np.zeros_like(q) + 0.1, **wrong)
+    with pytest.raises(ValueError, match="a quaternion, and must not be 0"):
+        robots.set_positions(np.zeros_like(q))
+    assert (robots.q == before).all() and (robots.array("body_state") == state).all()
+    assert before[0, 7 + 4] == pytest.approx(13.0, abs=1e-9)
+
+
+def test_equalities_do_not_carry_robots_along(tmp_path):
+    """Bodies that are free each by itself are placed each by itself; a weld that is not active holds nothing."""
+    model = """<mujoco><worldbody>
+    <body name="a" pos="0 0 1"><freejoint/><geom size="0.1"/></body>
+    <body name="b" pos="0.5 0 1"><freejoint/><geom size="0.1"/></body>
+    <body name="c" pos="2 0 1"><joint name="hinge" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/></body>
+    </worldbody><equality><connect body1="a" body2="b" anchor="0.25 0 0"/>
+    <weld body1="c" body2="a" active="false"/></equality></mujoco>"""
+    path = tmp_path / "two.xml"
+    path.write_text(model)
+    robots = subadmm.replicate(subadmm.load(path, backend="cpu"), 2)
+    q = np.array([[0, 0, 1, 1, 0, 0, 0, 0.5, 0, 1, 1, 0, 0, 0, 0.5], [3, 1, 2, 0, 1, 0, 0, -1, 0, 5, 0, 0, 1, 0, -0.4]])
+    robots.set_positions(q)
+    np.testing.assert_allclose(robots.q, q, atol=1e-12)
+
+
+def test_scripts_are_not_lost_in_silence():
+    world = subadmm.scene("grippers:2", backend="cpu")
+    with pytest.raises(ValueError, match="script"):
+        subadmm.replicate(world, 2)
+    world.script = False
+    assert len(subadmm.replicate(world, 2)) == 2
 
 
 def test_resets_and_kept_states(robot):
@@ -151,6 +191,9 @@ def test_resets_and_kept_states(robot):
     assert (state[1] == there).all() and (state[0] == start[0]).all()
     robots.reset(states=kept)
     assert (state == there).all()
+    robots.forget(kept)
+    with pytest.raises(ValueError, match="forgotten"):
+        robots.reset(states=kept)
     one = robots.world(3)
     one.step(11)
     robots.step(11)
@@ -277,6 +320,12 @@ def test_dynamics_are_mujocos(robot):
         at = data.xpos[source.body("hand").id] + data.xmat[source.body("hand").id].reshape(3, 3) @ point
         mujoco.mj_jac(source, data, linear, angular, at, source.body("hand").id)
         np.testing.assert_allclose(jacobian[e], np.concatenate([linear, angular]), atol=1e-12)
+    armature = robots.array("joint_armature")
+    hinge = robot.joints["post"]
+    armature[1, robot.world.joints.index(hinge.joint), hinge.coordinate] = 7
+    at = robot.source.jnt_dofadr[robot.source.joint("post").id]
+    assert robots.mass_matrix()[1, at, at] == pytest.approx(mass[1, at, at] + 7)
+    armature[:] = 0
     inertia = robots.array("body_inertia")
     inertia[:] *= rng.uniform(0.5, 2, (4, 1, 1))
     state = robots.array("body_state")

@@ -34,6 +34,19 @@ def test_spaces_and_shapes():
         envs.step(np.zeros((5, 2)))
 
 
+def test_what_is_refused():
+    with pytest.raises(ValueError, match="decimation"):
+        subadmm.gym.Task(subadmm.gym._load_text(subadmm.gym.CARTPOLE), 2, decimation=0)
+    with pytest.raises(TypeError, match="robot"):
+        subadmm.gym.Task(subadmm.World(), 2)
+    envs = subadmm.gym.CartPole(3)
+    for seed in (-5, [1, 2], [1, -2, 3], [0.5, 1, 2]):
+        with pytest.raises(ValueError, match="seed|Seed"):
+            envs.reset(seed=seed)
+    with pytest.raises(ValueError, match="reset_mask"):
+        envs.reset(options={"reset_mask": [True]})
+
+
 def test_an_environment_depends_on_itself_alone():
     """The third of seven is that of its seed alone; equal seeds are equal; threads do not matter."""
     seven = run(subadmm.gym.CartPole(7, threads=2), 60, actions=lambda step: 8 * np.sin(0.4 * step) * np.ones(7))

@@ -119,7 +119,8 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->resident.joints, world->resident.memory, world->step_joints,
                       world->resident.solution, world->resident.dirty_joints,
                       world->resident.coupling_memory, world->query.prelude, world->query.hits,
-                      world->query.slots, world->query.spare, world->placing.seen, world->placing.bodies};
+                      world->query.slots, world->query.spare, world->placing.seen, world->placing.bodies,
+                      world->placing.changes};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(world);
 }

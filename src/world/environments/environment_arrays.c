@@ -1,10 +1,12 @@
 /* Arrays of environments: those of worlds, with one dimension more. */
 #include "environment_arrays.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "core/base/check.h"
 #include "core/base/memory.h"
+#include "core/base/names.h"
 
 /* Numbers of an environment. */
 static size_t numbers_of(const struct sadmm_environments *environments, sadmm_array array)
@@ -42,12 +44,27 @@ static struct sadmm_bound_array *bound_of(const struct sadmm_environments *envir
     return NULL;
 }
 
+/* Single precision may take numbers out of their range by rounding: the least mass, a moment that is the sum of the
+ * others. They become what they were meant to be. */
+static void mend_inertia(double *row)
+{
+    static const double rounding = 1 + 1e-6, least = 1e-9; /* of single precision; kg */
+    if (row[0] < least && row[0] * rounding >= least) row[0] = least;
+    for (int k = 1; k < 4; ++k) {
+        const double most = row[1 + k % 3] + row[1 + (k + 1) % 3];
+        if (row[k] > most && row[k] <= rounding * most) row[k] = most;
+    }
+}
+
 static void load_numbers(const struct sadmm_bound_array *bound, int32_t environment, double *out)
 {
     const size_t n = bound->numbers, first = n * (size_t)environment;
-    if (bound->precision == SADMM_F64) memcpy(out, (const double *)bound->values + first, n * sizeof *out);
-    else
-        for (size_t k = 0; k < n; ++k) out[k] = (double)((const float *)bound->values)[first + k];
+    if (bound->precision == SADMM_F64) {
+        memcpy(out, (const double *)bound->values + first, n * sizeof *out);
+        return;
+    }
+    for (size_t k = 0; k < n; ++k) out[k] = (double)((const float *)bound->values)[first + k];
+    for (size_t k = 0; bound->array == SADMM_ARRAY_BODY_INERTIA && k < n; k += 4) mend_inertia(out + k);
 }
 
 static void store_numbers(const struct sadmm_bound_array *bound, int32_t environment, const double *numbers)
@@ -58,9 +75,14 @@ static void store_numbers(const struct sadmm_bound_array *bound, int32_t environ
         for (size_t k = 0; k < n; ++k) ((float *)bound->values)[first + k] = (float)numbers[k];
 }
 
+/* What a world without the numbers has none of is 0. */
 static sadmm_status get_all(sadmm_world *world, sadmm_array array, double *values)
 {
-    return sadmm_world_get_array(world, array, 0, sadmm_world_array_rows(world, array), values);
+    const int32_t rows = sadmm_world_array_rows(world, array);
+    const sadmm_status status = sadmm_world_get_array(world, array, 0, rows, values);
+    if (status != SADMM_ERROR_UNAVAILABLE) return status;
+    memset(values, 0, (size_t)rows * (size_t)sadmm_array_columns(array) * sizeof *values);
+    return SADMM_OK;
 }
 
 static sadmm_status set_all(sadmm_world *world, sadmm_array array, const double *values)
@@ -73,16 +95,44 @@ static sadmm_status set_all(sadmm_world *world, sadmm_array array, const double 
 
 /* ---- in steps ---------------------------------------------------------------------------------------------------- */
 
+/* Limits are checked against each other: where both are an environment's own, none is left of another one's. */
+static void open_limits(const struct sadmm_environments *environments, sadmm_world *world)
+{
+    if (!bound_of(environments, SADMM_ARRAY_JOINT_LOWER, -1) || !bound_of(environments, SADMM_ARRAY_JOINT_UPPER, -1))
+        return;
+    for (SADMM_OBJECTS(slot, &world->joint_ids)) {
+        sadmm_joint_def *def = &world->joints[slot].def;
+        for (int k = 0; k < JOINT_COORDINATES; ++k)
+            if (!(def->locks >> k & 1)) def->coordinates[k].lower = -INFINITY, def->coordinates[k].upper = INFINITY;
+    }
+}
+
+/* All but those of one array. good: one that is refused is the template's. */
+static sadmm_status read_inputs(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                int32_t environment, int but, bool good)
+{
+    open_limits(environments, worker->world);
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        const struct sadmm_bound_array *bound = &environments->bound[k];
+        if (!sadmm_environments_is_input(bound->array) || (int)bound->array == but) continue;
+        load_numbers(bound, environment, worker->numbers);
+        const sadmm_status status = set_all(worker->world, bound->array, worker->numbers);
+        if (status == SADMM_ERROR_INVALID_ARGUMENT && good) TRY(set_all(worker->world, bound->array, bound->start));
+        else TRY(status);
+    }
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_environments_read_inputs(struct sadmm_environments *environments,
                                             struct sadmm_environment_worker *worker, int32_t environment)
 {
-    for (size_t k = 0; k < environments->bound_count; ++k) {
-        const struct sadmm_bound_array *bound = &environments->bound[k];
-        if (!sadmm_environments_is_input(bound->array)) continue;
-        load_numbers(bound, environment, worker->numbers);
-        TRY(set_all(worker->world, bound->array, worker->numbers));
-    }
-    return SADMM_OK;
+    return read_inputs(environments, worker, environment, -1, false);
+}
+
+sadmm_status sadmm_environments_read_good_inputs(struct sadmm_environments *environments,
+                                                 struct sadmm_environment_worker *worker, int32_t environment)
+{
+    return read_inputs(environments, worker, environment, -1, true);
 }
 
 /* All that the worker's world has; none after a state was loaded. */
@@ -135,6 +185,15 @@ static sadmm_status fill(struct sadmm_environments *environments, struct sadmm_e
     return SADMM_OK;
 }
 
+/* Of an input array that is not bound yet: workers have what the template has. */
+static sadmm_status read_template(struct sadmm_environments *environments, sadmm_array array, double *values)
+{
+    sadmm_world *world = environments->worker[0].world;
+    sadmm_status status = sadmm_environment_state_load(world, &environments->kept[0]);
+    if (status == SADMM_OK) status = get_all(world, array, values);
+    return status == SADMM_OK ? status : sadmm_fail(&environments->error, status, "%s", world->error.message);
+}
+
 /* *out: the array that is bound, newly or before. */
 static sadmm_status bind(struct sadmm_environments *environments, sadmm_array array, sadmm_precision precision,
                          struct sadmm_bound_array **out)
@@ -144,17 +203,21 @@ static sadmm_status bind(struct sadmm_environments *environments, sadmm_array ar
     const bool input = sadmm_environments_is_input(array);
     *out = bound_of(environments, array, input ? -1 : (int)precision);
     if (*out && (*out)->precision != precision)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "precision = %d: must be %d, which this array has",
-                          (int)precision, (int)(*out)->precision);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "precision = %s: must be %s, which the array %s has",
+                          sadmm_precision_names[precision], sadmm_precision_names[(*out)->precision],
+                          sadmm_array_name(array));
     if (*out) return SADMM_OK;
     if (!SADMM_GROW(environments->bound, n, n + 1)) return sadmm_fail_memory(error, "an array of environments");
-    struct sadmm_bound_array fresh = {array, precision, numbers_of(environments, array), NULL};
+    struct sadmm_bound_array fresh = {array, precision, numbers_of(environments, array), NULL, NULL};
     fresh.values = sadmm_alloc((size_t)environments->count,
                                fresh.numbers * (precision == SADMM_F64 ? sizeof(double) : sizeof(float)));
-    if (!fresh.values) return sadmm_fail_memory(error, "an array of environments");
-    const sadmm_status status = sadmm_environments_each(environments, NULL, environments->count, fill, &fresh);
+    fresh.start = (double *)sadmm_alloc(input ? fresh.numbers : 0, sizeof *fresh.start);
+    sadmm_status status = fresh.values && fresh.start ? SADMM_OK : sadmm_fail_memory(error, "an array of environments");
+    if (status == SADMM_OK && input) status = read_template(environments, array, fresh.start);
+    if (status == SADMM_OK) status = sadmm_environments_each(environments, NULL, environments->count, fill, &fresh);
     if (status != SADMM_OK) {
         sadmm_free(fresh.values);
+        sadmm_free(fresh.start);
         return status;
     }
     environments->bound[n] = fresh;
@@ -211,13 +274,22 @@ sadmm_status sadmm_environments_get(sadmm_environments *environments, sadmm_arra
     return sadmm_environments_each(environments, which, count, get_one, &rows);
 }
 
-/* Can it be set? The worker's world is left with it. */
+/* Can it be set, with the other inputs that the environment has? The worker's world is left with it. */
 static sadmm_status try_one(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
                             int32_t environment, int32_t place, void *argument)
 {
     const struct rows_of *rows = (const struct rows_of *)argument;
+    const double *given = rows->in + rows->numbers * (size_t)place;
     TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
-    return set_all(worker->world, rows->array, rows->in + rows->numbers * (size_t)place);
+    if (!rows->bound) return set_all(worker->world, rows->array, given);
+    TRY(read_inputs(environments, worker, environment, (int)rows->array, true));
+    memcpy(worker->numbers, given, rows->numbers * sizeof *given);
+    if (rows->bound->precision == SADMM_F32) /* as it is stored */
+        for (size_t k = 0; k < rows->numbers; ++k) worker->numbers[k] = (double)(float)given[k];
+    for (size_t k = 0;
+         rows->bound->precision == SADMM_F32 && rows->array == SADMM_ARRAY_BODY_INERTIA && k < rows->numbers; k += 4)
+        mend_inertia(worker->numbers + k);
+    return set_all(worker->world, rows->array, worker->numbers);
 }
 
 static sadmm_status set_one(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
@@ -263,8 +335,8 @@ sadmm_status sadmm_environments_record_contacts(sadmm_environments *environments
         sadmm_environments_free_contacts(environments);
         return SADMM_OK;
     }
-    environments->contacts = (struct sadmm_environment_contacts *)sadmm_alloc((size_t)environments->count,
-                                                                              sizeof *environments->contacts);
+    environments->contacts =
+        (struct sadmm_environment_contacts *)sadmm_alloc((size_t)environments->count, sizeof *environments->contacts);
     return environments->contacts ? SADMM_OK : sadmm_fail_memory(&environments->error, "contacts of environments");
 }
 
@@ -284,8 +356,7 @@ sadmm_status sadmm_environments_contacts(sadmm_environments *environments, int32
     TRY(sadmm_check_given(contacts, "contacts", error));
     TRY(sadmm_check_given(count, "count", error));
     TRY(sadmm_environments_check(environments, "environment", environment));
-    if (!environments->contacts)
-        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "contacts: are not recorded");
+    if (!environments->contacts) return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "contacts: are not recorded");
     *contacts = environments->contacts[environment].list;
     *count = environments->contacts[environment].count;
     return SADMM_OK;

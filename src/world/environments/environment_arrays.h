@@ -4,9 +4,13 @@
 
 #include "environment_work.h"
 
-/* The worker's world, which is an environment already, has what its input arrays have. */
+/* The worker's world, which is an environment already, has what its input arrays have. Errors: those of
+ * sadmm_world_set_array. */
 sadmm_status sadmm_environments_read_inputs(struct sadmm_environments *environments,
                                             struct sadmm_environment_worker *worker, int32_t environment);
+/* The same; an array that is refused is the template's. */
+sadmm_status sadmm_environments_read_good_inputs(struct sadmm_environments *environments,
+                                                 struct sadmm_environment_worker *worker, int32_t environment);
 /* The other arrays that are bound, and contacts where they are recorded, are those of the worker's world. */
 sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environments,
                                               struct sadmm_environment_worker *worker, int32_t environment);

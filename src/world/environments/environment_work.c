@@ -31,7 +31,7 @@ sadmm_status sadmm_environments_each(struct sadmm_environments *environments, co
 {
     const struct sadmm_environment_worker *first = NULL;
     for (int t = 0; t < environments->workers; ++t) environments->worker[t].failed_at = -1;
-    const int asked = environments->threads,
+    const int asked = environments->settings.threads,
               wanted = asked > 0 && asked < environments->workers ? asked : environments->workers;
     const int threads = sadmm_team_threads(&environments->team, wanted, (size_t)count);
     struct sharing sharing = {
@@ -65,7 +65,7 @@ sadmm_status sadmm_environments_check_which(struct sadmm_environments *environme
     if (*count < 0 || *count > environments->count)
         return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "count = %d: must be in [0, %d]", *count,
                           environments->count);
-    const uint32_t call = ++environments->calls;
+    const uint64_t call = ++environments->calls;
     for (int32_t k = 0; k < *count; ++k) {
         const bool there = which[k] >= 0 && which[k] < environments->count;
         if (there && environments->seen[which[k]] != call) {

@@ -11,6 +11,7 @@ struct sadmm_bound_array {
     sadmm_precision precision;
     size_t numbers; /* an environment: rows x columns */
     void *values;
+    double *start; /* (numbers) of an input array: the template's */
 };
 
 /* Contacts that are kept of an environment. */
@@ -33,16 +34,16 @@ struct sadmm_environments {
     int32_t count, workers;
     struct sadmm_environment_worker *worker;
     struct sadmm_environment_state *states; /* (count) */
-    struct sadmm_environment_state *kept;   /* to reset to; the first is the template's */
+    struct sadmm_environment_state *kept;   /* to reset to, the first is the template's; of size 0: forgotten */
     size_t kept_count;
     uint8_t *marked; /* (count) */
     char **marks;    /* (count) why; NULL where it is not marked, or no memory was left to say so */
-    uint32_t *seen;  /* (count) the last call that named it */
-    uint32_t calls;
+    uint64_t *seen;  /* (count) the last call that named it */
+    uint64_t calls;
     struct sadmm_bound_array *bound;
     size_t bound_count;
     struct sadmm_environment_contacts *contacts; /* (count) where they are recorded; else NULL */
-    int threads; /* settings.threads of all; each worker has 1 */
+    sadmm_settings settings; /* of all; a worker has one thread, and the gravity of the environment that it is */
 };
 
 /* Work of one environment, the `place`-th of a call, by a worker. Its status is the call's where no earlier one

@@ -1,6 +1,7 @@
 /* Many copies of a world. A thread has one world, its worker, which becomes one environment after the other: the state
  * of an environment is loaded, its steps are made, its state is stored. So an environment takes no more memory than
  * what steps change, its steps run in the processor's caches, and no environment can see another one. */
+#include <stdio.h>
 #include <string.h>
 
 #include "core/base/check.h"
@@ -76,7 +77,7 @@ static sadmm_status make(struct sadmm_environments *environments, const void *by
     environments->states = (struct sadmm_environment_state *)sadmm_alloc(count, sizeof *environments->states);
     environments->marked = (uint8_t *)sadmm_alloc(count, sizeof *environments->marked);
     environments->marks = (char **)sadmm_alloc(count, sizeof *environments->marks);
-    environments->seen = (uint32_t *)sadmm_alloc(count, sizeof *environments->seen);
+    environments->seen = (uint64_t *)sadmm_alloc(count, sizeof *environments->seen);
     if (!environments->worker || !environments->states || !environments->marked || !environments->marks ||
         !environments->seen || !SADMM_GROW(environments->kept, 0, 1))
         return sadmm_fail_memory(error, "environments");
@@ -118,8 +119,8 @@ sadmm_status sadmm_world_replicate(sadmm_world *world, int32_t count, sadmm_envi
     if (status == SADMM_OK) {
         environments->team = world->team;
         environments->count = count;
-        environments->threads = world->def.settings.threads;
-        environments->workers = sadmm_team_threads(&environments->team, environments->threads, (size_t)count);
+        environments->settings = world->def.settings;
+        environments->workers = sadmm_team_threads(&environments->team, environments->settings.threads, (size_t)count);
         status = make(environments, bytes, size, error);
     }
     sadmm_free(bytes);
@@ -140,7 +141,10 @@ void sadmm_environments_destroy(sadmm_environments *environments)
     for (int32_t i = 0; environments->marks && i < environments->count; ++i) sadmm_free(environments->marks[i]);
     sadmm_environments_free_contacts(environments);
     for (size_t k = 0; k < environments->kept_count; ++k) sadmm_environment_state_free(&environments->kept[k]);
-    for (size_t k = 0; k < environments->bound_count; ++k) sadmm_free(environments->bound[k].values);
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        sadmm_free(environments->bound[k].values);
+        sadmm_free(environments->bound[k].start);
+    }
     void *blocks[] = {environments->worker, environments->states, environments->kept, environments->marked,
                       environments->marks,  environments->seen,   environments->bound};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
@@ -164,6 +168,10 @@ size_t sadmm_environments_memory(const sadmm_environments *environments)
     size_t bytes = count * (sizeof *environments->states + sizeof *environments->marked + sizeof *environments->marks +
                             sizeof *environments->seen);
     for (size_t i = 0; i < count; ++i) bytes += SADMM_ROOM(environments->states[i].bytes);
+    for (size_t i = 0; environments->contacts && i < count; ++i)
+        bytes += sizeof *environments->contacts +
+                 SADMM_ROOM(environments->contacts[i].list) * sizeof *environments->contacts[i].list;
+    for (size_t k = 0; k < environments->kept_count; ++k) bytes += SADMM_ROOM(environments->kept[k].bytes);
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
         bytes += count * bound->numbers * (bound->precision == SADMM_F64 ? sizeof(double) : sizeof(float));
@@ -178,7 +186,7 @@ sadmm_status sadmm_environments_set_settings(sadmm_environments *environments, c
     sadmm_settings settings;
     TRY(sadmm_check_given(environments, "environments", NULL));
     TRY(sadmm_settings_take(&settings, given, &environments->error));
-    environments->threads = settings.threads;
+    environments->settings = settings;
     settings.threads = 1;
     for (int t = 0; t < environments->workers; ++t) environments->worker[t].world->def.settings = settings;
     return SADMM_OK;
@@ -190,9 +198,7 @@ void sadmm_environments_settings_sized(const sadmm_environments *environments, s
         sadmm_settings_init(settings, size);
         return;
     }
-    sadmm_settings own = environments->worker[0].world->def.settings;
-    own.threads = environments->threads;
-    (void)sadmm_growing_give(&sadmm_growing_settings, settings, size, 0, &own, "settings", NULL);
+    (void)sadmm_growing_give(&sadmm_growing_settings, settings, size, 0, &environments->settings, "settings", NULL);
 }
 
 /* ---- steps ------------------------------------------------------------------------------------------------------- */
@@ -246,15 +252,24 @@ static sadmm_status begin_again(struct sadmm_environments *environments, struct 
     return sadmm_environments_write_outputs(environments, worker, environment);
 }
 
+/* A state that is there. place: in the call's list; -1: it is no list. */
+static sadmm_status check_state(struct sadmm_environments *environments, int32_t place, int32_t state)
+{
+    char name[32] = "state";
+    if (place >= 0) snprintf(name, sizeof name, "states[%d]", place);
+    if (state < 0 || (size_t)state >= environments->kept_count)
+        return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "%s = %d: must be in [0, %d)", name,
+                          state, (int)environments->kept_count);
+    if (environments->kept[state].size > 0) return SADMM_OK;
+    return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "%s = %d: was forgotten", name, state);
+}
+
 sadmm_status sadmm_environments_reset(sadmm_environments *environments, const int32_t *which, int32_t count,
                                       const int32_t *states)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));
     TRY(sadmm_environments_check_which(environments, which, &count));
-    for (int32_t k = 0; states && k < count; ++k)
-        if (states[k] < 0 || (size_t)states[k] >= environments->kept_count)
-            return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "states[%d] = %d: must be in [0, %d)",
-                              k, states[k], (int)environments->kept_count);
+    for (int32_t k = 0; states && k < count; ++k) TRY(check_state(environments, k, states[k]));
     return sadmm_environments_each(environments, which, count, begin_again, (void *)states);
 }
 
@@ -275,12 +290,24 @@ sadmm_status sadmm_environments_keep(sadmm_environments *environments, int32_t e
     return SADMM_OK;
 }
 
-/* The first worker's world is an environment, with what its input arrays have. */
+sadmm_status sadmm_environments_forget(sadmm_environments *environments, int32_t state)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(check_state(environments, -1, state));
+    if (state == 0)
+        return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "state = 0: must be one that was kept, not the template's");
+    sadmm_environment_state_free(&environments->kept[state]);
+    return SADMM_OK;
+}
+
+/* The first worker's world is an environment, with what its input arrays have; of one that is marked for these, with
+ * what can be had. */
 static sadmm_status become(struct sadmm_environments *environments, int32_t environment)
 {
     struct sadmm_environment_worker *worker = &environments->worker[0];
     TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
-    return sadmm_environments_read_inputs(environments, worker, environment);
+    return sadmm_environments_read_good_inputs(environments, worker, environment);
 }
 
 sadmm_status sadmm_environments_save(sadmm_environments *environments, int32_t environment, void *buffer,
@@ -295,9 +322,10 @@ sadmm_status sadmm_environments_save(sadmm_environments *environments, int32_t e
     if (status == SADMM_OK) {
         const size_t kinematic = 6 * (size_t)world->kinematic_count;
         if (!SADMM_GROW(world->start.kinematic, 0, kinematic)) return sadmm_fail_memory(error, "kinematic bodies");
+        if (kinematic > 0) memset(world->start.kinematic, 0, kinematic * sizeof *world->start.kinematic);
         world->start.kinematic_count = world->kinematic_count;
         world->step_settings = world->def.settings;
-        world->def.settings.threads = environments->threads;
+        world->step_settings.threads = world->def.settings.threads = environments->settings.threads;
         status = sadmm_world_save(world, buffer, capacity, size);
         world->def.settings.threads = 1;
     }

@@ -103,7 +103,7 @@ static sadmm_status set_wrench(sadmm_world *world, size_t slot, const double *ro
 static sadmm_status get_contact_wrench(sadmm_world *world, size_t slot, double *row)
 {
     const struct sadmm_world_body *body = &world->bodies[slot];
-    if (world->stepped && !world->step_settings.recover_wrenches)
+    if (world->stepped && !world->plan.wrenches)
         return sadmm_fail(&world->error, SADMM_ERROR_UNAVAILABLE,
                           "contact wrenches: settings.recover_wrenches was false");
     if (world->stepped && body->type != SADMM_BODY_STATIC) memcpy(row, body->contact_wrench, 6 * sizeof *row);

@@ -97,10 +97,10 @@ static sadmm_status find_moving_side(sadmm_world *world, size_t slot, int *side)
 
 static bool is_free(const struct sadmm_world_joint *joint, int k) { return !(joint->def.locks >> k & 1); }
 
-static bool differs(const double *x, const double *now)
+static bool differs(const struct sadmm_world_joint *joint, const double *x, const double *now, bool locked)
 {
     for (int k = 0; k < JOINT_COORDINATES; ++k)
-        if (x[k] != now[k]) return true;
+        if (is_free(joint, k) != locked && x[k] != now[k]) return true;
     return false;
 }
 
@@ -114,16 +114,33 @@ static sadmm_status check_numbers(const struct sadmm_world_joint *joint, const d
     return SADMM_OK;
 }
 
-static sadmm_status check_moves(sadmm_world *world, size_t slot)
+/* Why a joint cannot be set; NULL: it can. */
+static sadmm_status find_why_not(sadmm_world *world, size_t slot, const char **why)
 {
+    const struct sadmm_world_joint *joint = &world->joints[slot];
     int side;
-    if (joint_is_radial(world->joints[slot].def.kind))
-        return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "the joint holds a distance: its bodies' states must be set");
+    *why = joint_is_radial(joint->def.kind) ? "holds a distance" : !joint->def.enabled ? "is not enabled" : NULL;
+    if (*why) return SADMM_OK;
     TRY(find_moving_side(world, slot, &side));
-    if (side >= 0) return SADMM_OK;
-    return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
-                      "the joint is part of a loop: its bodies' states must be set");
+    if (side < 0) *why = "is part of a loop";
+    return SADMM_OK;
+}
+
+/* Is the row to be set? Noted for that: what is set before it may change its numbers by rounding. Where the joint
+ * cannot be set free coordinates must be as they are, and locked ones stay. */
+static sadmm_status note_row(sadmm_world *world, size_t slot, const double *row, const double *now)
+{
+    const struct sadmm_world_joint *joint = &world->joints[slot];
+    const size_t joints = world->joint_ids.slots;
+    const char *why = NULL;
+    if (!SADMM_GROW(world->placing.changes, 0, joints)) return sadmm_fail_memory(&world->error, "joints");
+    const bool free = differs(joint, row, now, false), any = free || differs(joint, row, now, true);
+    if (any) TRY(find_why_not(world, slot, &why));
+    if (free && why)
+        return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "the joint %s: its bodies' states must be set",
+                          why);
+    world->placing.changes[slot] = any && !why;
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_world_check_joint_positions(sadmm_world *world, size_t slot, const double position[6])
@@ -132,13 +149,12 @@ sadmm_status sadmm_world_check_joint_positions(sadmm_world *world, size_t slot, 
     const struct sadmm_world_joint *joint = &world->joints[slot];
     double now[6], speed[6];
     sadmm_world_read_joint_motion(world, joint, now, speed);
-    if (!differs(position, now)) return SADMM_OK;
     TRY(check_numbers(joint, position, MOST_POSITION, &world->error));
     const double turn = v3_norm(v3_load(position + 3));
     if (joint_locked_rotations(joint->def.locks) == 0 && turn > half_turn)
         return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
                           "columns 3 to 5 are a rotation by %.17g rad: must be at most half a turn", turn);
-    return check_moves(world, slot);
+    return note_row(world, slot, position, now);
 }
 
 sadmm_status sadmm_world_check_joint_speeds(sadmm_world *world, size_t slot, const double speed[6])
@@ -146,9 +162,8 @@ sadmm_status sadmm_world_check_joint_speeds(sadmm_world *world, size_t slot, con
     const struct sadmm_world_joint *joint = &world->joints[slot];
     double position[6], now[6];
     sadmm_world_read_joint_motion(world, joint, position, now);
-    if (!differs(speed, now)) return SADMM_OK;
     TRY(check_numbers(joint, speed, MOST_SPEED, &world->error));
-    return check_moves(world, slot);
+    return note_row(world, slot, speed, now);
 }
 
 /* ---- setting ----------------------------------------------------------------------------------------------------- */
@@ -249,10 +264,9 @@ sadmm_status sadmm_world_set_joint_positions(sadmm_world *world, size_t slot, co
     struct sadmm_world_joint *joint = &world->joints[slot];
     double now[6], speed[6], wanted[6];
     int side;
+    if (!world->placing.changes[slot]) return SADMM_OK;
     sadmm_world_read_joint_motion(world, joint, now, speed);
-    if (!differs(position, now)) return SADMM_OK;
     TRY(find_moving_side(world, slot, &side));
-    if (side < 0) return SADMM_OK;
     TRY(sadmm_world_detach(world)); /* the joint's turns are part of what a backend was given */
     for (int k = 0; k < JOINT_COORDINATES; ++k) wanted[k] = is_free(joint, k) ? position[k] : 0;
     const struct joint_end other = end_of(world, joint, 1 - side);
@@ -278,12 +292,9 @@ sadmm_status sadmm_world_set_joint_positions(sadmm_world *world, size_t slot, co
 sadmm_status sadmm_world_set_joint_speeds(sadmm_world *world, size_t slot, const double speed[6])
 {
     const struct sadmm_world_joint *joint = &world->joints[slot];
-    double position[6], now[6];
     int side;
-    sadmm_world_read_joint_motion(world, joint, position, now);
-    if (!differs(speed, now)) return SADMM_OK;
+    if (!world->placing.changes[slot]) return SADMM_OK;
     TRY(find_moving_side(world, slot, &side));
-    if (side < 0) return SADMM_OK;
     const int32_t body = joint->body[side];
     const struct twist from = twist_of(world, body), to = moving_twist(world, joint, side, speed);
     return add_twist(world, v3_load(world->bodies[body].rigid.position),

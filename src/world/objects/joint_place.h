@@ -7,11 +7,10 @@
 /* Positions and speeds of a joint, as in sadmm_joint_state. */
 void sadmm_world_read_joint_motion(const sadmm_world *world, const struct sadmm_world_joint *joint, double position[6],
                                    double speed[6]);
-/* May the joint in a slot be set to these positions? Else INVALID_ARGUMENT; OUT_OF_MEMORY. */
+/* May the joint in a slot be set to these positions? Else INVALID_ARGUMENT; OUT_OF_MEMORY. Notes whether it changes. */
 sadmm_status sadmm_world_check_joint_positions(sadmm_world *world, size_t slot, const double position[6]);
 sadmm_status sadmm_world_check_joint_speeds(sadmm_world *world, size_t slot, const double speed[6]);
-/* It is, where it may be: the others keep their positions and speeds. Of a loop, which may only have what it has:
- * nothing. */
+/* After the checks of all that are set: it is, where it changes. The others keep their positions and speeds. */
 sadmm_status sadmm_world_set_joint_positions(sadmm_world *world, size_t slot, const double position[6]);
 sadmm_status sadmm_world_set_joint_speeds(sadmm_world *world, size_t slot, const double speed[6]);
 

@@ -148,6 +148,7 @@ struct sadmm_world {
         uint32_t call;
         int32_t *bodies; /* slots, `count` of them */
         size_t count;
+        bool *changes; /* by joint slot: as it was checked last, its row was to be set */
     } placing;
 
     /* What queries search (query_scene.c). */
