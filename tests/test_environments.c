@@ -741,6 +741,66 @@ START_TEST(what_is_refused_changes_nothing)
 }
 END_TEST
 
+/* Calls that need memory, on what the last ones left. */
+static sadmm_status ask(sadmm_environments *environments, int call, double *numbers, void *bytes, size_t size)
+{
+    const sadmm_ray ray = {{0, 0, 3}, {0, 0, -1}, INFINITY};
+    sadmm_environments_array out;
+    sadmm_ray_hit hit;
+    int32_t kept;
+    const int32_t one = 1;
+    switch (call) {
+    case 0: return sadmm_environments_bind(environments, SADMM_ARRAY_JOINT_WRENCH, SADMM_F32, &out);
+    case 1: return sadmm_environments_set(environments, SADMM_ARRAY_BODY_WRENCH, &one, 1, numbers);
+    case 2: return sadmm_environments_get(environments, SADMM_ARRAY_BODY_STATE, &one, 1, numbers);
+    case 3: return sadmm_environments_set(environments, SADMM_ARRAY_BODY_STATE, &one, 1, numbers);
+    case 4: return sadmm_environments_record_contacts(environments, true);
+    case 5: return sadmm_environments_keep(environments, 0, &kept);
+    case 6: return sadmm_environments_save(environments, 0, bytes, size, &size);
+    case 7: return sadmm_environments_cast_rays(environments, &one, 1, 1, &ray, NULL, &hit);
+    case 8: return sadmm_environments_get(environments, SADMM_ARRAY_JOINT_POSITION, &one, 1, numbers);
+    case 9: return sadmm_environments_set(environments, SADMM_ARRAY_JOINT_POSITION, &one, 1, numbers);
+    default: return sadmm_environments_reset(environments, NULL, 0, NULL);
+    }
+}
+
+/* Each of them, at each of its allocations: it fails and says so, or it is done; in the end all is as it was. */
+START_TEST(calls_survive_a_lack_of_memory)
+{
+    enum { CALLS = 11 };
+    struct machine m = build_machine();
+    sadmm_environments *environments = replicate(m.world, 2);
+    const size_t n = numbers_of(m.world, SADMM_ARRAY_BODY_STATE);
+    double *numbers = calloc(n + 6 * 64, sizeof *numbers), *states = calloc(4 * n, sizeof *states);
+    size_t size;
+    int failures = 0;
+    MUST_ALL(environments, sadmm_environments_step(environments, 30));
+    MUST_ALL(environments, sadmm_environments_get(environments, SADMM_ARRAY_BODY_STATE, NULL, 0, states));
+    MUST_ALL(environments, sadmm_environments_save(environments, 0, NULL, 0, &size));
+    void *bytes = malloc(size);
+    for (int call = 0; call < CALLS - 1; ++call) {
+        sadmm_status status = SADMM_ERROR_OUT_OF_MEMORY;
+        for (long allowed = 0; status != SADMM_OK; ++allowed) {
+            sadmm_test_fail_allocations_after(allowed);
+            status = ask(environments, call, numbers, bytes, size);
+            sadmm_test_fail_allocations_after(-1);
+            if (status == SADMM_OK) break;
+            ck_assert_msg(status == SADMM_ERROR_OUT_OF_MEMORY, "call %d: %s", call,
+                          sadmm_environments_message(environments));
+            ++failures;
+        }
+        if (call == 1) memset(numbers, 0, n * sizeof *numbers);
+    }
+    ck_assert_int_gt(failures, 5);
+    MUST_ALL(environments, sadmm_environments_get(environments, SADMM_ARRAY_BODY_STATE, NULL, 0, states + 2 * n));
+    expect_same(states, states + 2 * n, 2 * n, "after all", 0, 30);
+    MUST_ALL(environments, ask(environments, CALLS - 1, numbers, bytes, size));
+    free(numbers), free(states), free(bytes);
+    sadmm_environments_destroy(environments);
+    sadmm_world_destroy(m.world);
+}
+END_TEST
+
 /* Wherever memory runs out the call says so, nothing leaks, and with memory again all is as if it had not been called,
  * or as after a call that was right. */
 START_TEST(memory_may_run_out)
@@ -804,6 +864,7 @@ int main(void)
     tcase_add_test(cases, saves_and_settings_are_of_one_and_of_all);
     tcase_add_test(cases, single_precision_takes_nothing_from_inertia);
     tcase_add_test(cases, what_is_refused_changes_nothing);
+    tcase_add_test(cases, calls_survive_a_lack_of_memory);
     tcase_add_test(cases, memory_may_run_out);
     suite_add_tcase(suite, cases);
     return run_suite(suite);

@@ -118,8 +118,8 @@ SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments,
 /* From now on keep the contacts of the last step of each sadmm_environments_step, or (false) no more. */
 SADMM_API sadmm_status sadmm_environments_record_contacts(sadmm_environments *environments, bool record);
 /* *contacts: *count contacts of an environment, all that there are, as of sadmm_world_contacts; valid until the next
- * call that steps or resets, sets a state, or ends the recording; what is reset or set has none. Ids are those of the template.
- * Errors: INVALID_ARGUMENT (range), UNAVAILABLE (not recorded). */
+ * call that steps or resets, sets a state, or ends the recording; what is reset or set has none. Ids are those of the
+ * template. Errors: INVALID_ARGUMENT (range), UNAVAILABLE (not recorded). */
 SADMM_API sadmm_status sadmm_environments_contacts(sadmm_environments *environments, int32_t environment,
                                                    const sadmm_contact **contacts, int32_t *count);
 /* sadmm_world_cast_rays in each of the environments `which`: rays and hits, count x `each`; each: >= 0. Ids in the hits
