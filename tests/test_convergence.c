@@ -10,8 +10,8 @@
  *
  * What may be worse before it fails. A machine's instruction set changes the order of sums, by rounding:
  *     cold   10 % and 1: counts are the same with AVX2 and without, and go up by 3 %
- *     warm   half as much again: f32 differs by 20 % with AVX2 and without; heaps are chaotic, two runs that differ by
- *            rounding are different heaps: a factor of 2, where those differ by 1.4 */
+ *     warm   half as much again: f32 differs by 20 % with AVX2 and without
+ *     heaps  a factor of 2: two that differ by rounding are different heaps, and differ by 1.4 */
 #include <errno.h>
 
 #include "../bench/problem_set.h"
@@ -35,7 +35,7 @@ static const struct convergence_case cases[] = {
     {"bar", true, false, false},
     {"chain 1:1000", true, false, true}, /* `paper` does not come there */
     {"pyramid 10", true, false, false},
-    {"random pile 60", true, false, false},
+    {"random pile 60", true, true, false},
     {"incline, above", true, false, false},
     {"vertical_stacks:6", false, false, false},
     {"oblique_stacks:1", false, false, false},
@@ -177,7 +177,7 @@ END_TEST
 static double most(int variant, double before)
 {
     const struct convergence_case *of = &cases[variant / 4];
-    return of->cold ? 1 + 1.1 * before : of->heap ? 2 * before : 1.5 * before;
+    return of->heap ? 2 * before : of->cold ? 1 + 1.1 * before : 1.5 * before;
 }
 
 START_TEST(convergence_is_what_it_was)
