@@ -705,7 +705,7 @@ START_TEST(what_is_refused_changes_nothing)
     REFUSED(environments, "state = 1: was forgotten", sadmm_environments_forget(environments, kept));
     REFUSED(environments, "state = 0: must be one that was kept", sadmm_environments_forget(environments, 0));
     REFUSED(environments, "count = 4: must be in [0, 3]", sadmm_environments_reset(environments, far, 4, NULL));
-    REFUSED(environments, "must be one that can be set",
+    REFUSED(environments, "array = joint_wrench: must be one that can be set",
             sadmm_environments_set(environments, SADMM_ARRAY_JOINT_WRENCH, NULL, 0, targets));
     REFUSED(environments, "array = 99", sadmm_environments_get(environments, (sadmm_array)99, NULL, 0, targets));
     /* The last of them is refused, and none is set. */

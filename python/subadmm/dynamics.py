@@ -6,21 +6,7 @@ so are contacts."""
 
 import numpy as np
 
-
-def _turn(q, v):
-    w, u = q[..., :1], q[..., 1:]
-    t = 2 * np.cross(u, v)
-    return v + w * t + np.cross(u, t)
-
-
-def _mul(a, b):
-    w, v, s, u = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
-    return np.concatenate([w * s - (v * u).sum(-1, keepdims=True), w * u + s * v + np.cross(v, u)], -1)
-
-
-def _about(axis, angle):
-    half = angle[..., None] / 2
-    return np.concatenate([np.cos(half), np.sin(half) * axis], -1)
+from .rotations import multiply, of_vector, rotate
 
 
 def _cross(v, s):
@@ -71,14 +57,14 @@ class Motion:
                 raise ValueError("dynamics of robots on bodies that move by themselves (mocap) are not there")
             return np.broadcast_to(place, (n, 3)), np.broadcast_to(turn, (n, 4)), np.zeros((n, 6)), np.zeros((n, 6))
         x, o = self.poses[group.root]
-        return (x + _turn(o, place), _mul(o, np.broadcast_to(turn, o.shape)), self.velocities[group.root],
+        return (x + rotate(o, place), multiply(o, np.broadcast_to(turn, o.shape)), self.velocities[group.root],
                 self.accelerations[group.root])
 
     def _add(self, body, q):
         source = self.tree.source
         x, o, v, a = self._frame_of(int(source.body_parentid[body]))
-        x = x + _turn(o, source.body_pos[body])
-        o = _mul(o, np.broadcast_to(source.body_quat[body], o.shape))
+        x = x + rotate(o, source.body_pos[body])
+        o = multiply(o, np.broadcast_to(source.body_quat[body], o.shape))
         first = int(source.body_jntadr[body])
         for joint in range(first, first + int(source.body_jntnum[body])):
             x, o, v, a = self._turn(joint, q, x, o, v, a)
@@ -95,19 +81,19 @@ class Motion:
                 v = v + self.twists[:, dof + k] * self.qd[:, dof + k, None]
             return self._turn_freely(dof + 3, x, x, o, v, a)
         if kind == 1:
-            anchor = x + _turn(o, source.jnt_pos[joint])
+            anchor = x + rotate(o, source.jnt_pos[joint])
             turned = q[:, at : at + 4] / np.linalg.norm(q[:, at : at + 4], axis=-1, keepdims=True)
-            o = _mul(o, turned)
-            return self._turn_freely(dof, anchor - _turn(o, source.jnt_pos[joint]), anchor, o, v, a)
-        axis, by = _turn(o, source.jnt_axis[joint]), q[:, at] - source.qpos0[at]
+            o = multiply(o, turned)
+            return self._turn_freely(dof, anchor - rotate(o, source.jnt_pos[joint]), anchor, o, v, a)
+        axis, by = rotate(o, source.jnt_axis[joint]), q[:, at] - source.qpos0[at]
         twist = self.twists[:, dof]
         if kind == 2:
             twist[:, 3:] = axis
             x = x + axis * by[:, None]
         else:
-            anchor = x + _turn(o, source.jnt_pos[joint])
-            o = _mul(_about(axis, by), o)
-            x = anchor - _turn(o, source.jnt_pos[joint])
+            anchor = x + rotate(o, source.jnt_pos[joint])
+            o = multiply(of_vector(axis * by[:, None]), o)
+            x = anchor - rotate(o, source.jnt_pos[joint])
             twist[:, :3], twist[:, 3:] = axis, np.cross(anchor, axis)
         self.rates[:, dof] = _cross(v, twist)
         rate = self.qd[:, dof, None]
@@ -116,7 +102,7 @@ class Motion:
     def _turn_freely(self, dof, x, anchor, o, v, a):
         """About the body's own axes, which turn with it."""
         for k in range(3):
-            axis = _turn(o, np.eye(3)[k])
+            axis = rotate(o, np.eye(3)[k])
             self.twists[:, dof + k] = np.concatenate([axis, np.cross(anchor, axis)], -1)
             v = v + self.twists[:, dof + k] * self.qd[:, dof + k, None]
         for k in range(3):
@@ -131,9 +117,9 @@ class Motion:
         for body in self.tree.bodies:
             place, turn = self.tree.groups[body].inertial
             x, o = self.poses[body]
-            center, axes = x + _turn(o, place), _mul(o, np.broadcast_to(turn, o.shape))
+            center, axes = x + rotate(o, place), multiply(o, np.broadcast_to(turn, o.shape))
             own = numbers[:, self.tree.rows[body]]
-            columns = np.stack([_turn(axes, np.eye(3)[k]) for k in range(3)], -1)
+            columns = np.stack([rotate(axes, np.eye(3)[k]) for k in range(3)], -1)
             about = np.einsum("nik,nk,njk->nij", columns, own[:, 1:], columns)
             across = np.zeros((len(x), 3, 3))  # center x
             for i, j, k, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 0, 2, 1), (1, 2, 0, -1), (2, 0, 1, -1), (2, 1, 0, 1)):
@@ -176,7 +162,7 @@ class Motion:
         if group.kind != "dynamic":
             return out
         x, o, _, _ = self._frame_of(index)
-        at = x + _turn(o, point)
+        at = x + rotate(o, point)
         dofs = self.tree.above[group.root]
         part = self.twists[:, dofs]
         out[:, :3, dofs] = (part[..., 3:] + np.cross(part[..., :3], at[:, None])).swapaxes(1, 2)

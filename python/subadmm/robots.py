@@ -9,45 +9,10 @@ from .environments import Environments
 from .given import numbers, point
 from .importing.actuators import FORCE_SPEED
 from .importing.model import name_of
+from .rotations import conjugate, multiply, of_vector, rotate, to_vector, unit
 
 #: Positions, velocities and accelerations that may be given.
 MOST = 1e9
-
-# ---- quaternions w x y z in the last axis --------------------------------------------------------------------------
-
-
-def _mul(a, b):
-    """Turn by b, then by a."""
-    w, v, s, u = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
-    return np.concatenate([w * s - (v * u).sum(-1, keepdims=True), w * u + s * v + np.cross(v, u)], -1)
-
-
-def _back(q):
-    return q * np.array([1.0, -1, -1, -1])
-
-
-def _turn(q, v):
-    w, u = q[..., :1], q[..., 1:]
-    t = 2 * np.cross(u, v)
-    return v + w * t + np.cross(u, t)
-
-
-def _of_vector(v):
-    angle = np.linalg.norm(v, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * v], -1)
-
-
-def _to_vector(q):
-    """A rotation vector of at most half a turn."""
-    q = np.where(q[..., :1] < 0, -q, q)
-    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scale = np.where(sine > 1e-12, 2 * np.arctan2(sine, q[..., :1]) / sine, 2.0)
-    return scale * q[..., 1:]
-
-
-def _unit(q):
-    return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 class _Free:
@@ -125,11 +90,11 @@ class Robots(Environments):
         q, _, row, coordinate, sign, offset = self._hinges
         out[:, q] = sign * self._position[:, row, coordinate] + offset
         for at, _, row, turn in self._balls:
-            out[:, at] = _of_vector(_turn(turn, self._position[:, row, 3:]))
+            out[:, at] = of_vector(rotate(turn, self._position[:, row, 3:]))
         for free in self._free:
             turned = self._state[:, free.body, 3:7]
             out[:, free.q] = np.concatenate(
-                [self._state[:, free.body, :3] + _turn(turned, free.place), _mul(turned, free.turn)], -1
+                [self._state[:, free.body, :3] + rotate(turned, free.place), multiply(turned, free.turn)], -1
             )
         return out
 
@@ -140,12 +105,12 @@ class Robots(Environments):
         _, qd, row, coordinate, sign, _ = self._hinges
         out[:, qd] = sign * self._speed[:, row, coordinate]
         for _, at, row, turn in self._balls:
-            file = _of_vector(_turn(turn, self._position[:, row, 3:]))
-            out[:, at] = _turn(_back(file), _turn(turn, self._speed[:, row, 3:]))
+            file = of_vector(rotate(turn, self._position[:, row, 3:]))
+            out[:, at] = rotate(conjugate(file), rotate(turn, self._speed[:, row, 3:]))
         for free in self._free:
             turned, linear, angular = np.split(self._state[:, free.body, 3:], (4, 7), -1)
             out[:, free.qd] = np.concatenate(
-                [linear + np.cross(angular, _turn(turned, free.place)), _turn(_back(_mul(turned, free.turn)), angular)],
+                [linear + np.cross(angular, rotate(turned, free.place)), rotate(conjugate(multiply(turned, free.turn)), angular)],
                 -1,
             )
         return out
@@ -180,9 +145,9 @@ class Robots(Environments):
         position[:, row, coordinate] = sign * (q[:, at] - offset)
         speed[:, row, coordinate] = sign * qd[:, of]
         for at, of, row, turn in self._balls:
-            file = _unit(q[:, at])
-            position[:, row, 3:] = _turn(_back(np.asarray(turn)), _to_vector(file))
-            speed[:, row, 3:] = _turn(_back(np.asarray(turn)), _turn(file, qd[:, of]))
+            file = unit(q[:, at])
+            position[:, row, 3:] = rotate(conjugate(turn), to_vector(file))
+            speed[:, row, 3:] = rotate(conjugate(turn), rotate(file, qd[:, of]))
         if position.shape[1]:
             core.set("joint_position", position, rows)
             core.set("joint_speed", speed, rows)
@@ -196,21 +161,21 @@ class Robots(Environments):
     def _move(state, free, q, qd):
         """What is joined to a free joint's body moves with it, as a rigid body."""
         old = state[:, free.body].copy()
-        turned = _unit(q[:, 3:])
-        orientation = _mul(turned, _back(np.asarray(free.turn)))
-        center = q[:, :3] - _turn(orientation, free.place)
-        angular = _turn(turned, qd[:, 3:])
+        turned = unit(q[:, 3:])
+        orientation = multiply(turned, conjugate(free.turn))
+        center = q[:, :3] - rotate(orientation, free.place)
+        angular = rotate(turned, qd[:, 3:])
         linear = qd[:, :3] - np.cross(angular, q[:, :3] - center)
-        turn = _mul(orientation, _back(old[:, 3:7]))[:, None]
+        turn = multiply(orientation, conjugate(old[:, 3:7]))[:, None]
         tree = state[:, free.tree]
         arm = tree[..., :3] - old[:, None, :3]
         relative = tree[..., 7:10] - old[:, None, 7:10] - np.cross(old[:, None, 10:], arm)
         spin = tree[..., 10:] - old[:, None, 10:]
-        arm = _turn(turn, arm)
+        arm = rotate(turn, arm)
         tree[..., :3] = center[:, None] + arm
-        tree[..., 3:7] = _unit(_mul(turn, tree[..., 3:7]))
-        tree[..., 7:10] = linear[:, None] + np.cross(angular[:, None], arm) + _turn(turn, relative)
-        tree[..., 10:] = angular[:, None] + _turn(turn, spin)
+        tree[..., 3:7] = unit(multiply(turn, tree[..., 3:7]))
+        tree[..., 7:10] = linear[:, None] + np.cross(angular[:, None], arm) + rotate(turn, relative)
+        tree[..., 10:] = angular[:, None] + rotate(turn, spin)
         state[:, free.tree] = tree
 
 
@@ -227,7 +192,7 @@ class Robots(Environments):
         (count x 3, world), orientations (count x 4, w x y z)."""
         row, inner, _ = self._mounted(body, place, turn)
         x, o = self._state[:, row, :3], self._state[:, row, 3:7]
-        return x + _turn(o, inner[0]), _mul(o, np.broadcast_to(inner[1], o.shape))
+        return x + rotate(o, inner[0]), multiply(o, np.broadcast_to(inner[1], o.shape))
 
     def _mounted(self, body, place, turn):
         """The row of the world's body that has a frame, its pose there, and the row's orientation."""
@@ -239,7 +204,7 @@ class Robots(Environments):
         if np.linalg.norm(turn) < 1e-6:
             raise ValueError("turn: must be a quaternion, not 0")
         outer = group.frame_in_body(index)
-        inner = outer[0] + _turn(outer[1], place), _mul(outer[1], turn / np.linalg.norm(turn))
+        inner = outer[0] + rotate(outer[1], place), multiply(outer[1], turn / np.linalg.norm(turn))
         row = self.loaded.world.bodies.index(group.body)
         return row, inner, self._state[:, row, 3:7]
 
@@ -249,11 +214,11 @@ class Robots(Environments):
         axes. The acceleration is the mean of the last (sub-)step."""
         row, inner, o = self._mounted(body, place, turn)
         acceleration = self.array("body_acceleration")[:, row]
-        spin, arm = self._state[:, row, 10:], _turn(o, inner[0])
+        spin, arm = self._state[:, row, 10:], rotate(o, inner[0])
         gravity = self._core.get("gravity", None)[:, 0]
         there = acceleration[:, :3] + np.cross(acceleration[:, 3:], arm) + np.cross(spin, np.cross(spin, arm)) - gravity
-        back = _back(_mul(o, np.broadcast_to(inner[1], o.shape)))
-        return _turn(back, spin), _turn(back, there)
+        back = conjugate(multiply(o, np.broadcast_to(inner[1], o.shape)))
+        return rotate(back, spin), rotate(back, there)
 
     # ---- dynamics --------------------------------------------------------------------------------------------------
 

@@ -16,3 +16,29 @@ def rotate(q, v):
     axis = q[..., 1:]
     across = 2 * np.cross(axis, v)
     return v + q[..., :1] * across + np.cross(axis, across)
+
+
+def conjugate(q):
+    """The turn back."""
+    return np.asarray(q) * np.array([1.0, -1, -1, -1])
+
+
+def unit(q):
+    """Of length 1."""
+    q = np.asarray(q, np.float64)
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+def of_vector(v):
+    """Of rotation vectors (... x 3), rad."""
+    v = np.asarray(v, np.float64)
+    half = np.linalg.norm(v, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.cos(half), np.sinc(half / np.pi) / 2 * v], axis=-1)
+
+
+def to_vector(q):
+    """Rotation vectors (... x 3), of at most pi."""
+    q = np.asarray(q, np.float64)
+    q = np.where(q[..., :1] < 0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    return 2 * np.arctan2(sine, q[..., :1]) / np.maximum(sine, 1e-300) * q[..., 1:]

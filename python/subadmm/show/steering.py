@@ -2,7 +2,7 @@
 import numpy as np
 
 from ..given import point, real, whole
-from ..rotations import multiply, rotate
+from ..rotations import multiply, of_vector, rotate, to_vector, unit
 from .chains import Finger, driven_chains, opposing, opposing_thumb
 
 _RATE = 40.0  # 1/s: targets go after what the user asks for, which comes in jumps, as a critically damped spring would
@@ -13,23 +13,6 @@ def _follow(offset, speed, dt):
     both = (speed + _RATE * offset) * dt
     fade = np.exp(-_RATE * dt)
     return (offset + both) * fade, (speed - _RATE * both) * fade
-
-
-def _unit(q):
-    q = np.array(q, float)
-    return q / np.linalg.norm(q)
-
-
-def _vector(q):
-    """The rotation vector of a unit quaternion, of at most pi."""
-    size = np.linalg.norm(q[1:])
-    return 2 * np.arctan2(size, abs(q[0])) * np.copysign(1, q[0]) / max(size, 1e-300) * q[1:]
-
-
-def _turn(vector):
-    """The quaternion of a rotation vector."""
-    angle = np.linalg.norm(vector)
-    return np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) / max(angle, 1e-300) * np.asarray(vector)])
 
 
 class Lead:
@@ -48,19 +31,19 @@ class Lead:
         position, orientation = point("position", position), point("orientation", orientation, 4)
         if not np.linalg.norm(orientation) > 1e-6:
             raise ValueError(f"orientation: {orientation}; must be a quaternion, not 0")
-        self.position, self.orientation = position, _unit(orientation)
+        self.position, self.orientation = position, unit(orientation)
 
     def step(self, dt):
         """Bring the target on by a step."""
         position, orientation = self.position, self.orientation
         offset, self._speed = _follow(self.at - position, self._speed, dt)
-        away = _vector(multiply(self.turn, orientation * [1, -1, -1, -1]))
+        away = to_vector(multiply(self.turn, orientation * [1, -1, -1, -1]))
         angle, self._spin = _follow(away, self._spin, dt)
-        at, turn = position + offset, multiply(_turn(angle), orientation)
-        spin = _vector(multiply(turn, self.turn * [1, -1, -1, -1])) / dt
+        at, turn = position + offset, multiply(of_vector(angle), orientation)
+        spin = to_vector(multiply(turn, self.turn * [1, -1, -1, -1])) / dt
         self.coupling.set_target(self.at.tolist(), self.turn.tolist(),
                                  [*((at - self.at) / dt).tolist(), *spin.tolist()])
-        self.at, self.turn = at, _unit(turn)
+        self.at, self.turn = at, unit(turn)
 
     def grip(self):
         """Where the frame on the body is, m, world."""

@@ -18,7 +18,7 @@ extern "C" {
     F(X, SADMM_BACKEND_CPU, "cpu")   \
     F(X, SADMM_BACKEND_CUDA, "cuda")
 #define SADMM_PRECISIONS(F, X) F(X, SADMM_F32, "f32") F(X, SADMM_F64, "f64")
-#define SADMM_METHODS(F, X)    F(X, SADMM_METHOD_PAPER, "paper") F(X, SADMM_METHOD_FAST, "fast")
+#define SADMM_METHODS(F, X) F(X, SADMM_METHOD_PAPER, "paper") F(X, SADMM_METHOD_FAST, "fast")
 #define SADMM_STEP_ERRORS(F, X)                 \
     F(X, SADMM_STEP_ERROR_NONE, "none")         \
     F(X, SADMM_STEP_ERROR_LAW, "law")           \

@@ -7,6 +7,7 @@
 #include "core/base/check.h"
 #include "core/base/memory.h"
 #include "core/base/names.h"
+#include "environment_contacts.h"
 
 /* Numbers of an environment. */
 static size_t numbers_of(const struct sadmm_environments *environments, sadmm_array array)
@@ -56,6 +57,12 @@ static void mend_inertia(double *row)
     }
 }
 
+static void mend(const struct sadmm_bound_array *bound, double *numbers)
+{
+    if (bound->precision != SADMM_F32 || bound->array != SADMM_ARRAY_BODY_INERTIA) return;
+    for (size_t k = 0; k < bound->numbers; k += 4) mend_inertia(numbers + k);
+}
+
 static void load_numbers(const struct sadmm_bound_array *bound, int32_t environment, double *out)
 {
     const size_t n = bound->numbers, first = n * (size_t)environment;
@@ -64,7 +71,7 @@ static void load_numbers(const struct sadmm_bound_array *bound, int32_t environm
         return;
     }
     for (size_t k = 0; k < n; ++k) out[k] = (double)((const float *)bound->values)[first + k];
-    for (size_t k = 0; bound->array == SADMM_ARRAY_BODY_INERTIA && k < n; k += 4) mend_inertia(out + k);
+    mend(bound, out);
 }
 
 static void store_numbers(const struct sadmm_bound_array *bound, int32_t environment, const double *numbers)
@@ -135,18 +142,6 @@ sadmm_status sadmm_environments_read_good_inputs(struct sadmm_environments *envi
     return read_inputs(environments, worker, environment, -1, true);
 }
 
-/* All that the worker's world has; none after a state was loaded. */
-static sadmm_status keep_contacts(struct sadmm_environment_worker *worker, struct sadmm_environment_contacts *kept)
-{
-    const int32_t count = sadmm_world_contact_count(worker->world);
-    kept->count = 0;
-    if (count == 0) return SADMM_OK;
-    if (!SADMM_GROW(kept->list, 0, (size_t)count)) return sadmm_fail_memory(&worker->world->error, "contacts");
-    TRY(sadmm_world_contacts(worker->world, 0, count, kept->list));
-    kept->count = count;
-    return SADMM_OK;
-}
-
 sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environments,
                                               struct sadmm_environment_worker *worker, int32_t environment)
 {
@@ -156,7 +151,7 @@ sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environ
         TRY(get_all(worker->world, bound->array, worker->numbers));
         store_numbers(bound, environment, worker->numbers);
     }
-    return environments->contacts ? keep_contacts(worker, &environments->contacts[environment]) : SADMM_OK;
+    return sadmm_environments_keep_contacts(environments, worker, environment);
 }
 
 /* ---- binding ----------------------------------------------------------------------------------------------------- */
@@ -283,12 +278,9 @@ static sadmm_status try_one(struct sadmm_environments *environments, struct sadm
     TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
     if (!rows->bound) return set_all(worker->world, rows->array, given);
     TRY(read_inputs(environments, worker, environment, (int)rows->array, true));
-    memcpy(worker->numbers, given, rows->numbers * sizeof *given);
-    if (rows->bound->precision == SADMM_F32) /* as it is stored */
-        for (size_t k = 0; k < rows->numbers; ++k) worker->numbers[k] = (double)(float)given[k];
-    for (size_t k = 0;
-         rows->bound->precision == SADMM_F32 && rows->array == SADMM_ARRAY_BODY_INERTIA && k < rows->numbers; k += 4)
-        mend_inertia(worker->numbers + k);
+    const bool single = rows->bound->precision == SADMM_F32; /* as it will be stored */
+    for (size_t k = 0; k < rows->numbers; ++k) worker->numbers[k] = single ? (double)(float)given[k] : given[k];
+    mend(rows->bound, worker->numbers);
     return set_all(worker->world, rows->array, worker->numbers);
 }
 
@@ -314,8 +306,8 @@ sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_arra
     struct rows_of rows = {.array = array, .numbers = numbers_of(environments, array), .in = values};
     if (rows.numbers > 0 && count > 0) TRY(sadmm_check_given(values, "values", &environments->error));
     if (!sadmm_array_is_settable(array))
-        return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "array = %d: must be one that can be set",
-                          (int)array);
+        return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "array = %s: must be one that can be set",
+                          sadmm_array_name(array));
     /* From here on every environment has its own, so that what a worker tries is of no other one. */
     if (sadmm_environments_is_input(array)) {
         const struct sadmm_bound_array *before = bound_of(environments, array, -1);
@@ -323,73 +315,4 @@ sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_arra
     }
     TRY(sadmm_environments_each(environments, which, count, try_one, &rows));
     return sadmm_environments_each(environments, which, count, set_one, &rows);
-}
-
-/* ---- contacts and rays ------------------------------------------------------------------------------------------- */
-
-sadmm_status sadmm_environments_record_contacts(sadmm_environments *environments, bool record)
-{
-    TRY(sadmm_check_given(environments, "environments", NULL));
-    if (record == (environments->contacts != NULL)) return SADMM_OK;
-    if (!record) {
-        sadmm_environments_free_contacts(environments);
-        return SADMM_OK;
-    }
-    environments->contacts =
-        (struct sadmm_environment_contacts *)sadmm_alloc((size_t)environments->count, sizeof *environments->contacts);
-    return environments->contacts ? SADMM_OK : sadmm_fail_memory(&environments->error, "contacts of environments");
-}
-
-void sadmm_environments_free_contacts(struct sadmm_environments *environments)
-{
-    for (int32_t e = 0; environments->contacts && e < environments->count; ++e)
-        sadmm_free(environments->contacts[e].list);
-    sadmm_free(environments->contacts);
-    environments->contacts = NULL;
-}
-
-sadmm_status sadmm_environments_contacts(sadmm_environments *environments, int32_t environment,
-                                         const sadmm_contact **contacts, int32_t *count)
-{
-    TRY(sadmm_check_given(environments, "environments", NULL));
-    struct sadmm_error *error = &environments->error;
-    TRY(sadmm_check_given(contacts, "contacts", error));
-    TRY(sadmm_check_given(count, "count", error));
-    TRY(sadmm_environments_check(environments, "environment", environment));
-    if (!environments->contacts) return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "contacts: are not recorded");
-    *contacts = environments->contacts[environment].list;
-    *count = environments->contacts[environment].count;
-    return SADMM_OK;
-}
-
-struct casting {
-    int32_t each;
-    const sadmm_ray *rays;
-    const sadmm_query_filter *filter;
-    sadmm_ray_hit *hits;
-};
-
-static sadmm_status cast_rays(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
-                              int32_t environment, int32_t place, void *argument)
-{
-    const struct casting *casting = (const struct casting *)argument;
-    const size_t first = (size_t)casting->each * (size_t)place;
-    TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
-    return sadmm_world_cast_rays(worker->world, casting->each, casting->rays + first, casting->filter,
-                                 casting->hits + first);
-}
-
-sadmm_status sadmm_environments_cast_rays(sadmm_environments *environments, const int32_t *which, int32_t count,
-                                          int32_t each, const sadmm_ray *rays, const sadmm_query_filter *filter,
-                                          sadmm_ray_hit *hits)
-{
-    TRY(sadmm_check_given(environments, "environments", NULL));
-    struct sadmm_error *error = &environments->error;
-    struct casting casting = {each, rays, filter, hits};
-    TRY(sadmm_environments_check_which(environments, which, &count));
-    if (each < 0) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "each = %d: must be >= 0", each);
-    if (each == 0) return SADMM_OK;
-    TRY(sadmm_check_given(rays, "rays", error));
-    TRY(sadmm_check_given(hits, "hits", error));
-    return sadmm_environments_each(environments, which, count, cast_rays, &casting);
 }

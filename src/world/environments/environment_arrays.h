@@ -14,7 +14,5 @@ sadmm_status sadmm_environments_read_good_inputs(struct sadmm_environments *envi
 /* The other arrays that are bound, and contacts where they are recorded, are those of the worker's world. */
 sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environments,
                                               struct sadmm_environment_worker *worker, int32_t environment);
-/* No contacts are recorded any more. */
-void sadmm_environments_free_contacts(struct sadmm_environments *environments);
 
 #endif

@@ -9,6 +9,7 @@
 #include "core/base/memory.h"
 #include "core/model/settings.h"
 #include "environment_arrays.h"
+#include "environment_contacts.h"
 #include "subadmm/save.h"
 
 enum { MOST_ENVIRONMENTS = 1 << 20 };

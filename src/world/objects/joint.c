@@ -156,13 +156,6 @@ static const struct sadmm_rigid *pose_of(const sadmm_world *world, int32_t slot)
     return slot >= 0 ? &world->bodies[slot].rigid : NULL;
 }
 
-static struct joint_geometry geometry_now(const sadmm_world *world, const struct sadmm_world_joint *joint)
-{
-    struct joint_end ends[2];
-    for (int s = 0; s < 2; ++s) ends[s] = joint_end_on(&joint->frame[s], pose_of(world, joint->body[s]));
-    return joint_geometry_of(&ends[0], &ends[1], joint->def.locks, joint_is_radial(joint->def.kind));
-}
-
 sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *given, sadmm_joint_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
@@ -180,7 +173,7 @@ sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *gi
     TRY(sadmm_world_detach(world));
     set_frames(&made);
     if (def->length == -1 && joint_is_radial(def->kind)) {
-        made.def.length = geometry_now(world, &made).value[0];
+        made.def.length = sadmm_world_joint_geometry(world, &made).value[0];
         TRY(check_length("def->length (-1: as it is)", made.def.length, error));
     }
     TRY(sadmm_world_insert_joint(world, &made, &slot));

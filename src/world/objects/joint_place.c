@@ -23,7 +23,7 @@ static struct joint_end end_of(const sadmm_world *world, const struct sadmm_worl
     return joint_end_on(&joint->frame[side], body >= 0 ? &world->bodies[body].rigid : NULL);
 }
 
-static struct joint_geometry geometry_of(const sadmm_world *world, const struct sadmm_world_joint *joint)
+struct joint_geometry sadmm_world_joint_geometry(const sadmm_world *world, const struct sadmm_world_joint *joint)
 {
     const struct joint_end a = end_of(world, joint, 0), b = end_of(world, joint, 1);
     return joint_geometry_of(&a, &b, joint->def.locks, joint_is_radial(joint->def.kind));
@@ -33,7 +33,7 @@ void sadmm_world_read_joint_motion(const sadmm_world *world, const struct sadmm_
                                    double speed[6])
 {
     static const double still[6];
-    const struct joint_geometry geometry = geometry_of(world, joint);
+    const struct joint_geometry geometry = sadmm_world_joint_geometry(world, joint);
     const double *v[2];
     for (int s = 0; s < 2; ++s) v[s] = joint->body[s] >= 0 ? world->bodies[joint->body[s]].rigid.velocity : still;
     for (int k = 0; k < JOINT_COORDINATES; ++k) {
@@ -197,7 +197,7 @@ static struct twist twist_of(const sadmm_world *world, int32_t body)
 static struct twist moving_twist(const sadmm_world *world, const struct sadmm_world_joint *joint, int side,
                                  const double speed[6])
 {
-    const struct joint_geometry g = geometry_of(world, joint);
+    const struct joint_geometry g = sadmm_world_joint_geometry(world, joint);
     const struct twist other = twist_of(world, joint->body[1 - side]);
     const vec3 arm = side ? g.arm_b : g.arm_a, other_arm = side ? g.arm_a : g.arm_b;
     const mat3 axes = {{g.axis[3], g.axis[4], g.axis[5]}};

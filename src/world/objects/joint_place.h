@@ -4,6 +4,8 @@
 
 #include "world/state/world_state.h"
 
+/* Of a joint as its bodies are now. */
+struct joint_geometry sadmm_world_joint_geometry(const sadmm_world *world, const struct sadmm_world_joint *joint);
 /* Positions and speeds of a joint, as in sadmm_joint_state. */
 void sadmm_world_read_joint_motion(const sadmm_world *world, const struct sadmm_world_joint *joint, double position[6],
                                    double speed[6]);

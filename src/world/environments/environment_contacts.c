@@ -1,0 +1,86 @@
+/* What is looked at of environments: contacts that are recorded, rays. */
+#include "environment_contacts.h"
+
+#include "core/base/check.h"
+#include "core/base/memory.h"
+
+sadmm_status sadmm_environments_keep_contacts(struct sadmm_environments *environments,
+                                              struct sadmm_environment_worker *worker, int32_t environment)
+{
+    if (!environments->contacts) return SADMM_OK;
+    struct sadmm_environment_contacts *kept = &environments->contacts[environment];
+    const int32_t count = sadmm_world_contact_count(worker->world);
+    kept->count = 0;
+    if (count == 0) return SADMM_OK;
+    if (!SADMM_GROW(kept->list, 0, (size_t)count)) return sadmm_fail_memory(&worker->world->error, "contacts");
+    TRY(sadmm_world_contacts(worker->world, 0, count, kept->list));
+    kept->count = count;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_environments_record_contacts(sadmm_environments *environments, bool record)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    if (record == (environments->contacts != NULL)) return SADMM_OK;
+    if (!record) {
+        sadmm_environments_free_contacts(environments);
+        return SADMM_OK;
+    }
+    environments->contacts =
+        (struct sadmm_environment_contacts *)sadmm_alloc((size_t)environments->count, sizeof *environments->contacts);
+    return environments->contacts ? SADMM_OK : sadmm_fail_memory(&environments->error, "contacts of environments");
+}
+
+void sadmm_environments_free_contacts(struct sadmm_environments *environments)
+{
+    for (int32_t e = 0; environments->contacts && e < environments->count; ++e)
+        sadmm_free(environments->contacts[e].list);
+    sadmm_free(environments->contacts);
+    environments->contacts = NULL;
+}
+
+sadmm_status sadmm_environments_contacts(sadmm_environments *environments, int32_t environment,
+                                         const sadmm_contact **contacts, int32_t *count)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    struct sadmm_error *error = &environments->error;
+    TRY(sadmm_check_given(contacts, "contacts", error));
+    TRY(sadmm_check_given(count, "count", error));
+    TRY(sadmm_environments_check(environments, "environment", environment));
+    if (!environments->contacts) return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "contacts: are not recorded");
+    *contacts = environments->contacts[environment].list;
+    *count = environments->contacts[environment].count;
+    return SADMM_OK;
+}
+
+struct casting {
+    int32_t each;
+    const sadmm_ray *rays;
+    const sadmm_query_filter *filter;
+    sadmm_ray_hit *hits;
+};
+
+static sadmm_status cast_rays(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                              int32_t environment, int32_t place, void *argument)
+{
+    const struct casting *casting = (const struct casting *)argument;
+    const size_t first = (size_t)casting->each * (size_t)place;
+    TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
+    return sadmm_world_cast_rays(worker->world, casting->each, casting->rays + first, casting->filter,
+                                 casting->hits + first);
+}
+
+sadmm_status sadmm_environments_cast_rays(sadmm_environments *environments, const int32_t *which, int32_t count,
+                                          int32_t each, const sadmm_ray *rays, const sadmm_query_filter *filter,
+                                          sadmm_ray_hit *hits)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    struct sadmm_error *error = &environments->error;
+    struct casting casting = {each, rays, filter, hits};
+    TRY(sadmm_environments_check_which(environments, which, &count));
+    if (each < 0) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "each = %d: must be >= 0", each);
+    if (each == 0) return SADMM_OK;
+    TRY(sadmm_check_given(rays, "rays", error));
+    TRY(sadmm_check_given(hits, "hits", error));
+    return sadmm_environments_each(environments, which, count, cast_rays, &casting);
+}
