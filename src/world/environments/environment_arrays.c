@@ -142,6 +142,74 @@ sadmm_status sadmm_environments_read_good_inputs(struct sadmm_environments *envi
     return read_inputs(environments, worker, environment, -1, true);
 }
 
+/* Numbers of an environment that the merged world does not have yet. */
+static sadmm_status give_merged(struct sadmm_environments *environments, struct sadmm_bound_array *bound,
+                                int32_t environment, const double *numbers)
+{
+    sadmm_world *world = environments->merged.world;
+    double *given = bound->given + bound->numbers * (size_t)environment;
+    const int32_t rows = sadmm_environments_rows(environments, bound->array);
+    if (memcmp(given, numbers, bound->numbers * sizeof *numbers) == 0) return SADMM_OK;
+    const sadmm_status status = sadmm_world_set_array(world, bound->array, rows * environment, rows, numbers);
+    if (status == SADMM_OK) memcpy(given, numbers, bound->numbers * sizeof *numbers);
+    else {
+        const struct sadmm_error cause = world->error;
+        (void)sadmm_fail(&world->error, status, "%s: %s", sadmm_array_name(bound->array), cause.message);
+    }
+    return status;
+}
+
+/* Limits are checked against each other: where one is to be another one, both are set anew. */
+static void open_merged_limits(struct sadmm_environments *environments, int32_t environment)
+{
+    static const sadmm_array limits[2] = {SADMM_ARRAY_JOINT_LOWER, SADMM_ARRAY_JOINT_UPPER};
+    struct sadmm_bound_array *bound[2];
+    sadmm_world *world = environments->merged.world;
+    bool differ = false;
+    for (int k = 0; k < 2; ++k) {
+        bound[k] = bound_of(environments, limits[k], -1);
+        if (!bound[k]) return;
+        load_numbers(bound[k], environment, environments->worker[0].numbers);
+        differ = differ || memcmp(bound[k]->given + bound[k]->numbers * (size_t)environment,
+                                  environments->worker[0].numbers, bound[k]->numbers * sizeof(double)) != 0;
+    }
+    if (!differ) return;
+    const size_t joints = (size_t)environments->merged.joints.count;
+    for (size_t i = 0; i < joints; ++i) {
+        sadmm_joint_def *def = &world->joints[joints * (size_t)environment + i].def;
+        for (int k = 0; k < JOINT_COORDINATES; ++k)
+            if (!(def->locks >> k & 1)) def->coordinates[k].lower = -INFINITY, def->coordinates[k].upper = INFINITY;
+    }
+    for (int k = 0; k < 2; ++k)
+        for (size_t i = 0; i < bound[k]->numbers; ++i)
+            bound[k]->given[bound[k]->numbers * (size_t)environment + i] = NAN; /* it has none of them now */
+}
+
+sadmm_status sadmm_environments_read_merged_inputs(struct sadmm_environments *environments, int32_t environment)
+{
+    struct sadmm_environment_worker *worker = &environments->worker[0];
+    open_merged_limits(environments, environment);
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        struct sadmm_bound_array *bound = &environments->bound[k];
+        if (!bound->given) continue;
+        load_numbers(bound, environment, worker->numbers);
+        TRY(give_merged(environments, bound, environment, worker->numbers));
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_environments_give_template_inputs(struct sadmm_environments *environments, int32_t environment)
+{
+    for (int pass = 0; pass < 2; ++pass) /* limits, one against the other */
+        for (size_t k = 0; k < environments->bound_count; ++k) {
+            struct sadmm_bound_array *bound = &environments->bound[k];
+            if (!bound->given) continue;
+            const sadmm_status status = give_merged(environments, bound, environment, bound->start);
+            if (pass > 0 || status != SADMM_ERROR_INVALID_ARGUMENT) TRY(status);
+        }
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environments,
                                               struct sadmm_environment_worker *worker, int32_t environment)
 {
@@ -151,7 +219,7 @@ sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environ
         TRY(get_all(worker->world, bound->array, worker->numbers));
         store_numbers(bound, environment, worker->numbers);
     }
-    return sadmm_environments_keep_contacts(environments, worker, environment);
+    return environments->merged.world ? SADMM_OK : sadmm_environments_keep_contacts(environments, worker, environment);
 }
 
 /* ---- binding ----------------------------------------------------------------------------------------------------- */
@@ -166,7 +234,7 @@ static sadmm_status read_environment(struct sadmm_environments *environments, st
         load_numbers(bound, environment, values);
         return SADMM_OK;
     }
-    TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
+    TRY(sadmm_environments_load(environments, worker, environment));
     return get_all(worker->world, array, values);
 }
 
@@ -202,17 +270,27 @@ static sadmm_status bind(struct sadmm_environments *environments, sadmm_array ar
                           sadmm_precision_names[precision], sadmm_precision_names[(*out)->precision],
                           sadmm_array_name(array));
     if (*out) return SADMM_OK;
+    if (environments->merged.world && array == SADMM_ARRAY_GRAVITY)
+        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
+                          "array = gravity: environments on CUDA have one gravity, that of the settings");
     if (!SADMM_GROW(environments->bound, n, n + 1)) return sadmm_fail_memory(error, "an array of environments");
-    struct sadmm_bound_array fresh = {array, precision, numbers_of(environments, array), NULL, NULL};
+    struct sadmm_bound_array fresh = {array, precision, numbers_of(environments, array), NULL, NULL, NULL};
     fresh.values = sadmm_alloc((size_t)environments->count,
                                fresh.numbers * (precision == SADMM_F64 ? sizeof(double) : sizeof(float)));
     fresh.start = (double *)sadmm_alloc(input ? fresh.numbers : 0, sizeof *fresh.start);
-    sadmm_status status = fresh.values && fresh.start ? SADMM_OK : sadmm_fail_memory(error, "an array of environments");
+    const bool merged = input && environments->merged.world;
+    if (merged) fresh.given = (double *)sadmm_alloc((size_t)environments->count, fresh.numbers * sizeof *fresh.given);
+    sadmm_status status = fresh.values && fresh.start && (!merged || fresh.given)
+                              ? SADMM_OK
+                              : sadmm_fail_memory(error, "an array of environments");
     if (status == SADMM_OK && input) status = read_template(environments, array, fresh.start);
+    for (size_t e = 0; status == SADMM_OK && merged && e < (size_t)environments->count; ++e)
+        memcpy(fresh.given + fresh.numbers * e, fresh.start, fresh.numbers * sizeof *fresh.start);
     if (status == SADMM_OK) status = sadmm_environments_each(environments, NULL, environments->count, fill, &fresh);
     if (status != SADMM_OK) {
         sadmm_free(fresh.values);
         sadmm_free(fresh.start);
+        sadmm_free(fresh.given);
         return status;
     }
     environments->bound[n] = fresh;
@@ -275,7 +353,7 @@ static sadmm_status try_one(struct sadmm_environments *environments, struct sadm
 {
     const struct rows_of *rows = (const struct rows_of *)argument;
     const double *given = rows->in + rows->numbers * (size_t)place;
-    TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
+    TRY(sadmm_environments_load(environments, worker, environment));
     if (!rows->bound) return set_all(worker->world, rows->array, given);
     TRY(read_inputs(environments, worker, environment, (int)rows->array, true));
     const bool single = rows->bound->precision == SADMM_F32; /* as it will be stored */
@@ -293,7 +371,7 @@ static sadmm_status set_one(struct sadmm_environments *environments, struct sadm
         return SADMM_OK;
     }
     TRY(try_one(environments, worker, environment, place, argument));
-    TRY(sadmm_environment_state_store(worker->world, &environments->states[environment]));
+    TRY(sadmm_environments_store(environments, worker, environment));
     return sadmm_environments_write_outputs(environments, worker, environment);
 }
 

@@ -11,6 +11,9 @@ sadmm_status sadmm_environments_read_inputs(struct sadmm_environments *environme
 /* The same; an array that is refused is the template's. */
 sadmm_status sadmm_environments_read_good_inputs(struct sadmm_environments *environments,
                                                  struct sadmm_environment_worker *worker, int32_t environment);
+/* An environment of the merged world has what its input arrays have; what the template has. */
+sadmm_status sadmm_environments_read_merged_inputs(struct sadmm_environments *environments, int32_t environment);
+sadmm_status sadmm_environments_give_template_inputs(struct sadmm_environments *environments, int32_t environment);
 /* The other arrays that are bound, and contacts where they are recorded, are those of the worker's world. */
 sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environments,
                                               struct sadmm_environment_worker *worker, int32_t environment);

@@ -3,6 +3,7 @@
 
 #include "core/base/check.h"
 #include "core/base/memory.h"
+#include "environment_merge.h"
 
 sadmm_status sadmm_environments_keep_contacts(struct sadmm_environments *environments,
                                               struct sadmm_environment_worker *worker, int32_t environment)
@@ -15,6 +16,30 @@ sadmm_status sadmm_environments_keep_contacts(struct sadmm_environments *environ
     if (!SADMM_GROW(kept->list, 0, (size_t)count)) return sadmm_fail_memory(&worker->world->error, "contacts");
     TRY(sadmm_world_contacts(worker->world, 0, count, kept->list));
     kept->count = count;
+    return SADMM_OK;
+}
+
+/* Those of all environments, in the order of the merged world, and hits at the end. */
+sadmm_status sadmm_environments_keep_merged_contacts(struct sadmm_environments *environments)
+{
+    struct sadmm_environment_worker *worker = &environments->worker[0];
+    sadmm_world *world = environments->merged.world;
+    if (!environments->contacts) return SADMM_OK;
+    const int32_t count = sadmm_world_contact_count(world);
+    if (!SADMM_GROW(worker->contacts, 0, (size_t)count)) return sadmm_fail_memory(&environments->error, "contacts");
+    const sadmm_status status = count > 0 ? sadmm_world_contacts(world, 0, count, worker->contacts) : SADMM_OK;
+    if (status != SADMM_OK) return sadmm_fail(&environments->error, status, "%s", world->error.message);
+    for (int32_t e = 0; e < environments->count; ++e)
+        if (!environments->marked[e]) environments->contacts[e].count = 0;
+    for (int32_t k = 0; k < count; ++k) {
+        int32_t environment;
+        sadmm_environments_rename_contact(environments, &worker->contacts[k], &environment);
+        struct sadmm_environment_contacts *kept = &environments->contacts[environment];
+        const size_t at = (size_t)kept->count;
+        if (environments->marked[environment]) continue;
+        if (!SADMM_GROW(kept->list, at, at + 1)) return sadmm_fail_memory(&environments->error, "contacts");
+        kept->list[kept->count++] = worker->contacts[k];
+    }
     return SADMM_OK;
 }
 
@@ -65,7 +90,7 @@ static sadmm_status cast_rays(struct sadmm_environments *environments, struct sa
 {
     const struct casting *casting = (const struct casting *)argument;
     const size_t first = (size_t)casting->each * (size_t)place;
-    TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
+    TRY(sadmm_environments_load(environments, worker, environment));
     return sadmm_world_cast_rays(worker->world, casting->each, casting->rays + first, casting->filter,
                                  casting->hits + first);
 }

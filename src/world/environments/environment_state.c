@@ -71,14 +71,19 @@ sadmm_status sadmm_environment_state_store(sadmm_world *world, struct sadmm_envi
     return SADMM_OK;
 }
 
-sadmm_status sadmm_environment_state_load(sadmm_world *world, const struct sadmm_environment_state *state)
+void sadmm_environment_state_taken(sadmm_world *world)
 {
-    struct sadmm_archive reading = {.reading = true, .in = state->bytes, .size = state->size, .error = &world->error};
-    archive_state(&reading, world);
     world->contacts_readable = false;
     world->start.hit_count = world->start.hit_first = 0;
     world->certified_step = -1;
     sadmm_world_moved(world);
+}
+
+sadmm_status sadmm_environment_state_load(sadmm_world *world, const struct sadmm_environment_state *state)
+{
+    struct sadmm_archive reading = {.reading = true, .in = state->bytes, .size = state->size, .error = &world->error};
+    archive_state(&reading, world);
+    sadmm_environment_state_taken(world);
     return reading.status;
 }
 

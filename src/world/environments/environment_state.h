@@ -14,6 +14,8 @@ sadmm_status sadmm_environment_state_store(sadmm_world *world, struct sadmm_envi
 /* The world is as it was when the state was stored, of this world or of another one with the same objects. Contacts
  * cannot be read before its next step. Errors: OUT_OF_MEMORY; load another state then. */
 sadmm_status sadmm_environment_state_load(sadmm_world *world, const struct sadmm_environment_state *state);
+/* What follows where a world was given the state of an environment in another way. */
+void sadmm_environment_state_taken(sadmm_world *world);
 /* to = from. Errors: OUT_OF_MEMORY; `to` is as it was. */
 sadmm_status sadmm_environment_state_copy(struct sadmm_environment_state *to,
                                           const struct sadmm_environment_state *from, struct sadmm_error *error);

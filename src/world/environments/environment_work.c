@@ -2,6 +2,42 @@
 
 #include <stdatomic.h>
 #include <stdio.h>
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "environment_merge.h"
+
+sadmm_status sadmm_environments_load(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                     int32_t environment)
+{
+    if (environments->merged.world && !environments->marked[environment])
+        return sadmm_environments_take(environments, worker->world, environment);
+    return sadmm_environment_state_load(worker->world, &environments->states[environment]);
+}
+
+sadmm_status sadmm_environments_store(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                      int32_t environment)
+{
+    if (environments->merged.world && !environments->marked[environment])
+        return sadmm_environments_put(environments, worker->world, environment);
+    return sadmm_environment_state_store(worker->world, &environments->states[environment]);
+}
+
+void sadmm_environments_take_mark(struct sadmm_environments *environments, int32_t environment)
+{
+    sadmm_free(environments->marks[environment]);
+    environments->marks[environment] = NULL;
+    environments->marked[environment] = 0;
+}
+
+void sadmm_environments_put_mark(struct sadmm_environments *environments, int32_t environment, const char *why)
+{
+    const size_t size = strlen(why) + 1;
+    sadmm_environments_take_mark(environments, environment);
+    environments->marked[environment] = 1;
+    environments->marks[environment] = (char *)sadmm_alloc(size, 1);
+    if (environments->marks[environment]) memcpy(environments->marks[environment], why, size);
+}
 
 struct sharing {
     struct sadmm_environments *environments;
@@ -42,7 +78,8 @@ sadmm_status sadmm_environments_each(struct sadmm_environments *environments, co
         const struct sadmm_environment_worker *worker = &environments->worker[t];
         if (worker->failed_at >= 0 && (!first || worker->failed_at < first->failed_at)) first = worker;
     }
-    if (!first) return SADMM_OK;
+    const sadmm_status put = sadmm_environments_put_contacts(environments);
+    if (!first) return put;
     return sadmm_fail(&environments->error, first->failed.status, "environment %d: %s",
                       which ? which[first->failed_at] : first->failed_at, first->failed.message);
 }

@@ -12,6 +12,7 @@ struct sadmm_bound_array {
     size_t numbers; /* an environment: rows x columns */
     void *values;
     double *start; /* (numbers) of an input array: the template's */
+    double *given; /* (count x numbers) of an input array: what the merged world has; NULL: there is none */
 };
 
 /* Contacts that are kept of an environment. */
@@ -20,10 +21,35 @@ struct sadmm_environment_contacts {
     int32_t count;
 };
 
+/* Objects of the template of one kind: their slots in order; by slot, which one it is. */
+struct sadmm_environment_slots {
+    size_t *slots;
+    int32_t *numbers;
+    int32_t count;
+};
+
+/* How far an environment of a merged world has come. */
+struct sadmm_environment_progress {
+    sadmm_step_report report; /* of its last step, but for its contacts where it has moved */
+    bool stepped, moved;      /* since the template; since a state was put into it */
+};
+
+/* All environments in one world (environment_merge.h); world NULL: each is a state by itself. */
+struct sadmm_merged_world {
+    sadmm_world *world;
+    struct sadmm_environment_slots bodies, shapes, joints;
+    int32_t *groups, group_count;                /* by the template's body: which of its own environments it is in */
+    struct sadmm_environment_progress *progress; /* (count) */
+    struct sadmm_contact_set *contacts;          /* (count) of those whose contacts are to be replaced */
+    bool *replaced, any_replaced;                /* (count) which these are */
+    struct sadmm_contact_set spare;
+};
+
 /* What one thread works with: a world that becomes one environment after the other. */
 struct sadmm_environment_worker {
     sadmm_world *world;
     double *numbers;   /* of the largest array of an environment */
+    sadmm_contact *contacts; /* a growable block: of a merged world */
     int32_t failed_at; /* the first of a call's environments that failed, by its place in the call; -1: none */
     struct sadmm_error failed;
 };
@@ -32,8 +58,9 @@ struct sadmm_environments {
     struct sadmm_error error;
     struct sadmm_team team;
     int32_t count, workers;
+    bool is_merged; /* all are in one world, of a backend that keeps it */
     struct sadmm_environment_worker *worker;
-    struct sadmm_environment_state *states; /* (count) */
+    struct sadmm_environment_state *states; /* (count); in a merged world of those that are marked alone */
     struct sadmm_environment_state *kept;   /* to reset to, the first is the template's; of size 0: forgotten */
     size_t kept_count;
     uint8_t *marked; /* (count) */
@@ -42,9 +69,17 @@ struct sadmm_environments {
     uint64_t calls;
     struct sadmm_bound_array *bound;
     size_t bound_count;
+    struct sadmm_merged_world merged;
     struct sadmm_environment_contacts *contacts; /* (count) where they are recorded; else NULL */
     sadmm_settings settings; /* of all; a worker has one thread, and the gravity of the environment that it is */
 };
+
+/* A worker's world becomes an environment, and an environment what a worker's world is. Errors: those of the steps
+ * begun, OUT_OF_MEMORY. */
+sadmm_status sadmm_environments_load(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                     int32_t environment);
+sadmm_status sadmm_environments_store(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                      int32_t environment);
 
 /* Work of one environment, the `place`-th of a call, by a worker. Its status is the call's where no earlier one
  * failed. */
@@ -54,6 +89,10 @@ typedef sadmm_status sadmm_environment_work(struct sadmm_environments *environme
 /* The work of `count` environments, of all where `which` is NULL, shared out over threads. */
 sadmm_status sadmm_environments_each(struct sadmm_environments *environments, const int32_t *which, int32_t count,
                                      sadmm_environment_work *work, void *argument);
+/* Marks: an environment makes no further steps, and why; it does again. */
+void sadmm_environments_put_mark(struct sadmm_environments *environments, int32_t environment, const char *why);
+void sadmm_environments_take_mark(struct sadmm_environments *environments, int32_t environment);
+
 /* Are these environments, none of them twice? NULL: all; *count is their number. Else INVALID_ARGUMENT. */
 sadmm_status sadmm_environments_check_which(struct sadmm_environments *environments, const int32_t *which,
                                             int32_t *count);

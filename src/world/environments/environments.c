@@ -10,27 +10,13 @@
 #include "core/model/settings.h"
 #include "environment_arrays.h"
 #include "environment_contacts.h"
+#include "environment_merge.h"
+#include "environment_merged_step.h"
 #include "subadmm/save.h"
 
 enum { MOST_ENVIRONMENTS = 1 << 20 };
 
 /* ---- marks ------------------------------------------------------------------------------------------------------- */
-
-static void unmark(struct sadmm_environments *environments, int32_t environment)
-{
-    sadmm_free(environments->marks[environment]);
-    environments->marks[environment] = NULL;
-    environments->marked[environment] = 0;
-}
-
-static void mark(struct sadmm_environments *environments, int32_t environment, const char *why)
-{
-    const size_t size = strlen(why) + 1;
-    unmark(environments, environment);
-    environments->marked[environment] = 1;
-    environments->marks[environment] = (char *)sadmm_alloc(size, 1);
-    if (environments->marks[environment]) memcpy(environments->marks[environment], why, size);
-}
 
 const uint8_t *sadmm_environments_marked(const sadmm_environments *environments)
 {
@@ -46,16 +32,24 @@ const char *sadmm_environments_mark(const sadmm_environments *environments, int3
 
 /* ---- creation ---------------------------------------------------------------------------------------------------- */
 
-/* The world of the saved bytes, for one thread and the host. */
-static sadmm_status create_worker(struct sadmm_environment_worker *worker, const void *bytes, size_t size,
+/* Do all environments go into one world, which the backend keeps? */
+static bool is_kept(const sadmm_world *world)
+{
+    return world->kernels ? world->kernels->resident != NULL : world->def.backend == SADMM_BACKEND_CUDA;
+}
+
+/* The world of the saved bytes, for one thread; steps of environments apart are the host's. */
+static sadmm_status create_worker(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                  const struct sadmm_kernels *kernels, const void *bytes, size_t size,
                                   struct sadmm_error *error)
 {
     const sadmm_world_def def = sadmm_world_def_default();
     sadmm_status status = sadmm_world_create(&def, &worker->world);
     if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_last_message());
     sadmm_world *world = worker->world;
+    world->kernels = kernels;
     status = sadmm_world_restore(world, bytes, size);
-    if (status == SADMM_OK && world->def.backend == SADMM_BACKEND_AUTO)
+    if (status == SADMM_OK && !environments->is_merged && world->def.backend == SADMM_BACKEND_AUTO)
         status = sadmm_world_set_backend(world, SADMM_BACKEND_CPU, world->def.precision, 0);
     if (status != SADMM_OK) return sadmm_fail(error, status, "%s", world->error.message);
     world->def.settings.threads = 1;
@@ -69,10 +63,21 @@ static sadmm_status create_worker(struct sadmm_environment_worker *worker, const
     return worker->numbers ? SADMM_OK : sadmm_fail_memory(error, "environments");
 }
 
-static sadmm_status make(struct sadmm_environments *environments, const void *bytes, size_t size,
-                         struct sadmm_error *error)
+/* Environments of a merged world begin with the template's state. */
+static sadmm_status begin_merged(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                 int32_t environment, int32_t place, void *argument)
+{
+    (void)place;
+    (void)argument;
+    TRY(sadmm_environment_state_load(worker->world, &environments->kept[0]));
+    return sadmm_environments_store(environments, worker, environment);
+}
+
+static sadmm_status make(struct sadmm_environments *environments, const struct sadmm_kernels *kernels,
+                         const void *bytes, size_t size, struct sadmm_error *error)
 {
     const size_t count = (size_t)environments->count;
+    const bool merged = environments->is_merged;
     environments->worker =
         (struct sadmm_environment_worker *)sadmm_alloc((size_t)environments->workers, sizeof *environments->worker);
     environments->states = (struct sadmm_environment_state *)sadmm_alloc(count, sizeof *environments->states);
@@ -82,14 +87,19 @@ static sadmm_status make(struct sadmm_environments *environments, const void *by
     if (!environments->worker || !environments->states || !environments->marked || !environments->marks ||
         !environments->seen || !SADMM_GROW(environments->kept, 0, 1))
         return sadmm_fail_memory(error, "environments");
-    for (int t = 0; t < environments->workers; ++t) TRY(create_worker(&environments->worker[t], bytes, size, error));
+    for (int t = 0; t < environments->workers; ++t) 
+        TRY(create_worker(environments, &environments->worker[t], kernels, bytes, size, error));
     environments->kept_count = 1;
     sadmm_world *world = environments->worker[0].world;
     if (sadmm_environment_state_store(world, &environments->kept[0]) != SADMM_OK)
         return sadmm_fail_memory(error, "environments");
-    for (size_t i = 0; i < count; ++i)
+    for (size_t i = 0; i < count && !merged; ++i)
         TRY(sadmm_environment_state_copy(&environments->states[i], &environments->kept[0], error));
-    return SADMM_OK;
+    if (!merged) return SADMM_OK;
+    TRY(sadmm_environments_merge(environments, error));
+    const sadmm_status status =
+        sadmm_environments_each(environments, NULL, environments->count, begin_merged, NULL);
+    return status == SADMM_OK ? status : sadmm_fail(error, status, "%s", environments->error.message);
 }
 
 static sadmm_status save_template(sadmm_world *world, unsigned char **bytes, size_t *size)
@@ -110,8 +120,6 @@ sadmm_status sadmm_world_replicate(sadmm_world *world, int32_t count, sadmm_envi
     if (count < 1 || count > MOST_ENVIRONMENTS)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "count = %d: must be in [1, %d]", count,
                           (int)MOST_ENVIRONMENTS);
-    if (world->def.backend == SADMM_BACKEND_CUDA)
-        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "environments: the world's backend must be CPU or AUTO");
     unsigned char *bytes;
     size_t size;
     sadmm_status status = save_template(world, &bytes, &size);
@@ -121,8 +129,12 @@ sadmm_status sadmm_world_replicate(sadmm_world *world, int32_t count, sadmm_envi
         environments->team = world->team;
         environments->count = count;
         environments->settings = world->def.settings;
-        environments->workers = sadmm_team_threads(&environments->team, environments->settings.threads, (size_t)count);
-        status = make(environments, bytes, size, error);
+        environments->is_merged = is_kept(world);
+        environments->workers = environments->is_merged ? 1
+                                                        : sadmm_team_threads(&environments->team,
+                                                                             environments->settings.threads,
+                                                                             (size_t)count);
+        status = make(environments, world->kernels, bytes, size, error);
     }
     sadmm_free(bytes);
     if (status == SADMM_OK) *out = environments;
@@ -136,6 +148,7 @@ void sadmm_environments_destroy(sadmm_environments *environments)
     for (int t = 0; environments->worker && t < environments->workers; ++t) {
         sadmm_world_destroy(environments->worker[t].world);
         sadmm_free(environments->worker[t].numbers);
+        sadmm_free(environments->worker[t].contacts);
     }
     for (int32_t i = 0; environments->states && i < environments->count; ++i)
         sadmm_environment_state_free(&environments->states[i]);
@@ -145,7 +158,9 @@ void sadmm_environments_destroy(sadmm_environments *environments)
     for (size_t k = 0; k < environments->bound_count; ++k) {
         sadmm_free(environments->bound[k].values);
         sadmm_free(environments->bound[k].start);
+        sadmm_free(environments->bound[k].given);
     }
+    sadmm_environments_free_merged(environments);
     void *blocks[] = {environments->worker, environments->states, environments->kept, environments->marked,
                       environments->marks,  environments->seen,   environments->bound};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
@@ -190,7 +205,11 @@ sadmm_status sadmm_environments_set_settings(sadmm_environments *environments, c
     environments->settings = settings;
     settings.threads = 1;
     for (int t = 0; t < environments->workers; ++t) environments->worker[t].world->def.settings = settings;
-    return SADMM_OK;
+    if (!environments->merged.world) return SADMM_OK;
+    const sadmm_status status = sadmm_world_set_settings(environments->merged.world, &environments->settings);
+    return status == SADMM_OK
+               ? status
+               : sadmm_fail(&environments->error, status, "%s", environments->merged.world->error.message);
 }
 
 void sadmm_environments_settings_sized(const sadmm_environments *environments, sadmm_settings *settings, size_t size)
@@ -209,7 +228,7 @@ static sadmm_status take_failure(struct sadmm_environments *environments, struct
                                  int32_t environment, sadmm_status status)
 {
     if (status == SADMM_OK) return SADMM_OK;
-    mark(environments, environment, worker->world->error.message);
+    sadmm_environments_put_mark(environments, environment, worker->world->error.message);
     return status == SADMM_ERROR_NON_FINITE || status == SADMM_ERROR_INVALID_ARGUMENT ? SADMM_OK : status;
 }
 
@@ -236,6 +255,7 @@ sadmm_status sadmm_environments_step(sadmm_environments *environments, int32_t s
     TRY(sadmm_check_given(environments, "environments", NULL));
     if (steps < 1)
         return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "steps = %d: must be >= 1", steps);
+    if (environments->merged.world) return sadmm_environments_step_merged(environments, steps);
     return sadmm_environments_each(environments, NULL, environments->count, make_steps, &steps);
 }
 
@@ -245,9 +265,17 @@ static sadmm_status begin_again(struct sadmm_environments *environments, struct 
                                 int32_t environment, int32_t place, void *argument)
 {
     const int32_t *states = (const int32_t *)argument;
+    const struct sadmm_environment_state *from = &environments->kept[states ? states[place] : 0];
+    if (environments->merged.world) {
+        sadmm_environments_take_mark(environments, environment);
+        TRY(sadmm_environment_state_load(worker->world, from));
+        TRY(sadmm_environments_store(environments, worker, environment));
+        if (environments->contacts) environments->contacts[environment].count = 0;
+        return sadmm_environments_write_outputs(environments, worker, environment);
+    }
     struct sadmm_environment_state *state = &environments->states[environment];
-    TRY(sadmm_environment_state_copy(state, &environments->kept[states ? states[place] : 0], &worker->world->error));
-    unmark(environments, environment);
+    TRY(sadmm_environment_state_copy(state, from, &worker->world->error));
+    sadmm_environments_take_mark(environments, environment);
     if (environments->bound_count == 0 && !environments->contacts) return SADMM_OK;
     TRY(sadmm_environment_state_load(worker->world, state));
     return sadmm_environments_write_outputs(environments, worker, environment);
@@ -285,7 +313,14 @@ sadmm_status sadmm_environments_keep(sadmm_environments *environments, int32_t e
                           sadmm_environments_mark(environments, environment));
     const size_t n = environments->kept_count;
     if (n >= INT32_MAX || !SADMM_GROW(environments->kept, n, n + 1)) return sadmm_fail_memory(error, "a state");
-    TRY(sadmm_environment_state_copy(&environments->kept[n], &environments->states[environment], error));
+    if (environments->merged.world) {
+        struct sadmm_environment_worker *worker = &environments->worker[0];
+        sadmm_status status = sadmm_environments_load(environments, worker, environment);
+        if (status == SADMM_OK) status = sadmm_environment_state_store(worker->world, &environments->kept[n]);
+        if (status != SADMM_OK) return sadmm_fail(error, status, "%s", worker->world->error.message);
+    } else {
+        TRY(sadmm_environment_state_copy(&environments->kept[n], &environments->states[environment], error));
+    }
     environments->kept_count = n + 1;
     *state = (int32_t)n;
     return SADMM_OK;
@@ -307,7 +342,7 @@ sadmm_status sadmm_environments_forget(sadmm_environments *environments, int32_t
 static sadmm_status become(struct sadmm_environments *environments, int32_t environment)
 {
     struct sadmm_environment_worker *worker = &environments->worker[0];
-    TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
+    TRY(sadmm_environments_load(environments, worker, environment));
     return sadmm_environments_read_good_inputs(environments, worker, environment);
 }
 

@@ -32,6 +32,7 @@ struct sadmm_hits;
 struct sadmm_world {
     sadmm_world_def def; /* settings inside are the current ones */
     struct sadmm_error error;
+    int32_t not_finite; /* the slot of the body that the last NON_FINITE was about */
     struct sadmm_team team;
 
     /* Objects, by the slots of their ids. */

@@ -29,6 +29,7 @@ static sadmm_status list_kinematic(sadmm_world *world)
 
 sadmm_status sadmm_world_slot_not_finite(sadmm_world *world, int32_t slot)
 {
+    world->not_finite = slot;
     return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
                       "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it",
                       slot + 1, world->body_ids.generations[slot], sadmm_world_body_name(&world->bodies[slot]));

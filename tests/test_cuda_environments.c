@@ -1,0 +1,288 @@
+/* Environments on the device: each makes the same steps, bit for bit, as if it were alone, whatever the others do; what
+ * fails is marked and alone; resets begin again. */
+#include "cuda_worlds.h"
+#include "subadmm/environments.h"
+
+#define MUST_ALL(environments, call) \
+    ck_assert_msg((call) == SADMM_OK, #call ": %s", sadmm_environments_message(environments))
+
+static sadmm_environments *replicate(sadmm_world *world, int32_t count)
+{
+    sadmm_environments *environments;
+    MUST(world, sadmm_world_replicate(world, count, &environments));
+    ck_assert_int_eq(sadmm_environments_count(environments), count);
+    return environments;
+}
+
+static sadmm_world *template_of(const char *name, int precision)
+{
+    struct sadmm_scene scene = open_scene(name);
+    scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.precision = (sadmm_precision)precision;
+    sadmm_world *world = build_scene(&scene);
+    world->def.backend = SADMM_BACKEND_CUDA;
+    use_device(world, precision, 0);
+    return world;
+}
+
+static double *array_of(sadmm_environments *environments, sadmm_array array)
+{
+    sadmm_environments_array out;
+    MUST_ALL(environments, sadmm_environments_bind(environments, array, SADMM_F64, &out));
+    return (double *)out.values;
+}
+
+static size_t numbers_of(const sadmm_environments *environments, sadmm_array array)
+{
+    return (size_t)sadmm_environments_rows(environments, array) * (size_t)sadmm_array_columns(array);
+}
+
+static double noise(uint32_t a, uint32_t b)
+{
+    uint32_t x = a * 2654435761U ^ (b + 1) * 2246822519U;
+    x ^= x >> 15, x *= 2246822519U, x ^= x >> 13;
+    return (double)x / 2147483647.5 - 1;
+}
+
+static void expect_same(const double *a, const double *b, size_t count, const char *what, int32_t environment, int step)
+{
+    for (size_t k = 0; k < count; ++k)
+        ck_assert_msg(memcmp(&a[k], &b[k], sizeof *a) == 0, "%s, environment %d, step %d, number %zu: %.17g, %.17g",
+                      what, environment, step, k, a[k], b[k]);
+}
+
+static const struct {
+    const char *name;
+    int warm, steps; /* of the template; of all */
+} scenes[] = {{"ragdolls:1", 0, EMULATED ? 30 : 100},
+              {"ragdolls:1", EMULATED ? 20 : 60, EMULATED ? 6 : 60},
+              {"grippers:1", 2, EMULATED ? 6 : 60},
+              {"pile:12", EMULATED ? 20 : 40, EMULATED ? 6 : 60},
+              {"hand_demo", 2, EMULATED ? 2 : 30}};
+enum { SCENES = sizeof scenes / sizeof *scenes, FEW = 4 };
+static const sadmm_array outputs[] = {
+    SADMM_ARRAY_BODY_STATE,          SADMM_ARRAY_JOINT_POSITION,    SADMM_ARRAY_JOINT_SPEED,
+    SADMM_ARRAY_BODY_CONTACT_WRENCH, SADMM_ARRAY_BODY_ACCELERATION, SADMM_ARRAY_JOINT_DRIVE_FORCE,
+    SADMM_ARRAY_JOINT_WRENCH,        SADMM_ARRAY_BODY_WRENCH,       SADMM_ARRAY_REPORT};
+enum { OUTPUTS = sizeof outputs / sizeof *outputs };
+
+/* Pushes that differ from environment to environment, of bodies that move. */
+static void push(const double *template_state, int32_t environment, size_t count, double *state)
+{
+    memcpy(state, template_state, count * sizeof *state);
+    for (size_t i = 0; i < count; i += 13)
+        for (size_t k = 7; k < 13; ++k)
+            if (environment > 0 && state[i + 2] > 0.3)
+                state[i + k] += 0.1 * noise((uint32_t)environment, (uint32_t)(i + k));
+}
+
+/* Whether a body takes a velocity: statics refuse it. */
+static void keep_still(sadmm_world *world, double *state)
+{
+    for (int32_t i = 0; i < sadmm_world_body_count(world); ++i)
+        if (body_def(world, body_at(world, i)).type != SADMM_BODY_DYNAMIC) memset(state + 13 * i + 7, 0, 6 * sizeof *state);
+}
+
+START_TEST(environments_step_as_if_alone)
+{
+    const int scene = _i / 2, precision = _i % 2;
+    const char *name = scenes[scene].name;
+    sadmm_world *origin = template_of(name, precision);
+    step_world(origin, scenes[scene].warm);
+    sadmm_environments *all = replicate(origin, FEW), *own[FEW];
+    const size_t n = numbers_of(all, SADMM_ARRAY_BODY_STATE);
+    double *views[OUTPUTS], *mine[FEW][OUTPUTS], *state = calloc(FEW * n, sizeof *state);
+    for (int k = 0; k < OUTPUTS; ++k) views[k] = array_of(all, outputs[k]);
+    for (int32_t e = 0; e < FEW; ++e) {
+        own[e] = replicate(origin, 1);
+        for (int k = 0; k < OUTPUTS; ++k) mine[e][k] = array_of(own[e], outputs[k]);
+        push(mine[e][0], e, n, state + n * (size_t)e);
+        if (e > 0) {
+            keep_still(origin, state + n * (size_t)e);
+            MUST_ALL(own[e], sadmm_environments_set(own[e], SADMM_ARRAY_BODY_STATE, NULL, 0, state + n * (size_t)e));
+            MUST_ALL(all, sadmm_environments_set(all, SADMM_ARRAY_BODY_STATE, &e, 1, state + n * (size_t)e));
+        }
+    }
+    for (int step = 0; step < scenes[scene].steps; step += 2) {
+        MUST_ALL(all, sadmm_environments_step(all, 2));
+        if (scenes[scene].warm > 0) { /* the first one is the world that goes on */
+            double *body = calloc(n, sizeof *body);
+            step_world(origin, 2);
+            MUST(origin, sadmm_world_get_array(origin, SADMM_ARRAY_BODY_STATE, 0, (int32_t)(n / 13), body));
+            expect_same(views[0], body, n, name, 0, step);
+            free(body);
+        }
+        for (int32_t e = 0; e < FEW; ++e) {
+            MUST_ALL(own[e], sadmm_environments_step(own[e], 2));
+            for (int k = 0; k < OUTPUTS; ++k) {
+                const size_t count = numbers_of(all, outputs[k]);
+                expect_same(views[k] + count * (size_t)e, mine[e][k], count, sadmm_array_name(outputs[k]), e, step);
+            }
+        }
+    }
+    for (int32_t e = 0; e < FEW; ++e) sadmm_environments_destroy(own[e]);
+    sadmm_environments_destroy(all);
+    sadmm_world_destroy(origin);
+    free(state);
+}
+END_TEST
+
+/* A random share begins again before each step, with the template's state or one that was kept: each is where a single
+ * one is after as many steps from there. */
+START_TEST(resets_begin_again)
+{
+    enum { MANY = EMULATED ? 6 : 64, STEPS = EMULATED ? 12 : 60, KEPT_AT = EMULATED ? 8 : 30 };
+    sadmm_world *origin = template_of("grippers:1", _i);
+    step_world(origin, EMULATED ? 2 : 20);
+    sadmm_environments *all = replicate(origin, MANY), *one = replicate(origin, 1);
+    const double *states = array_of(all, SADMM_ARRAY_BODY_STATE), *state = array_of(one, SADMM_ARRAY_BODY_STATE);
+    const size_t n = numbers_of(all, SADMM_ARRAY_BODY_STATE);
+    double *after = calloc((KEPT_AT + STEPS + 1) * n, sizeof *after);
+    int32_t kept;
+    for (int step = 0; step <= KEPT_AT + STEPS; ++step) {
+        memcpy(after + n * (size_t)step, state, n * sizeof *after);
+        if (step < KEPT_AT + STEPS) MUST_ALL(one, sadmm_environments_step(one, 1));
+    }
+    MUST_ALL(all, sadmm_environments_step(all, KEPT_AT));
+    MUST_ALL(all, sadmm_environments_keep(all, MANY - 1, &kept));
+    MUST_ALL(all, sadmm_environments_reset(all, NULL, 0, NULL));
+    int made[MANY] = {0};
+    for (int step = 0; step < STEPS; ++step) {
+        int32_t which[MANY], from[MANY], count = 0;
+        for (int32_t e = 0; e < MANY; ++e) {
+            if (noise((uint32_t)e, (uint32_t)step) < 0.6) continue;
+            from[count] = noise((uint32_t)e, (uint32_t)(step + 1000)) > 0 ? kept : 0;
+            made[e] = from[count] ? KEPT_AT : 0;
+            which[count++] = e;
+        }
+        MUST_ALL(all, sadmm_environments_reset(all, which, count, from));
+        for (int32_t e = 0; e < MANY; ++e)
+            expect_same(states + n * (size_t)e, after + n * (size_t)made[e], n, "reset", e, step);
+        MUST_ALL(all, sadmm_environments_step(all, 1));
+        for (int32_t e = 0; e < MANY; ++e)
+            expect_same(states + n * (size_t)e, after + n * (size_t)++made[e], n, "step", e, step);
+    }
+    sadmm_environments_destroy(all);
+    sadmm_environments_destroy(one);
+    sadmm_world_destroy(origin);
+    free(after);
+}
+END_TEST
+
+/* One gets a force that is no number, one a velocity that overflows: the others have the bits that they have without.
+ * Both are as they were before the step that failed, and can begin again. */
+START_TEST(what_goes_wrong_stays_alone)
+{
+    enum { MANY = EMULATED ? 4 : 8, STEPS = EMULATED ? 6 : 30, AT = 3 };
+    sadmm_world *origin = template_of("ragdolls:1", _i);
+    step_world(origin, 2);
+    sadmm_environments *good = replicate(origin, MANY), *bad = replicate(origin, MANY);
+    const double *states[2] = {array_of(good, SADMM_ARRAY_BODY_STATE), array_of(bad, SADMM_ARRAY_BODY_STATE)};
+    double *wrench = array_of(bad, SADMM_ARRAY_BODY_WRENCH);
+    const size_t n = numbers_of(good, SADMM_ARRAY_BODY_STATE), wrenches = numbers_of(good, SADMM_ARRAY_BODY_WRENCH);
+    double *left = calloc(n, sizeof *left);
+    for (int step = 0; step < STEPS; ++step) {
+        if (step == AT) {
+            const int32_t flies = 2;
+            double *state = calloc(n, sizeof *state);
+            wrench[wrenches + 6 * 2 + 1] = NAN;
+            memcpy(left, states[1] + n, n * sizeof *left);
+            memcpy(state, states[1] + 2 * n, n * sizeof *state);
+            state[13 * 3 + 8] = 1e308;
+            MUST_ALL(bad, sadmm_environments_set(bad, SADMM_ARRAY_BODY_STATE, &flies, 1, state));
+            free(state);
+        }
+        MUST_ALL(good, sadmm_environments_step(good, 1));
+        MUST_ALL(bad, sadmm_environments_step(bad, 1));
+        for (int32_t e = 0; e < MANY; ++e)
+            if (step < AT || (e != 1 && e != 2))
+                expect_same(states[1] + n * (size_t)e, states[0] + n * (size_t)e, n, "alone", e, step);
+    }
+    const uint8_t *marked = sadmm_environments_marked(bad);
+    for (int32_t e = 0; e < MANY; ++e) ck_assert_int_eq(marked[e], e == 1 || e == 2);
+    expect_same(states[1] + n, left, n, "as it was", 1, STEPS);
+    double *read = calloc(n, sizeof *read);
+    const int32_t first = 1, both[] = {1, 2};
+    MUST_ALL(bad, sadmm_environments_get(bad, SADMM_ARRAY_BODY_STATE, &first, 1, read));
+    expect_same(read, left, n, "read", 1, STEPS);
+    ck_assert_msg(strstr(sadmm_environments_mark(bad, 1), "body_wrench") != NULL, "\"%s\"",
+                  sadmm_environments_mark(bad, 1));
+    ck_assert_msg(strstr(sadmm_environments_mark(bad, 2), "not finite") != NULL, "\"%s\"",
+                  sadmm_environments_mark(bad, 2));
+    wrench[wrenches + 6 * 2 + 1] = 0;
+    MUST_ALL(bad, sadmm_environments_reset(bad, both, 2, NULL));
+    ck_assert_int_eq(marked[1] + marked[2], 0);
+    MUST_ALL(good, sadmm_environments_reset(good, NULL, 0, NULL));
+    MUST_ALL(good, sadmm_environments_step(good, 3));
+    MUST_ALL(bad, sadmm_environments_step(bad, 3));
+    for (int32_t e = 1; e < 3; ++e)
+        expect_same(states[1] + n * (size_t)e, states[0] + n * (size_t)e, n, "again", e, 3);
+    free(left);
+    free(read);
+    sadmm_environments_destroy(good);
+    sadmm_environments_destroy(bad);
+    sadmm_world_destroy(origin);
+}
+END_TEST
+
+/* Inputs of each: those of single ones. Contacts that are recorded, too. */
+START_TEST(inputs_and_contacts_are_an_environments_own)
+{
+    static const sadmm_array inputs[] = {SADMM_ARRAY_BODY_WRENCH,  SADMM_ARRAY_JOINT_TARGET_POSITION,
+                                         SADMM_ARRAY_BODY_INERTIA, SADMM_ARRAY_JOINT_DRIVE_DAMPING,
+                                         SADMM_ARRAY_BODY_DAMPING, SADMM_ARRAY_SHAPE_MATERIAL};
+    enum { INPUTS = sizeof inputs / sizeof *inputs, STEPS = EMULATED ? 6 : 40 };
+    sadmm_world *origin = template_of("grippers:1", _i);
+    step_world(origin, 2);
+    sadmm_environments *all = replicate(origin, FEW), *own[FEW];
+    const double *states = array_of(all, SADMM_ARRAY_BODY_STATE), *mine[FEW];
+    const size_t n = numbers_of(all, SADMM_ARRAY_BODY_STATE);
+    double *views[INPUTS], *given[FEW][INPUTS];
+    MUST_ALL(all, sadmm_environments_record_contacts(all, true));
+    for (int k = 0; k < INPUTS; ++k) views[k] = array_of(all, inputs[k]);
+    for (int32_t e = 0; e < FEW; ++e) {
+        own[e] = replicate(origin, 1);
+        MUST_ALL(own[e], sadmm_environments_record_contacts(own[e], true));
+        mine[e] = array_of(own[e], SADMM_ARRAY_BODY_STATE);
+        for (int k = 0; k < INPUTS; ++k) given[e][k] = array_of(own[e], inputs[k]);
+    }
+    int points = 0;
+    for (int step = 0; step < STEPS; ++step) {
+        for (int32_t e = 0; e < FEW && step % 3 == 0; ++e)
+            for (int k = 0; k < INPUTS; ++k)
+                for (size_t i = 0; i < numbers_of(all, inputs[k]); ++i) {
+                    double *number = &views[k][numbers_of(all, inputs[k]) * (size_t)e + i];
+                    *number *= 1 + 0.01 * noise((uint32_t)e + 7, (uint32_t)i);
+                    given[e][k][i] = *number;
+                }
+        MUST_ALL(all, sadmm_environments_step(all, 1));
+        for (int32_t e = 0; e < FEW; ++e) {
+            const sadmm_contact *contacts[2];
+            int32_t count[2];
+            ck_assert_str_eq(sadmm_environments_mark(all, e), "");
+            MUST_ALL(own[e], sadmm_environments_step(own[e], 1));
+            expect_same(states + n * (size_t)e, mine[e], n, "inputs", e, step);
+            MUST_ALL(all, sadmm_environments_contacts(all, e, &contacts[0], &count[0]));
+            MUST_ALL(own[e], sadmm_environments_contacts(own[e], 0, &contacts[1], &count[1]));
+            ck_assert_int_eq(count[0], count[1]);
+            if (count[0] > 0) ck_assert_mem_eq(contacts[0], contacts[1], (size_t)count[0] * sizeof **contacts);
+            points += count[0];
+        }
+    }
+    ck_assert_int_gt(points, 0);
+    for (int32_t e = 0; e < FEW; ++e) sadmm_environments_destroy(own[e]);
+    sadmm_environments_destroy(all);
+    sadmm_world_destroy(origin);
+}
+END_TEST
+
+int main(void)
+{
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
+    Suite *suite = suite_create("cuda_environments");
+    ADD_CASE(suite, environments_step_as_if_alone, 0, SCENES * tested_precisions());
+    ADD_CASE(suite, resets_begin_again, 0, tested_precisions());
+    ADD_CASE(suite, what_goes_wrong_stays_alone, 0, tested_precisions());
+    ADD_CASE(suite, inputs_and_contacts_are_an_environments_own, 0, tested_precisions());
+    return run_cuda_suite(suite);
+}

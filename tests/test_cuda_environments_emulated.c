@@ -1,0 +1,2 @@
+#define CUDA_EMULATED
+#include "test_cuda_environments.c"
