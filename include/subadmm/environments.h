@@ -104,6 +104,7 @@ typedef struct sadmm_environments_array {
     void *values; /* environments x rows x columns, row-major, without gaps */
     int64_t environments, rows, columns;
     sadmm_precision precision; /* F64: double, F32: float */
+    int32_t device;            /* `values` are in the memory of this CUDA device; -1: of the host */
 } sadmm_environments_array;
 
 /* *out stays valid until the environments are destroyed, at the same place. Output and state: the numbers after each

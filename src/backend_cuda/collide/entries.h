@@ -76,6 +76,14 @@ int COLLISION(current)(const struct sadmm_cuda_collision *collision);
 /* Put back the set that the last successful find replaced. Does nothing when the last find failed or was undone. */
 void COLLISION(undo)(struct sadmm_cuda_collision *collision);
 
+/* Contacts of worlds of many equal ones (core/solve/resident.h): worlds with a state begin with its contacts. The
+ * current set; `states`, on the device: a world each, NULL: its contacts stay; most: pairs and points of all of these.
+ * *fits: false: there is no room, and nothing is done. Waits. */
+sadmm_status COLLISION(put_contacts)(struct sadmm_cuda_collision *collision, void *stream,
+                                     const struct sadmm_resident_copies *copies,
+                                     const struct cuda_kept_state *const *states,
+                                     struct sadmm_cuda_contact_counts most, bool *fits, struct sadmm_error *error);
+
 struct sadmm_cuda_collision_stats COLLISION(stats)(const struct sadmm_cuda_collision *collision);
 /* From the next find on. */
 void COLLISION(tune)(struct sadmm_cuda_collision *collision, const struct sadmm_cuda_collision_tuning *tuning);

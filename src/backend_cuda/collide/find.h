@@ -3,6 +3,7 @@
 #define SADMM_CUDA_COLLIDE_FIND_H
 
 #include "backend_cuda/device/found.h"
+#include "backend_cuda/device/kept_state.h"
 #include "collision/collision.h"
 
 struct sadmm_cuda_collision;

@@ -23,6 +23,7 @@ enum buffer_name {
     PAIRS, POINTS, MIGRATIONS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, MIGRATIONS_2, PAIR_KEYS_2, COUNTS_2,
     PAIRS_3, POINTS_3, MIGRATIONS_3, PAIR_KEYS_3, COUNTS_3,
     TOUCHING,
+    COPIES_PAIRS, COPIES_KEYS, COPIES_POINTS, COPIES_MIGRATIONS, COPIES_RANGES,
     HIT_STATE, HIT_MARKS, HIT_HELD, HIT_KINDS, HIT_SWEPT_BODIES, HIT_SINCE, HIT_IMPULSES, HIT_BOXES, HIT_NEAR,
     HIT_LISTED, HIT_FORESEEN, HIT_TAKEN, HIT_RECORDS_OF_STEPS, HIT_GROUPS, HIT_PROGRESS, HIT_GROUP_BODIES,
     HIT_GROUP_LEAVES, HIT_SHARED_LEAVES, HIT_GROUP_OF,
@@ -32,6 +33,7 @@ enum buffer_name {
     PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_HULLS, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS,
     PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_SEAMS, PINNED_SEAM_NEIGHBOURS,
     PINNED_PAIRS, PINNED_POINTS, PINNED_MIGRATIONS, PINNED_PAIR_KEYS, PINNED_COUNTS, PINNED_TOUCHING,
+    PINNED_COPIES,
     BUFFERS
 };
 enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
@@ -46,6 +48,8 @@ static const char *const buffer_names[BUFFERS] = {
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "contact pairs", "contact points", "migrations of points", "contact keys", "contact counts",
     "touching pairs",
+    "pairs of environments", "keys of environments", "points of environments", "migrations of environments",
+    "contacts of environments",
     "hits", "marks of bodies", "bodies held by joints", "kinds of bodies", "swept bodies", "moments of hits",
     "impulses of hits", "boxes after hits", "pairs after hits", "fast pairs", "foreseen hits", "hits taken",
     "list of hits",
@@ -58,6 +62,7 @@ static const char *const buffer_names[BUFFERS] = {
     "staged friction pairs", "staged friction values", "staged neighbours by shape", "staged neighbours",
     "staged contact pairs", "staged contact points", "staged migrations",
     "staged contact keys", "staged contact counts", "staged touching pairs",
+    "staged contacts of environments",
 };
 
 /* As on the host: contact points are indexed by 32 bits. */

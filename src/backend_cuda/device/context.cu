@@ -92,6 +92,7 @@ static const char *const buffer_names[] = {
     "trees of articulations",
     "impulses of solved islands",
     "memory of solved islands",
+    "states of environments",
     "staged counts",
     "staged settings",
     "staged bodies",

@@ -65,6 +65,19 @@ sadmm_status CUDA(read_joints)(struct sadmm_context *, struct sadmm_joint_memory
                                double *gear_force, struct sadmm_error *);
 sadmm_status CUDA(read_rows)(struct sadmm_context *, struct sadmm_rows *, double *solution, double *velocity,
                              struct sadmm_error *);
+sadmm_status CUDA(allocate)(struct sadmm_context *, size_t bytes, void **out, struct sadmm_error *);
+void CUDA(release)(struct sadmm_context *, void *memory);
+sadmm_status CUDA(to_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *);
+sadmm_status CUDA(from_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes,
+                                struct sadmm_error *);
+bool CUDA(has_array)(int32_t array, bool in);
+sadmm_status CUDA(exchange)(struct sadmm_context *, const struct sadmm_resident_copies *,
+                            const struct sadmm_resident_array *, bool in, const uint8_t *left, uint8_t *refused,
+                            void *stream, struct sadmm_error *);
+sadmm_status CUDA(keep_state)(struct sadmm_context *, const struct sadmm_resident_copies *,
+                              const struct sadmm_resident_state *, void **out, struct sadmm_error *);
+sadmm_status CUDA(put_states)(struct sadmm_context *, const struct sadmm_resident_copies *, int32_t count,
+                              const int32_t *which, void *const *states, bool *fits, struct sadmm_error *);
 
 #ifdef __cplusplus
 }

@@ -39,6 +39,14 @@
             .read_start = sadmm_cuda_read_start##suffix,       \
             .read_joints = sadmm_cuda_read_joints##suffix,     \
             .read_rows = sadmm_cuda_read_rows##suffix,         \
+            .allocate = sadmm_cuda_allocate##suffix,           \
+            .release = sadmm_cuda_release##suffix,             \
+            .to_backend = sadmm_cuda_to_backend##suffix,       \
+            .from_backend = sadmm_cuda_from_backend##suffix,   \
+            .has_array = sadmm_cuda_has_array##suffix,         \
+            .exchange = sadmm_cuda_exchange##suffix,           \
+            .keep_state = sadmm_cuda_keep_state##suffix,       \
+            .put_states = sadmm_cuda_put_states##suffix,       \
         },                                                     \
     }
 

@@ -131,6 +131,7 @@ SADMM_TABLE(hull, SADMM_HULL)
 #define SADMM_BODY_FIELD(name) (&sadmm_body_table[SADMM_BODY_PLACE_##name])
 #define SADMM_SHAPE_FIELD(name) (&sadmm_shape_table[SADMM_SHAPE_PLACE_##name])
 #define SADMM_JOINT_FIELD(name) (&sadmm_joint_table[SADMM_JOINT_PLACE_##name])
+#define SADMM_COORDINATE_FIELD(name) (&sadmm_coordinate_table[SADMM_COORDINATE_PLACE_##name])
 #define SADMM_COUPLING_FIELD(name) (&sadmm_coupling_table[SADMM_COUPLING_PLACE_##name])
 #define SADMM_GEAR_FIELD(name) (&sadmm_gear_table[SADMM_GEAR_PLACE_##name])
 

@@ -102,6 +102,38 @@ struct sadmm_resident_view {
     void *stream;                    /* what steps run on: cudaStream_t */
 };
 
+/* A world of many equal ones (environments): bodies, shapes and joints one world after the other. So many of each: */
+struct sadmm_resident_copies {
+    int32_t count;             /* worlds */
+    int32_t bodies, kinematic; /* dynamic bodies, and kinematic ones; */
+    int32_t shapes;            /* slots */
+    int32_t joints, couplings, gears; /* joints: without those that couplings are */
+};
+
+/* An array (subadmm/arrays.h) of all of them. */
+struct sadmm_resident_array {
+    int32_t array;          /* sadmm_array */
+    int32_t rows, columns;  /* of each */
+    bool single;            /* numbers are floats, else doubles */
+    void *values;           /* (worlds x rows x columns) in the backend's memory, as is: */
+    double lo, hi;          /* in: numbers that the world takes are in this range */
+    const int32_t *objects; /* (rows) what a row is of: a body of the step (contact_set.h), a joint, a coupling */
+};
+
+/* What steps change of one of them. */
+struct sadmm_resident_state {
+    const struct sadmm_rigid *rigid;                 /* (bodies) */
+    const struct sadmm_extrapolation *extrapolation; /* (bodies) */
+    const double *wrench;                            /* (bodies x 6) of contacts */
+    const struct sadmm_kinematic_body *kinematic;    /* (kinematic) */
+    const double *kinematic_wrench;                  /* (kinematic x 6) */
+    const struct sadmm_joint_memory *joints;         /* (joints, couplings) */
+    const uint8_t *enabled;                          /* (joints) */
+    const struct sadmm_coupling_memory *couplings;   /* (couplings) */
+    const double *gear_force;                        /* (gears) */
+    const struct sadmm_contact_set *contacts;        /* shapes and bodies numbered as in the first one */
+};
+
 struct sadmm_resident_kernels {
     /* Take over a world. Everything the backend kept before is forgotten. */
     sadmm_status (*load)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
@@ -145,6 +177,30 @@ struct sadmm_resident_kernels {
      * not end with these. Nothing may be enqueued. */
     sadmm_status (*read_rows)(struct sadmm_context *, struct sadmm_rows *rows, double *solution, double *velocity,
                               struct sadmm_error *);
+
+    /* ---- worlds of many equal ones; nothing may be enqueued ---- */
+
+    /* Memory of the backend, zeroed; NULL may be released. To the backend and from it. */
+    sadmm_status (*allocate)(struct sadmm_context *, size_t bytes, void **out, struct sadmm_error *);
+    void (*release)(struct sadmm_context *, void *memory);
+    sadmm_status (*to_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *);
+    sadmm_status (*from_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes,
+                                 struct sadmm_error *);
+    /* Can an array be read (or, `in`, written) there? */
+    bool (*has_array)(int32_t array, bool in);
+    /* The world's numbers into the array; or, `in`, the array's into the world. `left`: not 0: worlds whose part is left
+     * alone. refused (in): 1 where a number is out of range, which is not taken. All in the backend's memory, a byte a
+     * world. Before anything on `stream` (the backend's kind of one, NULL: its default) has ended nothing is read. */
+    sadmm_status (*exchange)(struct sadmm_context *, const struct sadmm_resident_copies *,
+                             const struct sadmm_resident_array *, bool in, const uint8_t *left, uint8_t *refused,
+                             void *stream, struct sadmm_error *);
+    /* A state in the backend's memory, to be released. */
+    sadmm_status (*keep_state)(struct sadmm_context *, const struct sadmm_resident_copies *,
+                               const struct sadmm_resident_state *, void **out, struct sadmm_error *);
+    /* `count` worlds, each at most once, begin with states that are kept; what their bodies are given from outside, and
+     * their masses, stay. *fits: false: there is no room for so many contacts, and nothing is done. */
+    sadmm_status (*put_states)(struct sadmm_context *, const struct sadmm_resident_copies *, int32_t count,
+                               const int32_t *which, void *const *states, bool *fits, struct sadmm_error *);
 };
 
 #endif

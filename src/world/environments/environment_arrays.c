@@ -7,6 +7,7 @@
 #include "core/base/check.h"
 #include "core/base/memory.h"
 #include "core/base/names.h"
+#include "environment_backend.h"
 #include "environment_contacts.h"
 
 /* Numbers of an environment. */
@@ -67,19 +68,19 @@ static void load_numbers(const struct sadmm_bound_array *bound, int32_t environm
 {
     const size_t n = bound->numbers, first = n * (size_t)environment;
     if (bound->precision == SADMM_F64) {
-        memcpy(out, (const double *)bound->values + first, n * sizeof *out);
+        memcpy(out, (const double *)bound->host + first, n * sizeof *out);
         return;
     }
-    for (size_t k = 0; k < n; ++k) out[k] = (double)((const float *)bound->values)[first + k];
+    for (size_t k = 0; k < n; ++k) out[k] = (double)((const float *)bound->host)[first + k];
     mend(bound, out);
 }
 
 static void store_numbers(const struct sadmm_bound_array *bound, int32_t environment, const double *numbers)
 {
     const size_t n = bound->numbers, first = n * (size_t)environment;
-    if (bound->precision == SADMM_F64) memcpy((double *)bound->values + first, numbers, n * sizeof *numbers);
+    if (bound->precision == SADMM_F64) memcpy((double *)bound->host + first, numbers, n * sizeof *numbers);
     else
-        for (size_t k = 0; k < n; ++k) ((float *)bound->values)[first + k] = (float)numbers[k];
+        for (size_t k = 0; k < n; ++k) ((float *)bound->host)[first + k] = (float)numbers[k];
 }
 
 /* What a world without the numbers has none of is 0. */
@@ -149,7 +150,7 @@ static sadmm_status give_merged(struct sadmm_environments *environments, struct 
     sadmm_world *world = environments->merged.world;
     double *given = bound->given + bound->numbers * (size_t)environment;
     const int32_t rows = sadmm_environments_rows(environments, bound->array);
-    if (memcmp(given, numbers, bound->numbers * sizeof *numbers) == 0) return SADMM_OK;
+    if (!bound->given_unknown && memcmp(given, numbers, bound->numbers * sizeof *numbers) == 0) return SADMM_OK;
     const sadmm_status status = sadmm_world_set_array(world, bound->array, rows * environment, rows, numbers);
     if (status == SADMM_OK) memcpy(given, numbers, bound->numbers * sizeof *numbers);
     else {
@@ -170,7 +171,7 @@ static void open_merged_limits(struct sadmm_environments *environments, int32_t 
         bound[k] = bound_of(environments, limits[k], -1);
         if (!bound[k]) return;
         load_numbers(bound[k], environment, environments->worker[0].numbers);
-        differ = differ || memcmp(bound[k]->given + bound[k]->numbers * (size_t)environment,
+        differ = differ || bound[k]->given_unknown || memcmp(bound[k]->given + bound[k]->numbers * (size_t)environment,
                                   environments->worker[0].numbers, bound[k]->numbers * sizeof(double)) != 0;
     }
     if (!differ) return;
@@ -215,11 +216,66 @@ sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environ
 {
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
-        if (sadmm_environments_is_input(bound->array)) continue;
+        if (sadmm_environments_is_input(bound->array) || (environments->merged.world && !bound->by_host)) continue;
         TRY(get_all(worker->world, bound->array, worker->numbers));
         store_numbers(bound, environment, worker->numbers);
     }
     return environments->merged.world ? SADMM_OK : sadmm_environments_keep_contacts(environments, worker, environment);
+}
+
+bool sadmm_environments_inputs_differ(const struct sadmm_environments *environments, int32_t environment)
+{
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        const struct sadmm_bound_array *bound = &environments->bound[k];
+        double *now = environments->worker[0].numbers;
+        if (!bound->given || sadmm_environments_may_exchange(environments, bound)) continue;
+        load_numbers(bound, environment, now);
+        if (memcmp(bound->given + bound->numbers * (size_t)environment, now, bound->numbers * sizeof *now) != 0)
+            return true;
+    }
+    return false;
+}
+
+sadmm_status sadmm_environments_pull_inputs(struct sadmm_environments *environments, bool all)
+{
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        struct sadmm_bound_array *bound = &environments->bound[k];
+        if (!bound->given || (!all && sadmm_environments_may_exchange(environments, bound))) continue;
+        TRY(sadmm_environments_pull_array(environments, bound));
+    }
+    return SADMM_OK;
+}
+
+/* By the host. */
+static sadmm_status write_by_host(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
+                                  int32_t environment, int32_t place, void *argument)
+{
+    (void)place;
+    (void)argument;
+    if (environments->marked[environment]) return SADMM_OK;
+    TRY(sadmm_environments_load(environments, worker, environment));
+    return sadmm_environments_write_outputs(environments, worker, environment);
+}
+
+sadmm_status sadmm_environments_write_merged_outputs(struct sadmm_environments *environments, const int32_t *which,
+                                                     int32_t count)
+{
+    bool by_host = false;
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        struct sadmm_bound_array *bound = &environments->bound[k];
+        if (sadmm_environments_is_input(bound->array)) continue;
+        bound->by_host = !sadmm_environments_may_exchange(environments, bound);
+        by_host = by_host || bound->by_host;
+        TRY(bound->by_host ? sadmm_environments_pull_array(environments, bound)
+                           : sadmm_environments_exchange(environments, bound));
+    }
+    if (by_host) TRY(sadmm_environments_each(environments, which, count, write_by_host, NULL));
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        struct sadmm_bound_array *bound = &environments->bound[k];
+        if (!sadmm_environments_is_input(bound->array) && bound->by_host)
+            TRY(sadmm_environments_push_array(environments, bound));
+    }
+    return by_host || environments->bound_count == 0 ? SADMM_OK : sadmm_environments_wait_backend(environments);
 }
 
 /* ---- binding ----------------------------------------------------------------------------------------------------- */
@@ -274,23 +330,23 @@ static sadmm_status bind(struct sadmm_environments *environments, sadmm_array ar
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
                           "array = gravity: environments on CUDA have one gravity, that of the settings");
     if (!SADMM_GROW(environments->bound, n, n + 1)) return sadmm_fail_memory(error, "an array of environments");
-    struct sadmm_bound_array fresh = {array, precision, numbers_of(environments, array), NULL, NULL, NULL};
-    fresh.values = sadmm_alloc((size_t)environments->count,
+    struct sadmm_bound_array fresh = {
+        .array = array, .precision = precision, .numbers = numbers_of(environments, array)};
+    fresh.host = sadmm_alloc((size_t)environments->count,
                                fresh.numbers * (precision == SADMM_F64 ? sizeof(double) : sizeof(float)));
     fresh.start = (double *)sadmm_alloc(input ? fresh.numbers : 0, sizeof *fresh.start);
     const bool merged = input && environments->merged.world;
     if (merged) fresh.given = (double *)sadmm_alloc((size_t)environments->count, fresh.numbers * sizeof *fresh.given);
-    sadmm_status status = fresh.values && fresh.start && (!merged || fresh.given)
+    sadmm_status status = fresh.host && fresh.start && (!merged || fresh.given)
                               ? SADMM_OK
                               : sadmm_fail_memory(error, "an array of environments");
     if (status == SADMM_OK && input) status = read_template(environments, array, fresh.start);
     for (size_t e = 0; status == SADMM_OK && merged && e < (size_t)environments->count; ++e)
         memcpy(fresh.given + fresh.numbers * e, fresh.start, fresh.numbers * sizeof *fresh.start);
     if (status == SADMM_OK) status = sadmm_environments_each(environments, NULL, environments->count, fill, &fresh);
+    if (status == SADMM_OK) status = sadmm_environments_place_array(environments, &fresh);
     if (status != SADMM_OK) {
-        sadmm_free(fresh.values);
-        sadmm_free(fresh.start);
-        sadmm_free(fresh.given);
+        sadmm_environments_release_array(environments, &fresh);
         return status;
     }
     environments->bound[n] = fresh;
@@ -315,7 +371,8 @@ sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_arr
                                       .environments = environments->count,
                                       .rows = sadmm_environments_rows(environments, array),
                                       .columns = sadmm_array_columns(array),
-                                      .precision = precision};
+                                      .precision = precision,
+                                      .device = bound->in_backend ? environments->merged.world->def.device : -1};
     return SADMM_OK;
 }
 
@@ -344,6 +401,8 @@ sadmm_status sadmm_environments_get(sadmm_environments *environments, sadmm_arra
     TRY(sadmm_environments_check_which(environments, which, &count));
     struct rows_of rows = {.array = array, .numbers = numbers_of(environments, array), .out = values};
     if (rows.numbers > 0 && count > 0) TRY(sadmm_check_given(values, "values", &environments->error));
+    struct sadmm_bound_array *bound = sadmm_environments_is_input(array) ? bound_of(environments, array, -1) : NULL;
+    if (bound) TRY(sadmm_environments_pull_array(environments, bound));
     return sadmm_environments_each(environments, which, count, get_one, &rows);
 }
 
@@ -372,7 +431,7 @@ static sadmm_status set_one(struct sadmm_environments *environments, struct sadm
     }
     TRY(try_one(environments, worker, environment, place, argument));
     TRY(sadmm_environments_store(environments, worker, environment));
-    return sadmm_environments_write_outputs(environments, worker, environment);
+    return environments->merged.world ? SADMM_OK : sadmm_environments_write_outputs(environments, worker, environment);
 }
 
 sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_array array, const int32_t *which,
@@ -391,6 +450,9 @@ sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_arra
         const struct sadmm_bound_array *before = bound_of(environments, array, -1);
         TRY(bind(environments, array, before ? before->precision : SADMM_F64, &rows.bound));
     }
+    TRY(sadmm_environments_pull_inputs(environments, true));
     TRY(sadmm_environments_each(environments, which, count, try_one, &rows));
-    return sadmm_environments_each(environments, which, count, set_one, &rows);
+    TRY(sadmm_environments_each(environments, which, count, set_one, &rows));
+    if (rows.bound) return sadmm_environments_push_array(environments, rows.bound);
+    return environments->merged.world ? sadmm_environments_write_merged_outputs(environments, which, count) : SADMM_OK;
 }

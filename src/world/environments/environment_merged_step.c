@@ -4,6 +4,7 @@
 
 #include "core/base/memory.h"
 #include "environment_arrays.h"
+#include "environment_backend.h"
 #include "environment_contacts.h"
 #include "environment_merge.h"
 #include "world/resident/resident.h"
@@ -22,20 +23,71 @@ static sadmm_status take_out(struct sadmm_environments *environments, int32_t en
     return sadmm_environments_give_template_inputs(environments, environment);
 }
 
+/* What input arrays have of an environment; out of range: it is taken out. */
+static sadmm_status read_environment(struct sadmm_environments *environments, int32_t environment)
+{
+    const sadmm_world *all = environments->merged.world;
+    const sadmm_status status = sadmm_environments_read_merged_inputs(environments, environment);
+    const struct sadmm_error cause = all->error;
+    if (status == SADMM_OK) return SADMM_OK;
+    if (status != SADMM_ERROR_INVALID_ARGUMENT)
+        return sadmm_fail(&environments->error, status, "environment %d: %s", environment, cause.message);
+    const sadmm_status out = take_out(environments, environment, cause.message);
+    if (out == SADMM_OK) return SADMM_OK;
+    return sadmm_fail(&environments->error, out, "environment %d: %s", environment,
+                      environments->worker[0].world->error.message);
+}
+
+/* By the host, of all. */
+static sadmm_status read_all(struct sadmm_environments *environments)
+{
+    for (int32_t e = 0; e < environments->count; ++e)
+        if (!environments->marked[e]) TRY(read_environment(environments, e));
+    for (size_t k = 0; k < environments->bound_count; ++k) environments->bound[k].given_unknown = false;
+    return SADMM_OK;
+}
+
+/* Arrays that the host gives to the world: of environments in which one has changed. */
+static sadmm_status read_changed(struct sadmm_environments *environments)
+{
+    for (int32_t e = 0; e < environments->count; ++e)
+        if (!environments->marked[e] && sadmm_environments_inputs_differ(environments, e))
+            TRY(read_environment(environments, e));
+    return SADMM_OK;
+}
+
+/* Arrays that the backend takes by itself; what it refuses the host looks at. */
+static sadmm_status exchange_inputs(struct sadmm_environments *environments)
+{
+    bool any = false, refused;
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        struct sadmm_bound_array *bound = &environments->bound[k];
+        if (!bound->given || !sadmm_environments_may_exchange(environments, bound)) continue;
+        TRY(sadmm_environments_exchange(environments, bound));
+        any = true;
+    }
+    if (!any) return SADMM_OK;
+    TRY(sadmm_environments_find_refused(environments, &refused));
+    if (!refused) return SADMM_OK;
+    TRY(sadmm_environments_pull_inputs(environments, true));
+    for (int32_t e = 0; e < environments->count; ++e)
+        if (environments->merged.refusals[e] && !environments->marked[e]) TRY(read_environment(environments, e));
+    return SADMM_OK;
+}
+
+/* A world that its backend keeps takes most inputs there; as soon as something takes it to the host all inputs are the
+ * host's affair, since it has not seen what the backend has taken. */
 static sadmm_status read_inputs(struct sadmm_environments *environments)
 {
-    sadmm_world *all = environments->merged.world;
-    for (int32_t e = 0; e < environments->count; ++e) {
-        if (environments->marked[e]) continue;
-        const sadmm_status status = sadmm_environments_read_merged_inputs(environments, e);
-        if (status == SADMM_OK) continue;
-        const struct sadmm_error cause = all->error;
-        if (status != SADMM_ERROR_INVALID_ARGUMENT)
-            return sadmm_fail(&environments->error, status, "environment %d: %s", e, cause.message);
-        const sadmm_status out = take_out(environments, e, cause.message);
-        if (out != SADMM_OK)
-            return sadmm_fail(&environments->error, out, "environment %d: %s", e,
-                              environments->worker[0].world->error.message);
+    const sadmm_world *all = environments->merged.world;
+    if (all->resident.loaded) {
+        TRY(sadmm_environments_pull_inputs(environments, false));
+        TRY(read_changed(environments));
+    }
+    if (all->resident.loaded) TRY(exchange_inputs(environments));
+    if (!all->resident.loaded) {
+        TRY(sadmm_environments_pull_inputs(environments, true));
+        TRY(read_all(environments));
     }
     return sadmm_environments_put_contacts(environments);
 }
@@ -89,33 +141,17 @@ static sadmm_status make_steps(struct sadmm_environments *environments, int32_t 
         out = environment;
         last_failed = all->report.step;
         TRY(take_out(environments, environment, cause.message));
+        TRY(sadmm_environments_pull_inputs(environments, true)); /* the others' go on from where the backend had them */
+        TRY(read_all(environments));
         TRY(sadmm_environments_put_contacts(environments));
     }
     return SADMM_OK;
-}
-
-static sadmm_status write_outputs(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
-                                  int32_t environment, int32_t place, void *argument)
-{
-    (void)place;
-    (void)argument;
-    if (environments->marked[environment]) return SADMM_OK;
-    TRY(sadmm_environments_load(environments, worker, environment));
-    return sadmm_environments_write_outputs(environments, worker, environment);
-}
-
-static bool has_outputs(const struct sadmm_environments *environments)
-{
-    for (size_t k = 0; k < environments->bound_count; ++k)
-        if (!sadmm_environments_is_input(environments->bound[k].array)) return true;
-    return false;
 }
 
 sadmm_status sadmm_environments_step_merged(struct sadmm_environments *environments, int32_t steps)
 {
     TRY(read_inputs(environments));
     TRY(make_steps(environments, steps));
-    if (has_outputs(environments))
-        TRY(sadmm_environments_each(environments, NULL, environments->count, write_outputs, NULL));
+    TRY(sadmm_environments_write_merged_outputs(environments, NULL, environments->count));
     return sadmm_environments_keep_merged_contacts(environments);
 }

@@ -10,7 +10,11 @@ struct sadmm_bound_array {
     sadmm_array array;
     sadmm_precision precision;
     size_t numbers; /* an environment: rows x columns */
-    void *values;
+    void *values; /* what the caller has: the host's, or where in_backend the backend's memory */
+    void *host;
+    bool in_backend, host_behind; /* host_behind: `values` are newer */
+    bool by_host;                 /* the host writes it, in the call at hand */
+    bool given_unknown;           /* the merged world has taken others than `given` by itself */
     double *start; /* (numbers) of an input array: the template's */
     double *given; /* (count x numbers) of an input array: what the merged world has; NULL: there is none */
 };
@@ -34,6 +38,13 @@ struct sadmm_environment_progress {
     bool stepped, moved;      /* since the template; since a state was put into it */
 };
 
+/* A state that is kept, in the backend's memory; NULL: it is not there. */
+struct sadmm_kept_block {
+    void *block;
+    sadmm_step_report report;
+    bool stepped;
+};
+
 /* All environments in one world (environment_merge.h); world NULL: each is a state by itself. */
 struct sadmm_merged_world {
     sadmm_world *world;
@@ -43,6 +54,15 @@ struct sadmm_merged_world {
     struct sadmm_contact_set *contacts;          /* (count) of those whose contacts are to be replaced */
     bool *replaced, any_replaced;                /* (count) which these are */
     struct sadmm_contact_set spare;
+
+    /* In the backend's memory, where it has some for environments (environment_backend.h). */
+    bool has_backend;
+    struct sadmm_resident_copies copies;
+    const int32_t *objects;   /* of rows of bodies; then of rows of anything else */
+    uint8_t *left, *refused;  /* (count) not 0: marked; what is out of range */
+    uint8_t *refusals;        /* (count) as they were read last */
+    struct sadmm_kept_block *kept; /* by state; made when it is begun with */
+    size_t kept_count;
 };
 
 /* What one thread works with: a world that becomes one environment after the other. */
@@ -65,6 +85,8 @@ struct sadmm_environments {
     size_t kept_count;
     uint8_t *marked; /* (count) */
     char **marks;    /* (count) why; NULL where it is not marked, or no memory was left to say so */
+    bool marks_changed; /* since the backend has seen them */
+    void *stream;    /* of the caller, whose work on inputs comes before a step; NULL: the default one */
     uint64_t *seen;  /* (count) the last call that named it */
     uint64_t calls;
     struct sadmm_bound_array *bound;

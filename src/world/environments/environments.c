@@ -9,6 +9,7 @@
 #include "core/base/memory.h"
 #include "core/model/settings.h"
 #include "environment_arrays.h"
+#include "environment_backend.h"
 #include "environment_contacts.h"
 #include "environment_merge.h"
 #include "environment_merged_step.h"
@@ -97,6 +98,8 @@ static sadmm_status make(struct sadmm_environments *environments, const struct s
         TRY(sadmm_environment_state_copy(&environments->states[i], &environments->kept[0], error));
     if (!merged) return SADMM_OK;
     TRY(sadmm_environments_merge(environments, error));
+    if (sadmm_environments_open_backend(environments) != SADMM_OK)
+        return sadmm_fail(error, environments->error.status, "%s", environments->error.message);
     const sadmm_status status =
         sadmm_environments_each(environments, NULL, environments->count, begin_merged, NULL);
     return status == SADMM_OK ? status : sadmm_fail(error, status, "%s", environments->error.message);
@@ -156,10 +159,9 @@ void sadmm_environments_destroy(sadmm_environments *environments)
     sadmm_environments_free_contacts(environments);
     for (size_t k = 0; k < environments->kept_count; ++k) sadmm_environment_state_free(&environments->kept[k]);
     for (size_t k = 0; k < environments->bound_count; ++k) {
-        sadmm_free(environments->bound[k].values);
-        sadmm_free(environments->bound[k].start);
-        sadmm_free(environments->bound[k].given);
+        sadmm_environments_release_array(environments, &environments->bound[k]);
     }
+    sadmm_environments_close_backend(environments);
     sadmm_environments_free_merged(environments);
     void *blocks[] = {environments->worker, environments->states, environments->kept, environments->marked,
                       environments->marks,  environments->seen,   environments->bound};
@@ -269,9 +271,7 @@ static sadmm_status begin_again(struct sadmm_environments *environments, struct 
     if (environments->merged.world) {
         sadmm_environments_take_mark(environments, environment);
         TRY(sadmm_environment_state_load(worker->world, from));
-        TRY(sadmm_environments_store(environments, worker, environment));
-        if (environments->contacts) environments->contacts[environment].count = 0;
-        return sadmm_environments_write_outputs(environments, worker, environment);
+        return sadmm_environments_store(environments, worker, environment);
     }
     struct sadmm_environment_state *state = &environments->states[environment];
     TRY(sadmm_environment_state_copy(state, from, &worker->world->error));
@@ -293,12 +293,25 @@ static sadmm_status check_state(struct sadmm_environments *environments, int32_t
     return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "%s = %d: was forgotten", name, state);
 }
 
+/* By the merged world's backend, where it can; else by the host, which takes all of the world. */
+static sadmm_status reset_merged(struct sadmm_environments *environments, const int32_t *which, int32_t count,
+                                 const int32_t *states)
+{
+    bool done;
+    TRY(sadmm_environments_put_kept(environments, which, count, states, &done));
+    if (!done) TRY(sadmm_environments_each(environments, which, count, begin_again, (void *)states));
+    for (int32_t k = 0; environments->contacts && k < count; ++k)
+        environments->contacts[which ? which[k] : k].count = 0;
+    return sadmm_environments_write_merged_outputs(environments, which, count);
+}
+
 sadmm_status sadmm_environments_reset(sadmm_environments *environments, const int32_t *which, int32_t count,
                                       const int32_t *states)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));
     TRY(sadmm_environments_check_which(environments, which, &count));
     for (int32_t k = 0; states && k < count; ++k) TRY(check_state(environments, k, states[k]));
+    if (environments->merged.world) return reset_merged(environments, which, count, states);
     return sadmm_environments_each(environments, which, count, begin_again, (void *)states);
 }
 
@@ -334,6 +347,7 @@ sadmm_status sadmm_environments_forget(sadmm_environments *environments, int32_t
         return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT,
                           "state = 0: must be one that was kept, not the template's");
     sadmm_environment_state_free(&environments->kept[state]);
+    sadmm_environments_forget_kept(environments, (size_t)state);
     return SADMM_OK;
 }
 
