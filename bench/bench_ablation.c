@@ -194,6 +194,7 @@ static void print(const struct bench *b, const char *scene, const struct variati
 static bool fits(const struct bench *b, const struct variation *v, const struct sadmm_scene *scene)
 {
     if (b->o->only && v != variations && !strstr(v->name, b->o->only)) return false;
+    if (v->set == literal_form && scene->def.backend == SADMM_BACKEND_CUDA) return false; /* no step of the GPU's */
     return !v->paper_only || scene->def.settings.method == SADMM_METHOD_PAPER;
 }
 

@@ -17,7 +17,7 @@ from collections import defaultdict
 
 import profiles
 
-COLOURS = {"paper": "tab:red", "fast": "tab:blue"}
+COLOURS = {"paper": "tab:red", "fast": "tab:blue", "paper cuda": "tab:orange", "fast cuda": "tab:cyan"}
 STYLES = ["-", "--", ":", "-."]
 
 
@@ -56,9 +56,10 @@ def draw(plt, curves, path, x_label, y_label, columns=5, shares=False):
         print(f"not drawn: {path}: nothing measured")
         return
     rows = -(-len(curves) // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(3.2 * columns + 2 * shares, 2.5 * rows), squeeze=False)
     all_series = sorted({series for lines in curves.values() for _, series in lines})
     methods = list(dict.fromkeys(method for lines in curves.values() for method, _ in lines))
+    beside = shares or len(all_series) > 2  # too many for the legend to be in a panel
+    figure, axes = plt.subplots(rows, columns, figsize=(3.2 * columns + 2 * beside, 2.5 * rows), squeeze=False)
     for axis, (name, lines) in zip(axes.flat, curves.items()):
         for (method, series), points in sorted(lines.items()):
             if shares:
@@ -71,7 +72,7 @@ def draw(plt, curves, path, x_label, y_label, columns=5, shares=False):
             # What is exact to rounding is drawn at 1e-12.
             axis.loglog([x for x, _ in points], [max(y, 1e-12) for _, y in points],
                         STYLES[all_series.index(series) % len(STYLES)], marker=".", markersize=3,
-                        color=COLOURS.get(method, "tab:green"),
+                        color=COLOURS.get(f"{method} cuda" if series.startswith("cuda") else method, "tab:green"),
                         label=method if len(all_series) == 1 else f"{method}, {series}")
         axis.set_title(name, fontsize="small")
         axis.grid(True, which="major", alpha=0.4)
@@ -88,11 +89,11 @@ def draw(plt, curves, path, x_label, y_label, columns=5, shares=False):
         visible = [axis for axis in axes[:, column] if axis.get_visible()]
         if visible:
             visible[-1].set_xlabel(x_label, fontsize="small")
-    if shares:  # too many for a panel
+    if beside:
         figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="center right")
     else:
         axes[0, 0].legend(fontsize="x-small")
-    figure.tight_layout(rect=(0, 0, 0.83, 1) if shares else None)
+    figure.tight_layout(rect=(0, 0, 0.83 if shares else 0.88, 1) if beside else None)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 

@@ -29,7 +29,7 @@ import numpy as np
 import engines
 import judge
 import scenes
-from report import machine
+from report_files import machine
 
 FRAME = 0.01            # between the times at which poses are compared, s
 LIMIT = 300.0           # of a run, s of the engine's own time
@@ -198,6 +198,7 @@ def main():
     parser.add_argument("--rows", metavar="FILE", help="do not measure; take the rows of such a CSV file")
     parser.add_argument("--csv", metavar="FILE", help="write all rows (-: to standard output)")
     parser.add_argument("--picture", metavar="FILE", help="draw errors against time")
+    parser.add_argument("--complete", action="store_true", help="do not measure where an engine cannot be had")
     parser.add_argument("--quick", action="store_true", help="a tenth of the duration, tuned, whole steps only")
     parser.add_argument("--list", action="store_true", help="scenes, engines and their settings")
     args = parser.parse_args()
@@ -216,6 +217,8 @@ def main():
     chosen, missing = find_engines(args.engine, args.driver)
     for line in missing:
         print(line, file=sys.stderr)
+    if args.complete and missing:
+        sys.exit("not every engine can be had")
     if not chosen:
         sys.exit("no engine can be had")
     rows = list(rows_of(args.scene or list(scenes.SCENES), chosen, args.quick,
