@@ -74,7 +74,8 @@ def test_a_runner_learns(tmp_path):
     network = {"class_name": "MLPModel", "hidden_dims": [32, 32], "activation": "elu", "obs_normalization": False}
     runner = OnPolicyRunner(envs, {
         "num_steps_per_env": 24, "save_interval": 1000, "obs_groups": {"actor": ["policy"], "critic": ["policy"]},
-        "actor": dict(network, distribution_cfg={"class_name": "GaussianDistribution", "init_std": 1.0}), "critic": network,
+        "actor": dict(network, distribution_cfg={"class_name": "GaussianDistribution", "init_std": 1.0}),
+        "critic": network,
         "algorithm": {"class_name": "PPO", "learning_rate": 1e-2, "schedule": "fixed", "rnd_cfg": None, "gamma": 0.98,
                       "num_learning_epochs": 5, "num_mini_batches": 4, "entropy_coef": 0.0}}, log_dir=None)
     policy = runner.get_inference_policy()

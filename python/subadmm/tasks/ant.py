@@ -10,8 +10,8 @@ from .task import Task
 
 
 class Ant(Task):
-    """gymnasium's ant walks along x: its model, observation (without contact forces) and reward: speed along x, 1 a step
-    while its torso is between 0.2 and 1 m high, less half the squared actions."""
+    """gymnasium's ant walks along x: its model, observation (without contact forces) and reward: speed along x, 1 a
+    step while its torso is between 0.2 and 1 m high, less half the squared actions."""
 
     def __init__(self, count, *, threads=None, episode=1000, **options):
         model = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"

@@ -21,7 +21,7 @@ class RslRl:
             import torch
             from tensordict import TensorDict
         except ImportError as error:
-            raise ImportError("subadmm.gym.RslRl needs torch and tensordict: python -m pip install rsl-rl-lib") from error
+            raise ImportError("RslRl needs torch and tensordict: python -m pip install rsl-rl-lib") from error
         if not isinstance(task, Task):
             raise TypeError(f"task = {task!r}: must be a subadmm.gym.Task")
         if task.episode < 1:
