@@ -208,6 +208,35 @@ START_TEST(changes_of_a_body_do_not_pile_up)
 }
 END_TEST
 
+/* Materials, sizes and places of shapes that are set while the device has the world: the steps of a world that was
+ * given to it with them. */
+START_TEST(shapes_that_change)
+{
+    static const double size[3] = {0.12, 0.1, 0.1}, place[3] = {0.01, 0, 0.02}, turned[4] = {0.6, 0, 0, 0.8};
+    const int precision = _i / 3, what = _i % 3;
+    sadmm_world *world = small_world(precision, 1), *unchanged = small_world(precision, 1),
+                *fresh = small_world(precision, 1);
+    sadmm_shape_id id;
+    size_t bytes;
+    for (int body = 1; body <= 2; ++body) set_wrench(world, body, 4, 1), set_wrench(unchanged, body, 4, 1);
+    step_world(world, 6), step_world(unchanged, 6);
+    MUST(world, sadmm_world_shape_at(world, 2, &id));
+    if (what == 0) MUST(world, sadmm_world_set_shape_material(world, id, 0.01, 0));
+    if (what == 1) MUST(world, sadmm_world_set_shape_size(world, id, size));
+    if (what == 2) MUST(world, sadmm_world_set_shape_frame(world, id, place, turned));
+    world->def.backend = SADMM_BACKEND_AUTO; /* use_device has chosen */
+    MUST(world, sadmm_world_save(world, NULL, 0, &bytes));
+    void *saved = malloc(bytes);
+    MUST(world, sadmm_world_save(world, saved, bytes, &bytes));
+    MUST(fresh, sadmm_world_restore(fresh, saved, bytes));
+    free(saved);
+    step_world(world, 6), step_world(fresh, 6), step_world(unchanged, 6);
+    ck_assert(state_hash(world) != state_hash(unchanged));
+    expect_same_world(world, fresh, "shapes that change");
+    sadmm_world_destroy(world), sadmm_world_destroy(fresh), sadmm_world_destroy(unchanged);
+}
+END_TEST
+
 /* Getters between changes and steps, waited for or not: they give what was set, and the rest as the last step left
  * it. */
 START_TEST(reading_between_changes)
@@ -577,6 +606,7 @@ int main(void)
     Suite *suite = suite_create("cuda_changes");
     ADD_CASE(suite, the_last_change_of_a_body_counts, 0, parts);
     ADD_CASE(suite, changes_of_a_body_do_not_pile_up, 0, parts);
+    ADD_CASE(suite, shapes_that_change, 0, 3 * parts);
     ADD_CASE(suite, reading_between_changes, 0, parts);
     ADD_CASE(suite, queries_between_changes, 0, parts);
     ADD_CASE(suite, numbers_of_the_settings_change_at_every_step, 0, 2 * parts);

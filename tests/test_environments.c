@@ -243,7 +243,9 @@ static const sadmm_array inputs[] = {SADMM_ARRAY_BODY_WRENCH,
                                      SADMM_ARRAY_JOINT_DRIVE_STIFFNESS,
                                      SADMM_ARRAY_JOINT_DRIVE_DAMPING,
                                      SADMM_ARRAY_BODY_GRAVITY_SCALE,
-                                     SADMM_ARRAY_JOINT_DRIVE_LIMIT};
+                                     SADMM_ARRAY_JOINT_DRIVE_LIMIT,
+                                     SADMM_ARRAY_SHAPE_SIZE,
+                                     SADMM_ARRAY_SHAPE_FRAME};
 enum { INPUTS = sizeof inputs / sizeof *inputs };
 
 /* Every number that is not 0 becomes another one; those of joints' free coordinates, too. */
@@ -260,6 +262,10 @@ static void vary(sadmm_world *world, sadmm_array array, int32_t environment, int
         if (array == SADMM_ARRAY_JOINT_FRICTION && k / (size_t)columns < 2 && k % (size_t)columns == 5)
             numbers[k] = 0.1 + 0.1 * x;
         if (array == SADMM_ARRAY_BODY_WRENCH && k / (size_t)columns > 0 && k % (size_t)columns < 3) numbers[k] = 3 * x;
+    }
+    for (size_t k = 0; array == SADMM_ARRAY_SHAPE_FRAME && k < n; k += 7) {
+        for (size_t j = k; j < k + 3; ++j) numbers[j] = 0.01 * noise((uint32_t)(environment + 100 * step), (uint32_t)j);
+        numbers[k + 3] = 0.96, numbers[k + 6] = environment % 2 ? 0.28 : -0.28; /* about z; of unit length */
     }
     if (array == SADMM_ARRAY_SHAPE_MATERIAL)
         for (size_t k = 1; k < n; k += 2) numbers[k] = environment % 2 ? 0.3 : 0;
@@ -539,6 +545,151 @@ START_TEST(contacts_and_rays_are_an_environments_own)
 }
 END_TEST
 
+static void *save_of(sadmm_environments *environments, int32_t environment, size_t *size)
+{
+    MUST_ALL(environments, sadmm_environments_save(environments, environment, NULL, 0, size));
+    void *bytes = malloc(*size);
+    ck_assert_ptr_nonnull(bytes);
+    MUST_ALL(environments, sadmm_environments_save(environments, environment, bytes, *size, size));
+    return bytes;
+}
+
+/* Boxes slide and balls roll over a heightfield and over two flush slabs. */
+static sadmm_world *build_ground(int threads)
+{
+    enum { SIDE = 60 };
+    double heights[SIDE * SIDE];
+    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_heightfield_def field = sadmm_heightfield_def_default();
+    sadmm_mesh *mesh;
+    def.backend = SADMM_BACKEND_CPU;
+    def.settings.threads = threads;
+    sadmm_world *world = create_world(&def);
+    for (int r = 0; r < SIDE; ++r)
+        for (int c = 0; c < SIDE; ++c) heights[SIDE * r + c] = 0.05 * sin(0.7 * r) * sin(0.9 * c + 0.01 * r * r);
+    field.heights = heights, field.rows = field.columns = SIDE;
+    field.spacing[0] = field.spacing[1] = 0.1;
+    ck_assert_int_eq(sadmm_heightfield_create(&field, &mesh), SADMM_OK);
+    for (int k = 0; k < 3; ++k) {
+        sadmm_body_def body = sadmm_body_def_default();
+        sadmm_shape_def shape = sadmm_shape_def_default();
+        sadmm_body_id id;
+        body.type = SADMM_BODY_STATIC;
+        body.environment = -1;
+        if (k > 0) body.position[0] = k == 1 ? 9 : 11, body.position[2] = -0.1;
+        MUST(world, sadmm_world_add_body(world, &body, &id));
+        shape.type = k > 0 ? SADMM_SHAPE_BOX : SADMM_SHAPE_MESH;
+        if (k == 0) shape.mesh = mesh;
+        else shape.size[0] = shape.size[1] = 1, shape.size[2] = 0.1;
+        MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+    }
+    sadmm_mesh_destroy(mesh);
+    for (int k = 0; k < 6; ++k) {
+        sadmm_body_def body = sadmm_body_def_default();
+        sadmm_shape_def shape = sadmm_shape_def_default();
+        sadmm_body_id id;
+        body.mass = 1;
+        for (int j = 0; j < 3; ++j) body.inertia[j] = 0.004 + 0.001 * j;
+        body.position[0] = k < 4 ? 0.3 * k - 1 : 9.6, body.position[1] = k < 4 ? 0.2 : 0.5 * k - 2.3;
+        body.position[2] = k < 4 ? 0.25 : 0.1;
+        body.linear_velocity[0] = 2;
+        MUST(world, sadmm_world_add_body(world, &body, &id));
+        shape.type = k % 2 ? SADMM_SHAPE_BOX : SADMM_SHAPE_SPHERE;
+        for (int j = 0; j < 3; ++j) shape.size[j] = 0.1;
+        MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+    }
+    return world;
+}
+
+/* Each begins elsewhere on the heightfield, and between its slabs there is another gap: the steps of a world that has
+ * it so, whoever had the worker before. */
+START_TEST(ground_is_an_environments_own)
+{
+    enum { MANY = 7 };
+    const int threads = _i ? 2 : 1;
+    sadmm_test_force_threads(threads > 1);
+    sadmm_world *origin = build_ground(threads), *worlds[MANY];
+    sadmm_environments *environments = replicate(origin, MANY);
+    const size_t n = numbers_of(origin, SADMM_ARRAY_SHAPE_FRAME), bodies = numbers_of(origin, SADMM_ARRAY_BODY_STATE);
+    double *frames = array_of(environments, SADMM_ARRAY_SHAPE_FRAME), heights[MANY];
+    const double *state = array_of(environments, SADMM_ARRAY_BODY_STATE);
+    sadmm_ray rays[MANY];
+    sadmm_ray_hit hits[MANY], own;
+    for (int32_t e = 0; e < MANY; ++e) {
+        double *frame = frames + n * (size_t)e;
+        frame[0] = -0.17 * e, frame[1] = -0.23 * e;
+        frame[14] = 0.02 * (e % 3); /* of the second slab, along x */
+        worlds[e] = alone(origin);
+        write_array(worlds[e], SADMM_ARRAY_SHAPE_FRAME, frame);
+        rays[e] = (sadmm_ray){{0.33, 0.12, 3}, {0, 0, -1}, INFINITY};
+    }
+    MUST_ALL(environments, sadmm_environments_cast_rays(environments, NULL, 0, 1, rays, NULL, hits));
+    for (int32_t e = 0; e < MANY; ++e) {
+        MUST(worlds[e], sadmm_world_cast_rays(worlds[e], 1, rays, NULL, &own));
+        ck_assert_mem_eq(&own, &hits[e], sizeof own);
+        heights[e] = hits[e].point[2];
+        for (int32_t other = 0; other < e; ++other) ck_assert(heights[e] != heights[other]);
+    }
+    for (int step = 0; step < 60; ++step) {
+        MUST_ALL(environments, sadmm_environments_step(environments, 1));
+        for (int32_t e = 0; e < MANY; ++e) {
+            step_world(worlds[e], 1);
+            double *mine = read_array(worlds[e], SADMM_ARRAY_BODY_STATE);
+            expect_same(state + bodies * (size_t)e, mine, bodies, "ground", e, step);
+            free(mine);
+        }
+    }
+    for (int32_t e = 1; e < MANY; ++e) {
+        ck_assert_int_gt(world_report(worlds[e]).contacts, 4);
+        ck_assert(memcmp(state, state + bodies * (size_t)e, bodies * sizeof *state) != 0);
+    }
+    for (int32_t e = 0; e < MANY; ++e) sadmm_world_destroy(worlds[e]);
+    sadmm_environments_destroy(environments);
+    sadmm_world_destroy(origin);
+    sadmm_test_force_threads(false);
+}
+END_TEST
+
+/* Resets keep sizes, and begin again as a world does that is given them at its start; one that is refused is marked and
+ * has the template's when it is looked at. */
+START_TEST(sizes_outlast_resets)
+{
+    struct machine m = build_machine();
+    step_world(m.world, 30);
+    sadmm_environments *environments = replicate(m.world, 3);
+    const size_t n = numbers_of(m.world, SADMM_ARRAY_SHAPE_SIZE), bodies = numbers_of(m.world, SADMM_ARRAY_BODY_STATE);
+    double *sizes = array_of(environments, SADMM_ARRAY_SHAPE_SIZE), grown[64];
+    const double *state = array_of(environments, SADMM_ARRAY_BODY_STATE);
+    ck_assert_uint_le(n, 64);
+    for (size_t k = 0; k < n; ++k) grown[k] = sizes[n + k] *= k < 3 ? 1 : 1.05;
+    sadmm_world *world = alone(m.world);
+    write_array(world, SADMM_ARRAY_SHAPE_SIZE, grown);
+    for (int episode = 0; episode < 3; ++episode) {
+        if (episode > 0) MUST_ALL(environments, sadmm_environments_reset(environments, NULL, 0, NULL));
+        MUST_ALL(environments, sadmm_environments_step(environments, 25));
+        if (episode == 0) step_world(world, 25);
+        double *own = read_array(world, SADMM_ARRAY_BODY_STATE);
+        expect_same(state + bodies, own, bodies, "grown", 1, episode);
+        expect_same(state, state + 2 * bodies, bodies, "others", 2, episode);
+        ck_assert(memcmp(state, state + bodies, bodies * sizeof *state) != 0);
+        free(own);
+    }
+    sizes[n + 4] = -1;
+    MUST_ALL(environments, sadmm_environments_step(environments, 1));
+    ck_assert_msg(strstr(sadmm_environments_mark(environments, 1), "shape_size: values, row 1: size[1] = -1") != NULL,
+                  "\"%s\"", sadmm_environments_mark(environments, 1));
+    size_t size;
+    void *bytes = save_of(environments, 1, &size);
+    MUST(world, sadmm_world_restore(world, bytes, size));
+    double *own = read_array(world, SADMM_ARRAY_SHAPE_SIZE), *first = read_array(m.world, SADMM_ARRAY_SHAPE_SIZE);
+    ck_assert_mem_eq(own, first, n * sizeof *own);
+    free(own), free(first), free(bytes);
+    sadmm_world_destroy(world);
+    sadmm_environments_destroy(environments);
+    sadmm_world_destroy(m.world);
+}
+END_TEST
+
 /* Limits of each, which no other one's bounds fit, whoever was stepped before by the same worker. */
 START_TEST(limits_are_an_environments_own)
 {
@@ -615,15 +766,6 @@ START_TEST(any_worker_reads_any_environment)
 }
 END_TEST
 
-static void *save_of(sadmm_environments *environments, int32_t environment, size_t *size)
-{
-    MUST_ALL(environments, sadmm_environments_save(environments, environment, NULL, 0, size));
-    void *bytes = malloc(*size);
-    ck_assert_ptr_nonnull(bytes);
-    MUST_ALL(environments, sadmm_environments_save(environments, environment, bytes, *size, size));
-    return bytes;
-}
-
 /* A save says nothing of other environments, and there is one of an environment that is marked. Settings are those of
  * all, whatever gravity the last one had. */
 START_TEST(saves_and_settings_are_of_one_and_of_all)
@@ -654,18 +796,24 @@ START_TEST(saves_and_settings_are_of_one_and_of_all)
 }
 END_TEST
 
-/* Moments a, b and a + b, and the least mass, are not within their ranges once they are rounded to single precision. */
-START_TEST(single_precision_takes_nothing_from_inertia)
+/* Moments a, b and a + b, the least mass and the least size are not within their ranges once they are rounded to single
+ * precision. */
+START_TEST(single_precision_takes_nothing_away)
 {
     const sadmm_world_def def = sadmm_world_def_default();
     sadmm_world *world = create_world(&def);
     sadmm_body_def body = sadmm_body_def_default();
-    sadmm_environments_array inertia;
+    sadmm_environments_array inertia, sizes, frames;
     body.mass = 1e-9;
     body.inertia[0] = 0.1e-9, body.inertia[1] = 0.2e-9, body.inertia[2] = 0.1e-9 + 0.2e-9;
     sadmm_body_id id;
     MUST(world, sadmm_world_add_body(world, &body, &id));
+    sadmm_shape_def shape = sadmm_shape_def_default();
+    shape.size[0] = 1e-6; /* of a sphere; the nearest float is less */
+    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
     sadmm_environments *environments = replicate(world, 3);
+    MUST_ALL(environments, sadmm_environments_bind(environments, SADMM_ARRAY_SHAPE_SIZE, SADMM_F32, &sizes));
+    MUST_ALL(environments, sadmm_environments_bind(environments, SADMM_ARRAY_SHAPE_FRAME, SADMM_F32, &frames));
     MUST_ALL(environments, sadmm_environments_bind(environments, SADMM_ARRAY_BODY_INERTIA, SADMM_F32, &inertia));
     MUST_ALL(environments, sadmm_environments_step(environments, 2));
     for (int e = 0; e < 3; ++e) ck_assert_str_eq(sadmm_environments_mark(environments, e), "");
@@ -859,10 +1007,12 @@ int main(void)
     tcase_add_test(cases, what_goes_wrong_stays_alone);
     tcase_add_test(cases, single_precision_arrays_are_rounded);
     tcase_add_test(cases, contacts_and_rays_are_an_environments_own);
+    tcase_add_loop_test(cases, ground_is_an_environments_own, 0, 2);
+    tcase_add_test(cases, sizes_outlast_resets);
     tcase_add_test(cases, limits_are_an_environments_own);
     tcase_add_test(cases, any_worker_reads_any_environment);
     tcase_add_test(cases, saves_and_settings_are_of_one_and_of_all);
-    tcase_add_test(cases, single_precision_takes_nothing_from_inertia);
+    tcase_add_test(cases, single_precision_takes_nothing_away);
     tcase_add_test(cases, what_is_refused_changes_nothing);
     tcase_add_test(cases, calls_survive_a_lack_of_memory);
     tcase_add_test(cases, memory_may_run_out);

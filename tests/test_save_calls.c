@@ -213,8 +213,15 @@ static sadmm_status change_body(struct draw *d, sadmm_world *world)
 static sadmm_status change_shape(struct draw *d, sadmm_world *world)
 {
     const sadmm_shape_id id = any_shape(d, world);
-    switch (below(d, 4)) {
+    double size[3], place[3], way[4];
+    for (int k = 0; k < 3; ++k) size[k] = number(d, 0.05, 0.3), place[k] = number(d, -0.2, 0.2);
+    if (!rarely(d, 3)) size[2] = 0; /* as many as there may be */
+    if (!rarely(d, 3)) size[1] = size[2] = 0;
+    turn(d, way);
+    switch (below(d, 6)) {
     case 0: return sadmm_world_set_shape_material(world, id, number(d, 0, 1), number(d, 0, 1.1));
+    case 3: return sadmm_world_set_shape_size(world, id, size);
+    case 4: return sadmm_world_set_shape_frame(world, id, place, way);
     case 1: return sadmm_world_set_pair_friction(world, id, any_shape(d, world), rarely(d, 2) ? -1 : number(d, 0, 1));
     case 2: return sadmm_world_remove_shape(world, id);
     default: return add_shape(d, world);

@@ -74,6 +74,11 @@ typedef enum sadmm_array {
     SADMM_ARRAY_REPORT,  /* 8, of the last step: error (m/s, -1: not known), unsolved (-1: no tolerance),
                                        penetration_max (m), joint_drift (m), contacts, iterations, step, time (s), as in
                                        sadmm_step_report. Read only */
+    /* A row a shape. */
+    SADMM_ARRAY_SHAPE_SIZE,  /* 3: sadmm_shape_def.size, m; 0, and must be 0, where the type has no such size: planes,
+                                hulls and meshes have none. Set: as sadmm_world_set_shape_size */
+    SADMM_ARRAY_SHAPE_FRAME, /* 7: position (m), orientation (w x y z) of the shape's frame in the body's. Set: as
+                                sadmm_world_set_shape_frame */
     SADMM_ARRAY_COUNT
 } sadmm_array;
 

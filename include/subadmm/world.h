@@ -167,6 +167,18 @@ static inline sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape
  * INVALID_ARGUMENT (range; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id id, double friction,
                                                       double restitution);
+/* Replace the sizes of a shape (m, meaning and range as in the definition; those that its type does not use must be 0)
+ * from the next step on. Of a sphere, capsule, box, cylinder, cone or ellipsoid; planes, hulls and meshes have none.
+ * The body keeps its mass, its inertia and its centre of mass: see sadmm_world_set_body_mass. Contacts of the shape
+ * begin anew, without their impulses and without the memory of which side they came from. What a shape grows into it
+ * overlaps: position correction parts them. Numbers that are what the shape has cost nothing. Errors: STALE_ID,
+ * INVALID_ARGUMENT (range; nothing changes), DEVICE. */
+SADMM_API sadmm_status sadmm_world_set_shape_size(sadmm_world *world, sadmm_shape_id id, const double size[3]);
+/* Replace the pose of a shape of any type in its body's frame (m; w x y z; ranges as in the definition) from the next
+ * step on; mass and contacts as above. Of a mesh on a static body this moves the terrain. An orientation that is of
+ * unit length to rounding is taken as it is. Errors: STALE_ID, INVALID_ARGUMENT (range; nothing changes), DEVICE. */
+SADMM_API sadmm_status sadmm_world_set_shape_frame(sadmm_world *world, sadmm_shape_id id, const double position[3],
+                                                   const double orientation[4]);
 /* Override the pair's friction (mu in [0, 1e6]), or give -1 to return to the geometric mean. Errors: STALE_ID,
  * INVALID_ARGUMENT (range; a and b the same), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b,

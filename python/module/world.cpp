@@ -322,6 +322,27 @@ static void bind_body(nb::module_ &m)
             },
             "friction"_a, "restitution"_a = 0.0)
         .def(
+            "set_size",
+            [](const shape &s, nb::object size) {
+                sadmm_shape_def def;
+                vec3 given = {0, 0, 0};
+                call(s.in(), [&](sadmm_world *h) { return sadmm_world_shape_def(h, s.id, &def, nullptr); });
+                read_numbers("size", size, (size_t)sadmm_shape_sizes[def.type], given.data());
+                call(s.in(), [&](sadmm_world *h) { return sadmm_world_set_shape_size(h, s.id, given.data()); });
+            },
+            "size"_a,
+            "Other sizes, m, as many as its type has; the mass of the body stays. Contacts of the shape begin anew.")
+        .def(
+            "set_frame",
+            [](const shape &s, numbers<3> position, numbers<4> orientation) {
+                const vec3 x = position.as("position");
+                const quat q = orientation.as("orientation");
+                call(s.in(), [&](sadmm_world *h) { return sadmm_world_set_shape_frame(h, s.id, x.data(), q.data()); });
+            },
+            "position"_a, "orientation"_a = quat{1, 0, 0, 0},
+            "Another place in its body's frame (m; w x y z); the mass of the body stays. Contacts of the shape begin "
+            "anew.")
+        .def(
             "set_pair_friction",
             [](const shape &a, const shape &b, double mu) {
                 const sadmm_shape_id other = id_in(a.in(), b, "other");

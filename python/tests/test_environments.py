@@ -247,6 +247,35 @@ def test_one_that_fails_is_alone(robot):
     assert not robots.failed.any() and (state[1] == other[1]).all()
 
 
+def test_sizes_and_terrain_of_each():
+    """Balls of their own sizes, each on its own patch of one heightfield: at rest as high as a ray says that it is."""
+    random = np.random.default_rng(4)
+    world = subadmm.World(backend="cpu")
+    ground = world.add_body(type="static", environment=-1)
+    x = np.linspace(-8, 8, 161)
+    steps = np.round(2 * np.sin(1.1 * x[:, None]) * np.cos(0.8 * x)) * 0.02  # flat between its edges
+    ground.add_shape(subadmm.heightfield(steps, spacing=(0.1, 0.1)))
+    ball = world.add_solid(subadmm.sphere(0.05), density=500, position=(0, 0, 0.4))
+    ball.set_damping(2, 2)
+    many = subadmm.replicate(world, 12)
+    frame, size = many.array("shape_frame"), many.array("shape_size")
+    frame[:, 0, :2] = random.uniform(-6, 6, (12, 2))
+    size[:, 1, 0] = np.linspace(0.03, 0.08, 12)
+    many.step(300)
+    place = many.array("body_state")[:, 1, :3]
+    distance, _, normal = many.cast_rays(place[:, None] + [0, 0, 1.0], [0, 0, -1.0], types=("static",))
+    assert not many.failed.any() and len(np.unique(np.round(place[:, 2] - size[:, 1, 0], 4))) > 2
+    flat = normal[:, 0, 2] > 1 - 1e-12
+    assert flat.sum() > 6
+    np.testing.assert_allclose((distance[:, 0] - 1)[flat], size[flat, 1, 0], atol=1e-3)  # what contacts leave
+    many.reset()
+    assert (size[:, 1, 0] == np.linspace(0.03, 0.08, 12)).all()
+    alone = many.world(7)
+    alone.step(50)
+    many.step(50)
+    assert (alone.get("body_state") == many.array("body_state")[7]).all()
+
+
 def test_contacts_and_rays(robot):
     robots = subadmm.replicate(robot, 3)
     with pytest.raises(subadmm.Unavailable):

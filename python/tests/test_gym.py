@@ -6,6 +6,8 @@ gymnasium = pytest.importorskip("gymnasium", minversion="1.1")
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
 import subadmm.gym  # noqa: E402
+from subadmm.tasks.cartpole import MODEL  # noqa: E402
+from subadmm.tasks.task import load_text  # noqa: E402
 
 
 def run(envs, steps, seed=3, actions=None):
@@ -36,7 +38,7 @@ def test_spaces_and_shapes():
 
 def test_what_is_refused():
     with pytest.raises(ValueError, match="decimation"):
-        subadmm.gym.Task(subadmm.gym._load_text(subadmm.gym.CARTPOLE), 2, decimation=0)
+        subadmm.gym.Task(load_text(MODEL), 2, decimation=0)
     with pytest.raises(TypeError, match="robot"):
         subadmm.gym.Task(subadmm.World(), 2)
     envs = subadmm.gym.CartPole(3)

@@ -33,6 +33,31 @@ def test_a_box_falls_and_rests():
     assert (contacts["triangle"] == -1).all() and contacts["friction"] == pytest.approx(np.full(4, 0.5))
 
 
+def test_sizes_and_places_of_shapes():
+    world = subadmm.World(backend="cpu")
+    world.add_ground()
+    ball = world.add_solid(subadmm.sphere(0.1), mass=2, position=(0, 0, 0.1))
+    shape = world.shapes[1]
+    inertia = ball.inertia
+    shape.set_size([0.15])
+    shape.set_frame((0, 0, 0.05))
+    assert shape.definition.size[0] == 0.15 and shape.definition.position == [0, 0, 0.05]
+    assert shape.definition.orientation == [1, 0, 0, 0] and ball.mass == 2 and ball.inertia == inertia
+    assert world.get("shape_size").tolist() == [[0, 0, 0], [0.15, 0, 0]]
+    world.step(200)
+    assert ball.position[2] == pytest.approx(0.1, abs=1e-3)  # 0.15 above the floor, less 0.05: what contacts leave
+    with pytest.raises(subadmm.InvalidArgument, match=r"size\[0\] = 0: must be in \[1e-06, 1e\+06\] m"):
+        shape.set_size([0])
+    with pytest.raises(TypeError, match="size = .*must be 1 numbers"):
+        shape.set_size([0.1, 0.1])
+    with pytest.raises(subadmm.InvalidArgument, match="orientation"):
+        shape.set_frame((0, 0, 0), (1, 1, 0, 0))
+    frames = world.get("shape_frame")
+    frames[1, 2] = np.nan
+    with pytest.raises(subadmm.InvalidArgument, match=r"values, row 1: position\[2\] = nan"):
+        world.set("shape_frame", frames)
+
+
 def test_arrays():
     world, box = falling_box()
     ball = world.add_solid(subadmm.sphere(0.1), mass=2, position=(1, 0, 0.5))

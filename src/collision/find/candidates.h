@@ -19,7 +19,7 @@
 
 /* What decides whether a shape's entry in the broad phase is still the same. Planes have no entry. */
 struct sadmm_seen {
-    uint32_t revision;
+    uint32_t revision, formed;
     int32_t body, group;
     bool alive, moves;
     bool still;      /* on a body that does not move; */

@@ -90,14 +90,15 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     }
     body = &input->bodies[shape->body];
     now.revision = shape->revision;
+    now.formed = shape->formed;
     now.body = shape->body;
     now.group = body->environment;
     now.alive = true;
     now.moves = body->system_body >= 0;
     now.still = body->system_body == -1;
     now.placed = now.still ? body->placed : 0;
-    same = seen->alive && seen->revision == now.revision && seen->body == now.body && seen->group == now.group &&
-           seen->moves == now.moves;
+    same = seen->alive && seen->revision == now.revision && seen->formed == now.formed && seen->body == now.body &&
+           seen->group == now.group && seen->moves == now.moves;
     seams = same && seen->still == now.still && seen->placed == now.placed ? 0 : SLOT_SEAMS;
     same = same && !renew;
     seen->still = now.still;

@@ -12,7 +12,7 @@ struct sadmm_collision_input {
     const double *hulls;              /* shape data (hull_data.h); NULL: none is a HULL, a MESH, or smooth
                                          (geometry.h) */
     size_t hull_doubles;
-    uint32_t hull_revision;           /* changes whenever the shape data does */
+    uint32_t hull_revision;           /* changes whenever the shape data does, or anything of a shape */
     const struct sadmm_collision_body *bodies; /* by world body slot */
     size_t body_count;
     double dt;                        /* of what contacts are found for: the step, or the sub-step */

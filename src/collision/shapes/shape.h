@@ -38,6 +38,8 @@ struct sadmm_shape {
     int32_t body;     /* world body slot */
     bool alive, sensor; /* a sensor is the world's alone: to contact finding its slot is a dead one */
     uint32_t revision; /* changes whenever the slot is reused or the shape's definition changes, geometry included */
+    uint32_t formed;   /* likewise, but never the same again in a world: what is kept from step to step of a slot, other
+                          than contacts, holds while it lasts */
 };
 
 /* Does this slot take part? */

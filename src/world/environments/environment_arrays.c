@@ -47,10 +47,12 @@ static struct sadmm_bound_array *bound_of(const struct sadmm_environments *envir
 }
 
 /* Single precision may take numbers out of their range by rounding: the least mass, a moment that is the sum of the
- * others. They become what they were meant to be. */
+ * others, the least size. They become what they were meant to be. */
+static const double rounding = 1 + 1e-6; /* of single precision */
+
 static void mend_inertia(double *row)
 {
-    static const double rounding = 1 + 1e-6, least = 1e-9; /* of single precision; kg */
+    static const double least = 1e-9; /* kg */
     if (row[0] < least && row[0] * rounding >= least) row[0] = least;
     for (int k = 1; k < 4; ++k) {
         const double most = row[1 + k % 3] + row[1 + (k + 1) % 3];
@@ -58,10 +60,19 @@ static void mend_inertia(double *row)
     }
 }
 
+static void mend_size(double *size)
+{
+    static const double least = 1e-6; /* m */
+    if (*size < least && *size * rounding >= least) *size = least;
+}
+
 static void mend(const struct sadmm_bound_array *bound, double *numbers)
 {
-    if (bound->precision != SADMM_F32 || bound->array != SADMM_ARRAY_BODY_INERTIA) return;
-    for (size_t k = 0; k < bound->numbers; k += 4) mend_inertia(numbers + k);
+    if (bound->precision != SADMM_F32) return;
+    if (bound->array == SADMM_ARRAY_BODY_INERTIA)
+        for (size_t k = 0; k < bound->numbers; k += 4) mend_inertia(numbers + k);
+    if (bound->array == SADMM_ARRAY_SHAPE_SIZE)
+        for (size_t k = 0; k < bound->numbers; ++k) mend_size(numbers + k);
 }
 
 static void load_numbers(const struct sadmm_bound_array *bound, int32_t environment, double *out)
@@ -115,7 +126,17 @@ static void open_limits(const struct sadmm_environments *environments, sadmm_wor
     }
 }
 
-/* All but those of one array. good: one that is refused is the template's. */
+/* good: one that is refused is the template's. */
+static sadmm_status read_input(struct sadmm_environment_worker *worker, const struct sadmm_bound_array *bound,
+                               int32_t environment, bool good)
+{
+    load_numbers(bound, environment, worker->numbers);
+    const sadmm_status status = set_all(worker->world, bound->array, worker->numbers);
+    if (status != SADMM_ERROR_INVALID_ARGUMENT || !good) return status;
+    return set_all(worker->world, bound->array, bound->start);
+}
+
+/* All but those of one array. */
 static sadmm_status read_inputs(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
                                 int32_t environment, int but, bool good)
 {
@@ -123,10 +144,7 @@ static sadmm_status read_inputs(struct sadmm_environments *environments, struct 
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
         if (!sadmm_environments_is_input(bound->array) || (int)bound->array == but) continue;
-        load_numbers(bound, environment, worker->numbers);
-        const sadmm_status status = set_all(worker->world, bound->array, worker->numbers);
-        if (status == SADMM_ERROR_INVALID_ARGUMENT && good) TRY(set_all(worker->world, bound->array, bound->start));
-        else TRY(status);
+        TRY(read_input(worker, bound, environment, good));
     }
     return SADMM_OK;
 }
@@ -141,6 +159,17 @@ sadmm_status sadmm_environments_read_good_inputs(struct sadmm_environments *envi
                                                  struct sadmm_environment_worker *worker, int32_t environment)
 {
     return read_inputs(environments, worker, environment, -1, true);
+}
+
+sadmm_status sadmm_environments_read_good_forms(struct sadmm_environments *environments,
+                                                struct sadmm_environment_worker *worker, int32_t environment)
+{
+    for (size_t k = 0; k < environments->bound_count; ++k) {
+        const struct sadmm_bound_array *bound = &environments->bound[k];
+        if (bound->array == SADMM_ARRAY_SHAPE_SIZE || bound->array == SADMM_ARRAY_SHAPE_FRAME)
+            TRY(read_input(worker, bound, environment, true));
+    }
+    return SADMM_OK;
 }
 
 /* Numbers of an environment that the merged world does not have yet. */

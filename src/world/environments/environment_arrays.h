@@ -21,6 +21,9 @@ sadmm_status sadmm_environments_pull_inputs(struct sadmm_environments *environme
 /* The other arrays that are bound are those of the merged world, of the environments `which` that are not marked. */
 sadmm_status sadmm_environments_write_merged_outputs(struct sadmm_environments *environments, const int32_t *which,
                                                      int32_t count);
+/* The same of sizes and places of shapes alone: what rays see besides the state. */
+sadmm_status sadmm_environments_read_good_forms(struct sadmm_environments *environments,
+                                                struct sadmm_environment_worker *worker, int32_t environment);
 /* The other arrays that are bound, and contacts where they are recorded, are those of the worker's world. */
 sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environments,
                                               struct sadmm_environment_worker *worker, int32_t environment);

@@ -356,6 +356,7 @@ sadmm_status sadmm_environments_forget(sadmm_environments *environments, int32_t
 static sadmm_status become(struct sadmm_environments *environments, int32_t environment)
 {
     struct sadmm_environment_worker *worker = &environments->worker[0];
+    TRY(sadmm_environments_pull_inputs(environments, true));
     TRY(sadmm_environments_load(environments, worker, environment));
     return sadmm_environments_read_good_inputs(environments, worker, environment);
 }

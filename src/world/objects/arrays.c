@@ -11,6 +11,7 @@
 #include "coupling.h"
 #include "joint.h"
 #include "joint_place.h"
+#include "shape.h"
 #include "world/resident/resident.h"
 #include "world/state/ids.h"
 
@@ -199,6 +200,40 @@ static sadmm_status set_material(sadmm_world *world, size_t slot, const double *
     return sadmm_world_set_shape_material(world, sadmm_world_shape_id(world, slot), row[0], row[1]);
 }
 
+static sadmm_status get_size(sadmm_world *world, size_t slot, double *row)
+{
+    sadmm_world_read_shape_size(world, slot, row);
+    return SADMM_OK;
+}
+
+static sadmm_status check_size(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    return sadmm_world_check_shape_size(world, slot, row, error);
+}
+
+static sadmm_status set_size(sadmm_world *world, size_t slot, const double *row)
+{
+    return sadmm_world_set_shape_size(world, sadmm_world_shape_id(world, slot), row);
+}
+
+static sadmm_status get_frame(sadmm_world *world, size_t slot, double *row)
+{
+    sadmm_world_read_shape_frame(world, slot, row);
+    return SADMM_OK;
+}
+
+static sadmm_status check_frame(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    (void)world;
+    (void)slot;
+    return sadmm_world_check_shape_frame(row, row + 3, error);
+}
+
+static sadmm_status set_frame(sadmm_world *world, size_t slot, const double *row)
+{
+    return sadmm_world_set_shape_frame(world, sadmm_world_shape_id(world, slot), row, row + 3);
+}
+
 /* ---- joints ------------------------------------------------------------------------------------------------------ */
 
 #define GET_OF_JOINT(name, member)                                                      \
@@ -375,6 +410,8 @@ static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
     [SADMM_ARRAY_SHAPE_MATERIAL] = {"shape_material", 2, OF_SHAPE, get_material, check_material, set_material},
     [SADMM_ARRAY_GRAVITY] = {"gravity", 3, OF_WORLD, get_gravity, check_gravity, set_gravity},
     [SADMM_ARRAY_REPORT] = {"report", 8, OF_WORLD, get_report, NULL, NULL},
+    [SADMM_ARRAY_SHAPE_SIZE] = {"shape_size", 3, OF_SHAPE, get_size, check_size, set_size},
+    [SADMM_ARRAY_SHAPE_FRAME] = {"shape_frame", 7, OF_SHAPE, get_frame, check_frame, set_frame},
 };
 
 static const struct array_kind *kind_of(sadmm_array array)

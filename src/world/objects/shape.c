@@ -1,4 +1,6 @@
 /* Shapes of a world. */
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "collision/hull/hull.h"
@@ -106,6 +108,7 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     shape->body = body_slot;
     shape->alive = true;
     shape->revision = ++world->shape_revisions;
+    shape->formed = ++world->shape_changes;
     world->sensor_count += def->sensor;
     world->bouncing_count += def->restitution > 0;
     sadmm_world_reshaped(world);
@@ -208,5 +211,137 @@ sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id i
     world->bouncing_count += (restitution > 0) - (shape->restitution > 0);
     shape->friction = friction;
     shape->restitution = restitution;
+    ++world->shape_changes;
+    return SADMM_OK;
+}
+
+/* ---- size and place ---------------------------------------------------------------------------------------------- */
+
+/* Contacts of a shape with other sizes, or in another place, begin anew: its revision is another one. It depends on
+ * what the shape is and not on how it came to be that: environments take turns in one world, and each must find its own
+ * contacts again (environments.h). So the revision moves by the difference of two words. */
+static uint32_t form_word(const sadmm_world *world, size_t slot)
+{
+    double numbers[10];
+    uint64_t word = UINT64_C(0x9E3779B97F4A7C15);
+    memcpy(numbers, world->geometries[world->shapes[slot].geometry].size, 3 * sizeof *numbers);
+    sadmm_world_read_shape_frame(world, slot, numbers + 3);
+    for (int k = 0; k < 10; ++k) {
+        uint64_t bits;
+        memcpy(&bits, &numbers[k], sizeof bits);
+        word = (word ^ bits) * UINT64_C(0xBF58476D1CE4E5B9);
+        word ^= word >> 29;
+    }
+    return (uint32_t)(word >> 32) ^ (uint32_t)word;
+}
+
+static void reform(sadmm_world *world, size_t slot, uint32_t before)
+{
+    world->shapes[slot].revision += form_word(world, slot) - before;
+    world->shapes[slot].formed = ++world->shape_changes;
+    sadmm_world_moved(world);
+}
+
+static int sizes_of(const sadmm_world *world, size_t slot)
+{
+    return sadmm_shape_sizes[world->geometries[world->shapes[slot].geometry].type];
+}
+
+void sadmm_world_read_shape_size(const sadmm_world *world, size_t slot, double size[3])
+{
+    const double *own = world->geometries[world->shapes[slot].geometry].size;
+    for (int k = 0; k < 3; ++k) size[k] = k < sizes_of(world, slot) ? own[k] : 0;
+}
+
+sadmm_status sadmm_world_check_shape_size(const sadmm_world *world, size_t slot, const double size[3],
+                                          struct sadmm_error *error)
+{
+    const struct sadmm_field *const range = SADMM_SHAPE_FIELD(size);
+    const int sizes = sizes_of(world, slot);
+    for (int k = 0; k < 3; ++k) {
+        if (k < sizes && !(size[k] >= range->lo && size[k] <= range->hi))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "size[%d] = %g: must be in [%g, %g] m", k, size[k],
+                              range->lo, range->hi);
+        if (k >= sizes && !(size[k] == 0))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "size[%d] = %g: must be 0, for a shape of type %d has %d sizes", k, size[k],
+                              (int)world->geometries[world->shapes[slot].geometry].type, sizes);
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_shape_size(sadmm_world *world, sadmm_shape_id id, const double size[3])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
+    if (!shape) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(size, "size", error));
+    const size_t slot = id.slot - 1, bytes = (size_t)sizes_of(world, slot) * sizeof *size;
+    TRY(sadmm_world_check_shape_size(world, slot, size, error));
+    double *own = world->geometries[shape->geometry].size;
+    if (memcmp(own, size, bytes) == 0) return SADMM_OK;
+    TRY(sadmm_world_detach(world));
+    const uint32_t before = form_word(world, slot);
+    memcpy(own, size, bytes);
+    reform(world, slot, before);
+    return SADMM_OK;
+}
+
+void sadmm_world_read_shape_frame(const sadmm_world *world, size_t slot, double frame[7])
+{
+    const struct sadmm_shape *shape = &world->shapes[slot];
+    const bool block = has_block(world->geometries[shape->geometry].type);
+    memcpy(frame, block ? world->block_shapes[slot].position : shape->position, 3 * sizeof *frame);
+    memcpy(frame + 3, block ? world->block_shapes[slot].orientation : shape->orientation, 4 * sizeof *frame);
+}
+
+/* One that is of unit length to rounding stays as it is, so that what was read can be set again. */
+static sadmm_status take_orientation(const double given[4], double out[4], struct sadmm_error *error)
+{
+    double length2 = 0;
+    TRY(sadmm_check_orientation("orientation", given, out, error));
+    for (int k = 0; k < 4; ++k) length2 += given[k] * given[k];
+    if (fabs(length2 - 1) <= 8 * DBL_EPSILON) memcpy(out, given, 4 * sizeof *out);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_check_shape_frame(const double position[3], const double orientation[4],
+                                           struct sadmm_error *error)
+{
+    double ignored[4];
+    TRY(sadmm_check_vector("position", position, 3, SADMM_SHAPE_FIELD(position)->hi, error));
+    return take_orientation(orientation, ignored, error);
+}
+
+sadmm_status sadmm_world_set_shape_frame(sadmm_world *world, sadmm_shape_id id, const double position[3],
+                                         const double orientation[4])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
+    if (!shape) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(position, "position", error));
+    TRY(sadmm_check_given(orientation, "orientation", error));
+    TRY(sadmm_world_check_shape_frame(position, orientation, error));
+    const size_t slot = id.slot - 1;
+    double now[7], frame[7];
+    sadmm_world_read_shape_frame(world, slot, now);
+    memcpy(frame, position, 3 * sizeof *frame);
+    TRY(take_orientation(orientation, frame + 3, error));
+    if (memcmp(now, frame, sizeof now) == 0) return SADMM_OK;
+    TRY(sadmm_world_detach(world));
+    const uint32_t before = form_word(world, slot);
+    sadmm_shape_def def = {.type = (sadmm_shape_type)world->geometries[shape->geometry].type};
+    if (has_block(def.type)) {
+        struct sadmm_world_block_shape *kept = &world->block_shapes[slot];
+        def.hull = kept->hull;
+        def.mesh = kept->mesh;
+        memcpy(kept->position, frame, sizeof kept->position);
+        memcpy(kept->orientation, frame + 3, sizeof kept->orientation);
+    }
+    memcpy(def.position, frame, sizeof def.position);
+    sadmm_shape_form_place(&def, frame + 3, shape->position, shape->orientation);
+    reform(world, slot, before);
     return SADMM_OK;
 }

@@ -50,7 +50,7 @@ struct sadmm_world {
     int32_t sensor_count;              /* shapes that are sensors */
     int32_t bouncing_count;            /* shapes with restitution */
     struct sadmm_link *shape_links; /* by slot: the shapes of a body */
-    uint32_t shape_revisions;
+    uint32_t shape_revisions, shape_changes; /* counts: new shapes; these, and new sizes, places and materials */
     struct sadmm_shape_data shape_data;
     struct sadmm_world_block_shape *block_shapes; /* by slot, as far as there are hulls or meshes */
     size_t block_shape_slots;

@@ -161,7 +161,7 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
         .geometry_count = world->shape_ids.slots,
         .hulls = world->shape_data.doubles > 0 ? world->shape_data.blocks : NULL,
         .hull_doubles = world->shape_data.doubles,
-        .hull_revision = world->shape_data.revision,
+        .hull_revision = world->shape_data.revision + world->shape_changes,
         .bodies = world->collision_bodies,
         .body_count = world->body_ids.slots,
         .dt = settings.dt,

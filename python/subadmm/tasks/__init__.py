@@ -1,0 +1,1 @@
+"""Tasks for reinforcement learning, one file each: subadmm.gym has them all."""
