@@ -93,6 +93,7 @@ static const char *const buffer_names[] = {
     "impulses of solved islands",
     "memory of solved islands",
     "states of environments",
+    "measures of environments",
     "staged counts",
     "staged settings",
     "staged bodies",

@@ -74,6 +74,8 @@ bool CUDA(has_array)(int32_t array, bool in);
 sadmm_status CUDA(exchange)(struct sadmm_context *, const struct sadmm_resident_copies *,
                             const struct sadmm_resident_array *, bool in, const uint8_t *left, uint8_t *refused,
                             void *stream, struct sadmm_error *);
+sadmm_status CUDA(measure)(struct sadmm_context *, const struct sadmm_resident_copies *, struct sadmm_copy_measures *,
+                           struct sadmm_error *);
 sadmm_status CUDA(keep_state)(struct sadmm_context *, const struct sadmm_resident_copies *,
                               const struct sadmm_resident_state *, void **out, struct sadmm_error *);
 sadmm_status CUDA(put_states)(struct sadmm_context *, const struct sadmm_resident_copies *, int32_t count,

@@ -201,11 +201,35 @@ static __global__ void __launch_bounds__(COPIES_THREADS)
 
 /* ---- in ---------------------------------------------------------------------------------------------------------- */
 
+/* What an array sets of a joint's coordinate; NULL: it is none of these. Limits are the host's affair: they are checked
+ * against each other. */
+static __host__ __device__ inline double *member_of(sadmm_joint_coordinate *c, int32_t array)
+{
+    switch (array) {
+    case SADMM_ARRAY_JOINT_TARGET_POSITION: return &c->target_position;
+    case SADMM_ARRAY_JOINT_TARGET_SPEED: return &c->target_speed;
+    case SADMM_ARRAY_JOINT_DRIVE_STIFFNESS: return &c->drive_stiffness;
+    case SADMM_ARRAY_JOINT_DRIVE_DAMPING: return &c->drive_damping;
+    case SADMM_ARRAY_JOINT_DRIVE_LIMIT: return &c->drive_force;
+    case SADMM_ARRAY_JOINT_FRICTION: return &c->friction;
+    case SADMM_ARRAY_JOINT_SPRING_STIFFNESS: return &c->spring_stiffness;
+    case SADMM_ARRAY_JOINT_SPRING_DAMPING: return &c->spring_damping;
+    case SADMM_ARRAY_JOINT_SPRING_REST: return &c->spring_rest;
+    case SADMM_ARRAY_JOINT_ARMATURE: return &c->armature;
+    default: return nullptr;
+    }
+}
+
+static __host__ __device__ inline bool is_input_of_joints(int32_t array)
+{
+    sadmm_joint_coordinate any;
+    return member_of(&any, array) != nullptr;
+}
+
 static __host__ __device__ inline bool is_input(int32_t array)
 {
     return array == SADMM_ARRAY_BODY_WRENCH || array == SADMM_ARRAY_BODY_GRAVITY_SCALE ||
-           array == SADMM_ARRAY_BODY_DAMPING || array == SADMM_ARRAY_JOINT_TARGET_POSITION ||
-           array == SADMM_ARRAY_JOINT_TARGET_SPEED;
+           array == SADMM_ARRAY_BODY_DAMPING || is_input_of_joints(array);
 }
 
 /* A number that is not finite is in no range. */
@@ -235,20 +259,31 @@ static __device__ __forceinline__ bool take_body(const cuda_view &v, const copie
     return true;
 }
 
+/* Constraints that the joint may have rows in. */
+static __device__ __forceinline__ int constraints_of(const struct sadmm_resident_joint *joint)
+{
+    int laws = joint_most_laws(&joint->def);
+    for (int k = 0; k < JOINT_COORDINATES; ++k) { /* a spring that has nothing but its table */
+        const sadmm_joint_coordinate *c = &joint->def.coordinates[k];
+        laws += joint->points[k] > 0 && !(c->spring_stiffness > 0 || c->spring_damping > 0);
+    }
+    return (laws + SADMM_MAX_ROWS - 1) / SADMM_MAX_ROWS;
+}
+
 static __device__ __forceinline__ bool take_joint(const cuda_view &v, const copies_args &a, int32_t j, const double *x)
 {
-    sadmm_joint_def *def = &v.joints.joints[j].def;
-    const bool speeds = a.array.array == SADMM_ARRAY_JOINT_TARGET_SPEED;
+    struct sadmm_resident_joint *joint = &v.joints.joints[j];
+    sadmm_joint_def *def = &joint->def;
+    double before[JOINT_COORDINATES];
     for (int k = 0; k < JOINT_COORDINATES; ++k) {
-        const double now = speeds ? def->coordinates[k].target_speed : def->coordinates[k].target_position;
-        if (x[k] == now) continue;
+        before[k] = *member_of(&def->coordinates[k], a.array.array);
+        if (x[k] == before[k]) continue;
         if (!is_taken(a.array, x[k]) || def->locks >> k & 1 || !joint_has_coordinate(def, k)) return false;
     }
-    for (int k = 0; k < JOINT_COORDINATES; ++k) {
-        if (speeds) def->coordinates[k].target_speed = x[k];
-        else def->coordinates[k].target_position = x[k];
-    }
-    return true;
+    for (int k = 0; k < JOINT_COORDINATES; ++k) *member_of(&def->coordinates[k], a.array.array) = x[k];
+    if (constraints_of(joint) <= joint->constraints) return true;
+    for (int k = 0; k < JOINT_COORDINATES; ++k) *member_of(&def->coordinates[k], a.array.array) = before[k];
+    return false; /* the host makes room for more */
 }
 
 static __global__ void __launch_bounds__(COPIES_THREADS)
@@ -258,11 +293,9 @@ static __global__ void __launch_bounds__(COPIES_THREADS)
     const int32_t e = (int32_t)(row / a.array.rows);
     if (e >= a.copies.count || (a.left && a.left[e])) return;
     const int32_t object = a.array.objects[row % a.array.rows];
-    const bool joint = a.array.array == SADMM_ARRAY_JOINT_TARGET_POSITION ||
-                       a.array.array == SADMM_ARRAY_JOINT_TARGET_SPEED;
     double x[MOST_COLUMNS];
     for (int k = 0; k < a.array.columns; ++k) x[k] = number_of(a.array, row * a.array.columns + k);
-    const bool taken = joint ? take_joint(v, a, e * a.copies.joints + object, x)
+    const bool taken = is_input_of_joints(a.array.array) ? take_joint(v, a, e * a.copies.joints + object, x)
                              : take_body(v, a, body_in(a.copies, e, object), x);
     if (!taken) a.refused[e] = 1; /* whoever says so says the same */
 }

@@ -45,6 +45,7 @@
             .from_backend = sadmm_cuda_from_backend##suffix,   \
             .has_array = sadmm_cuda_has_array##suffix,         \
             .exchange = sadmm_cuda_exchange##suffix,           \
+            .measure = sadmm_cuda_measure##suffix,             \
             .keep_state = sadmm_cuda_keep_state##suffix,       \
             .put_states = sadmm_cuda_put_states##suffix,       \
         },                                                     \

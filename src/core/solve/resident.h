@@ -134,6 +134,16 @@ struct sadmm_resident_state {
     const struct sadmm_contact_set *contacts;        /* shapes and bodies numbered as in the first one */
 };
 
+/* How well one of them was solved in the last step. */
+struct sadmm_copy_measures {
+    double error;           /* natural map of its contacts and rows, m/s (solve_error.h) */
+    double penetration_max; /* m */
+    double joint_drift;     /* m */
+    int32_t contacts, iterations;
+    int32_t unsolved;       /* islands above the tolerance, where there is one */
+    int32_t unused;
+};
+
 struct sadmm_resident_kernels {
     /* Take over a world. Everything the backend kept before is forgotten. */
     sadmm_status (*load)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
@@ -194,6 +204,9 @@ struct sadmm_resident_kernels {
     sadmm_status (*exchange)(struct sadmm_context *, const struct sadmm_resident_copies *,
                              const struct sadmm_resident_array *, bool in, const uint8_t *left, uint8_t *refused,
                              void *stream, struct sadmm_error *);
+    /* Of each, after a step and before anything else changes the world. */
+    sadmm_status (*measure)(struct sadmm_context *, const struct sadmm_resident_copies *, struct sadmm_copy_measures *,
+                            struct sadmm_error *);
     /* A state in the backend's memory, to be released. */
     sadmm_status (*keep_state)(struct sadmm_context *, const struct sadmm_resident_copies *,
                                const struct sadmm_resident_state *, void **out, struct sadmm_error *);

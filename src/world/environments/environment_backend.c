@@ -71,7 +71,9 @@ sadmm_status sadmm_environments_open_backend(struct sadmm_environments *environm
                                                     .couplings = from->coupling_ids.count,
                                                     .gears = from->gear_ids.count};
     merged->refusals = (uint8_t *)sadmm_alloc((size_t)environments->count, 1);
-    if (!merged->refusals) return sadmm_fail_memory(&environments->error, "environments");
+    merged->measures =
+        (struct sadmm_copy_measures *)sadmm_alloc((size_t)environments->count, sizeof *merged->measures);
+    if (!merged->refusals || !merged->measures) return sadmm_fail_memory(&environments->error, "environments");
     TRY(list_objects(environments));
     TRY(upload(environments, NULL, (size_t)environments->count, (void **)&merged->left));
     TRY(upload(environments, NULL, (size_t)environments->count, (void **)&merged->refused));
@@ -155,6 +157,14 @@ static void find_range(sadmm_array array, double *lo, double *hi)
     case SADMM_ARRAY_BODY_DAMPING: field = SADMM_BODY_FIELD(linear_damping); break;
     case SADMM_ARRAY_JOINT_TARGET_POSITION: field = SADMM_COORDINATE_FIELD(target_position); break;
     case SADMM_ARRAY_JOINT_TARGET_SPEED: field = SADMM_COORDINATE_FIELD(target_speed); break;
+    case SADMM_ARRAY_JOINT_DRIVE_STIFFNESS: field = SADMM_COORDINATE_FIELD(drive_stiffness); break;
+    case SADMM_ARRAY_JOINT_DRIVE_DAMPING: field = SADMM_COORDINATE_FIELD(drive_damping); break;
+    case SADMM_ARRAY_JOINT_DRIVE_LIMIT: field = SADMM_COORDINATE_FIELD(drive_force); break;
+    case SADMM_ARRAY_JOINT_FRICTION: field = SADMM_COORDINATE_FIELD(friction); break;
+    case SADMM_ARRAY_JOINT_SPRING_STIFFNESS: field = SADMM_COORDINATE_FIELD(spring_stiffness); break;
+    case SADMM_ARRAY_JOINT_SPRING_DAMPING: field = SADMM_COORDINATE_FIELD(spring_damping); break;
+    case SADMM_ARRAY_JOINT_SPRING_REST: field = SADMM_COORDINATE_FIELD(spring_rest); break;
+    case SADMM_ARRAY_JOINT_ARMATURE: field = SADMM_COORDINATE_FIELD(armature); break;
     default: break;
     }
     *lo = field ? field->lo : -SADMM_WRENCH_LIMIT;
@@ -200,6 +210,31 @@ sadmm_status sadmm_environments_exchange(struct sadmm_environments *environments
     return pass(environments, kernels_of(environments)->exchange(merged->world->context, &merged->copies, &array, in,
                                                                  merged->left, merged->refused, environments->stream,
                                                                  &merged->world->error));
+}
+
+/* The last step's, while nothing else has changed the world. */
+sadmm_status sadmm_environments_measure(struct sadmm_environments *environments)
+{
+    struct sadmm_merged_world *merged = &environments->merged;
+    sadmm_world *world = merged->world;
+    if (!merged->measurable || !merged->has_backend || !world->resident.loaded) return SADMM_OK;
+    merged->measurable = false;
+    TRY(pass(environments, kernels_of(environments)->measure(world->context, &merged->copies, merged->measures,
+                                                             &world->error)));
+    for (int32_t e = 0; e < environments->count; ++e) {
+        sadmm_step_report *report = &merged->progress[e].report;
+        const struct sadmm_copy_measures *own = &merged->measures[e];
+        if (environments->marked[e]) continue;
+        report->error = own->error;
+        report->error_kind = SADMM_STEP_ERROR_LAW;
+        report->unsolved = world->def.settings.tolerance > 0 ? own->unsolved : -1;
+        report->converged = world->def.settings.tolerance > 0 && own->unsolved == 0;
+        report->penetration_max = own->penetration_max;
+        report->joint_drift = own->joint_drift;
+        report->contacts = own->contacts;
+        report->iterations = own->iterations;
+    }
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_environments_wait_backend(struct sadmm_environments *environments)
@@ -379,6 +414,7 @@ sadmm_status sadmm_environments_put_kept(struct sadmm_environments *environments
         if (status == SADMM_OK) all[k] = which ? which[k] : k;
     }
     if (status == SADMM_OK) status = pass(environments, sadmm_world_synchronise(world));
+    merged->measurable = false;
     if (status == SADMM_OK)
         status = pass(environments, kernels_of(environments)->put_states(world->context, &merged->copies, count, all,
                                                                          blocks, done, &world->error));

@@ -26,6 +26,9 @@ sadmm_status sadmm_environments_exchange(struct sadmm_environments *environments
 sadmm_status sadmm_environments_wait_backend(struct sadmm_environments *environments);
 sadmm_status sadmm_environments_find_refused(struct sadmm_environments *environments, bool *any);
 
+/* Reports of all that are not marked say how well the last step was solved. */
+sadmm_status sadmm_environments_measure(struct sadmm_environments *environments);
+
 /* Environments begin with kept states, if the backend has all that it takes; else *done is false. */
 sadmm_status sadmm_environments_put_kept(struct sadmm_environments *environments, const int32_t *which, int32_t count,
                                          const int32_t *states, bool *done);

@@ -4,6 +4,7 @@
 
 #include "core/base/memory.h"
 #include "core/model/forces.h"
+#include "environment_backend.h"
 #include "subadmm/coupling.h"
 #include "subadmm/gear.h"
 #include "world/objects/joint_slots.h"
@@ -268,7 +269,8 @@ void sadmm_environments_free_merged(struct sadmm_environments *environments)
     sadmm_contact_set_free(&merged->spare);
     void *blocks[] = {merged->bodies.slots,    merged->bodies.numbers, merged->shapes.slots, merged->shapes.numbers,
                       merged->joints.slots,    merged->joints.numbers, merged->groups,       merged->progress,
-                      merged->contacts,        merged->replaced};
+                      merged->contacts,        merged->replaced,       merged->refusals,     merged->measures,
+                      merged->kept};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
 }
 
@@ -358,10 +360,6 @@ static void take_report(const struct sadmm_environments *environments, sadmm_wor
     world->plan.bodies = report->bodies = world->dynamic_count;
     world->plan.pairs = report->pairs = (int32_t)set->pair_count;
     world->plan.points = report->contacts = (int32_t)set->point_count;
-    report->penetration_max = 0;
-    for (size_t k = 0; k < set->point_count; ++k)
-        if (-set->points[k].separation > report->penetration_max)
-            report->penetration_max = -set->points[k].separation;
 }
 
 sadmm_status sadmm_environments_take(struct sadmm_environments *environments, sadmm_world *world, int32_t environment)
@@ -370,6 +368,8 @@ sadmm_status sadmm_environments_take(struct sadmm_environments *environments, sa
     sadmm_world *all = merged->world;
     const size_t bodies = (size_t)merged->bodies.count, joints = (size_t)merged->joints.count,
                  e = (size_t)environment;
+    if (sadmm_environments_measure(environments) != SADMM_OK)
+        return sadmm_fail(&world->error, environments->error.status, "%s", environments->error.message);
     sadmm_status status = sadmm_world_download_bodies(all);
     if (status == SADMM_OK) status = sadmm_world_download_contacts(all);
     if (status == SADMM_OK) status = sadmm_world_download_joints(all);
@@ -440,6 +440,8 @@ sadmm_status sadmm_environments_put(struct sadmm_environments *environments, sad
     sadmm_world *all = merged->world;
     const size_t bodies = (size_t)merged->bodies.count, joints = (size_t)merged->joints.count,
                  e = (size_t)environment;
+    if (sadmm_environments_measure(environments) != SADMM_OK)
+        return sadmm_fail(&world->error, environments->error.status, "%s", environments->error.message);
     const sadmm_status status = sadmm_world_detach(all);
     if (status != SADMM_OK) return sadmm_fail(&world->error, status, "%s", all->error.message);
     TRY(put_contacts(environments, world, environment));

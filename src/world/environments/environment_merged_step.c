@@ -108,6 +108,7 @@ static void count_steps(struct sadmm_environments *environments, int64_t steps, 
         progress->report.time = time;
         progress->stepped = progress->moved = true;
     }
+    environments->merged.measurable = true;
 }
 
 /* As many as there are left, or until one fails. */

@@ -61,6 +61,8 @@ struct sadmm_merged_world {
     const int32_t *objects;   /* of rows of bodies; then of rows of anything else */
     uint8_t *left, *refused;  /* (count) not 0: marked; what is out of range */
     uint8_t *refusals;        /* (count) as they were read last */
+    struct sadmm_copy_measures *measures; /* (count) likewise */
+    bool measurable;          /* the last step's are not read yet, and can be */
     struct sadmm_kept_block *kept; /* by state; made when it is begun with */
     size_t kept_count;
 };
