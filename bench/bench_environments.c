@@ -1,5 +1,5 @@
 /* subadmm-bench environments: many copies of a scene stepped together (subadmm/environments.h), by their number and the
- * threads. Each begins with other velocities. What a step of one takes, how far steps are from the laws, and the memory
+ * threads, or on a GPU. Each begins with other velocities. What a step of one takes, how far steps are from the laws, and the memory
  * of one. */
 #include <math.h>
 #include <stdio.h>
@@ -26,7 +26,7 @@ struct options {
     const char *scenes[BENCH_LIST], *csv;
     int scene_count;
     long counts[BENCH_LIST], threads[BENCH_LIST], steps, warm_up;
-    int count_count, thread_count, precision;
+    int count_count, thread_count, precision, backend;
     bool fixed;
 };
 
@@ -51,7 +51,7 @@ static sadmm_status build(const struct options *o, const char *name, int precisi
 {
     struct sadmm_scene scene;
     TRY(sadmm_scene_open(name, &scene, error));
-    scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.backend = (sadmm_backend)o->backend;
     scene.def.precision = (sadmm_precision)precision;
     if (!o->fixed) { /* what a world has that nobody chose for */
         const sadmm_settings own = sadmm_settings_default();
@@ -104,9 +104,14 @@ static sadmm_status run_steps(const struct options *o, sadmm_environments *envir
 {
     const size_t count = (size_t)sadmm_environments_count(environments);
     sadmm_environments_array report;
-    double *errors = (double *)sadmm_alloc(count * (size_t)o->steps, sizeof *errors), begin;
+    double *errors = (double *)sadmm_alloc(count * (size_t)o->steps, sizeof *errors), begin,
+           *rows = (double *)sadmm_alloc(count * REPORT_COLUMNS, sizeof *rows);
     size_t known = 0;
-    if (!errors) return sadmm_fail_memory(error, "errors");
+    if (!errors || !rows) {
+        sadmm_free(errors);
+        sadmm_free(rows);
+        return sadmm_fail_memory(error, "errors");
+    }
     sadmm_status status = of_all(environments, sadmm_environments_step(environments, (int32_t)o->warm_up), error);
     begin = sadmm_clock_ms();
     if (status == SADMM_OK) /* nothing is read in between */
@@ -117,8 +122,10 @@ static sadmm_status run_steps(const struct options *o, sadmm_environments *envir
             of_all(environments, sadmm_environments_bind(environments, SADMM_ARRAY_REPORT, SADMM_F64, &report), error);
     for (long step = 0; step < o->steps && status == SADMM_OK && !interrupted(); ++step) {
         status = of_all(environments, sadmm_environments_step(environments, 1), error);
+        if (status == SADMM_OK)
+            status = of_all(environments, sadmm_environments_get(environments, SADMM_ARRAY_REPORT, NULL, 0, rows), error);
         for (size_t e = 0; e < count && status == SADMM_OK; ++e) {
-            const double *row = (const double *)report.values + REPORT_COLUMNS * e;
+            const double *row = rows + REPORT_COLUMNS * e;
             errors[known++] = row[ERROR_COLUMN];
             out->unsolved += row[UNSOLVED_COLUMN] > 0;
             out->drift = fmax(out->drift, row[DRIFT_COLUMN]);
@@ -132,6 +139,7 @@ static sadmm_status run_steps(const struct options *o, sadmm_environments *envir
     for (size_t e = 0; e < count; ++e) out->failed += sadmm_environments_marked(environments)[e];
     out->memory = sadmm_environments_memory(environments);
     sadmm_free(errors);
+    sadmm_free(rows);
     return status;
 }
 
@@ -170,7 +178,7 @@ static void print(const struct options *o, FILE *csv, const char *scene, int pre
 static sadmm_status run(const struct options *o, FILE *csv, struct sadmm_error *error)
 {
     char machine[128];
-    bench_runs_on(SADMM_BACKEND_CPU, machine, sizeof machine);
+    bench_runs_on((sadmm_backend)o->backend, machine, sizeof machine);
     printf("%s; %ld steps, %s\n", machine, o->steps, o->fixed ? "the scenes' fixed work" : "to the default tolerance");
     printf("%-20s %-4s %8s %7s %9s %9s %9s %9s %9s %9s %8s %8s\n", "scene", "", "copies", "threads", "us/step", "M/s",
            "median", "most m/s", "unsolved", "drift m", "bytes", "made ms");
@@ -197,6 +205,7 @@ static int parse(int argc, char **argv, struct options *o)
         BENCH_NUMBERS("threads", o->threads, &o->thread_count, 0, 1024, "0: as many as there are; default 1"),
         BENCH_NUMBER("steps", &o->steps, 1, 100000, "timed ones, and as many whose errors are read; default 50"),
         BENCH_NUMBER("warm-up", &o->warm_up, 1, 100000, "steps before these, default 20"),
+        BENCH_WORD("backend", &o->backend, bench_backends, BENCH_ONE_BACKEND, "default cpu"),
         BENCH_WORD("precision", &o->precision, bench_precisions, 3, "default f64"),
         BENCH_FLAG("fixed", &o->fixed, "the scenes' number of iterations in place of the default tolerance"),
         BENCH_TEXT("csv", "FILE", &o->csv, "the same as a CSV file"),
@@ -211,7 +220,8 @@ int bench_environments(int argc, char **argv)
                         .threads = {1},
                         .steps = 50,
                         .warm_up = 20,
-                        .precision = SADMM_F64};
+                        .precision = SADMM_F64,
+                        .backend = SADMM_BACKEND_CPU};
     struct sadmm_error error = {SADMM_OK, ""};
     struct output *csv = NULL;
     int code = parse(argc, argv, &o);

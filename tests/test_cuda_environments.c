@@ -2,6 +2,7 @@
  * fails is marked and alone; resets begin again. */
 #include "cuda_worlds.h"
 #include "subadmm/environments.h"
+#include "world/environments/environment_work.h"
 
 #define MUST_ALL(environments, call) \
     ck_assert_msg((call) == SADMM_OK, #call ": %s", sadmm_environments_message(environments))
@@ -25,11 +26,40 @@ static sadmm_world *template_of(const char *name, int precision)
     return world;
 }
 
-static double *array_of(sadmm_environments *environments, sadmm_array array)
+/* An array in the device's memory, and a copy of it. */
+struct view {
+    sadmm_environments_array in;
+    double *host;
+    size_t numbers; /* of an environment */
+};
+
+static struct view view_of(sadmm_environments *environments, sadmm_array array)
 {
-    sadmm_environments_array out;
-    MUST_ALL(environments, sadmm_environments_bind(environments, array, SADMM_F64, &out));
-    return (double *)out.values;
+    struct view view;
+    MUST_ALL(environments, sadmm_environments_bind(environments, array, SADMM_F64, &view.in));
+    ck_assert_int_ge(view.in.device, 0);
+    view.numbers = (size_t)(view.in.rows * view.in.columns);
+    view.host = calloc((size_t)view.in.environments * view.numbers + 1, sizeof *view.host);
+    ck_assert_ptr_nonnull(view.host);
+    return view;
+}
+
+/* As a program does that has the pointer, by a copy from it or to it. */
+static const double *look(sadmm_environments *environments, const struct view *view)
+{
+    sadmm_world *world = environments->merged.world;
+    ck_assert_int_eq(world->kernels->resident->from_backend(world->context, view->host, view->in.values,
+                                                            (size_t)view->in.environments * view->numbers *
+                                                                sizeof *view->host, &world->error), SADMM_OK);
+    return view->host;
+}
+
+static void give(sadmm_environments *environments, const struct view *view)
+{
+    sadmm_world *world = environments->merged.world;
+    ck_assert_int_eq(world->kernels->resident->to_backend(world->context, view->in.values, view->host,
+                                                          (size_t)view->in.environments * view->numbers *
+                                                              sizeof *view->host, &world->error), SADMM_OK);
 }
 
 static size_t numbers_of(const sadmm_environments *environments, sadmm_array array)
@@ -106,12 +136,13 @@ START_TEST(environments_step_as_if_alone)
     settings.certify = true; /* of the one that goes on alone */
     MUST(origin, sadmm_world_set_settings(origin, &settings));
     const size_t n = numbers_of(all, SADMM_ARRAY_BODY_STATE);
-    double *views[OUTPUTS], *mine[FEW][OUTPUTS], *state = calloc(FEW * n, sizeof *state);
-    for (int k = 0; k < OUTPUTS; ++k) views[k] = array_of(all, outputs[k]);
+    struct view views[OUTPUTS], mine[FEW][OUTPUTS];
+    double *state = calloc(FEW * n, sizeof *state);
+    for (int k = 0; k < OUTPUTS; ++k) views[k] = view_of(all, outputs[k]);
     for (int32_t e = 0; e < FEW; ++e) {
         own[e] = replicate(origin, 1);
-        for (int k = 0; k < OUTPUTS; ++k) mine[e][k] = array_of(own[e], outputs[k]);
-        push(mine[e][0], e, n, state + n * (size_t)e);
+        for (int k = 0; k < OUTPUTS; ++k) mine[e][k] = view_of(own[e], outputs[k]);
+        push(look(own[e], &mine[e][0]), e, n, state + n * (size_t)e);
         if (e > 0) {
             keep_still(origin, state + n * (size_t)e);
             MUST_ALL(own[e], sadmm_environments_set(own[e], SADMM_ARRAY_BODY_STATE, NULL, 0, state + n * (size_t)e));
@@ -124,17 +155,22 @@ START_TEST(environments_step_as_if_alone)
             double *body = calloc(n, sizeof *body);
             step_world(origin, 2);
             MUST(origin, sadmm_world_get_array(origin, SADMM_ARRAY_BODY_STATE, 0, (int32_t)(n / 13), body));
-            expect_same(views[0], body, n, name, 0, step);
+            expect_same(look(all, &views[0]), body, n, name, 0, step);
             free(body);
-            expect_report(origin, views[OUTPUTS - 1], precision);
+            expect_report(origin, look(all, &views[OUTPUTS - 1]), precision);
         }
         for (int32_t e = 0; e < FEW; ++e) {
             MUST_ALL(own[e], sadmm_environments_step(own[e], 2));
             for (int k = 0; k < OUTPUTS; ++k) {
                 const size_t count = numbers_of(all, outputs[k]);
-                expect_same(views[k] + count * (size_t)e, mine[e][k], count, sadmm_array_name(outputs[k]), e, step);
+                expect_same(look(all, &views[k]) + count * (size_t)e, look(own[e], &mine[e][k]), count,
+                            sadmm_array_name(outputs[k]), e, step);
             }
         }
+    }
+    for (int k = 0; k < OUTPUTS; ++k) {
+        free(views[k].host);
+        for (int32_t e = 0; e < FEW; ++e) free(mine[e][k].host);
     }
     for (int32_t e = 0; e < FEW; ++e) sadmm_environments_destroy(own[e]);
     sadmm_environments_destroy(all);
@@ -151,12 +187,12 @@ START_TEST(resets_begin_again)
     sadmm_world *origin = template_of("grippers:1", _i);
     step_world(origin, EMULATED ? 2 : 20);
     sadmm_environments *all = replicate(origin, MANY), *one = replicate(origin, 1);
-    const double *states = array_of(all, SADMM_ARRAY_BODY_STATE), *state = array_of(one, SADMM_ARRAY_BODY_STATE);
+    const struct view states = view_of(all, SADMM_ARRAY_BODY_STATE), state = view_of(one, SADMM_ARRAY_BODY_STATE);
     const size_t n = numbers_of(all, SADMM_ARRAY_BODY_STATE);
     double *after = calloc((KEPT_AT + STEPS + 1) * n, sizeof *after);
     int32_t kept;
     for (int step = 0; step <= KEPT_AT + STEPS; ++step) {
-        memcpy(after + n * (size_t)step, state, n * sizeof *after);
+        memcpy(after + n * (size_t)step, look(one, &state), n * sizeof *after);
         if (step < KEPT_AT + STEPS) MUST_ALL(one, sadmm_environments_step(one, 1));
     }
     MUST_ALL(all, sadmm_environments_step(all, KEPT_AT));
@@ -173,11 +209,14 @@ START_TEST(resets_begin_again)
         }
         MUST_ALL(all, sadmm_environments_reset(all, which, count, from));
         for (int32_t e = 0; e < MANY; ++e)
-            expect_same(states + n * (size_t)e, after + n * (size_t)made[e], n, "reset", e, step);
+            expect_same(look(all, &states) + n * (size_t)e, after + n * (size_t)made[e], n, "reset", e, step);
         MUST_ALL(all, sadmm_environments_step(all, 1));
         for (int32_t e = 0; e < MANY; ++e)
-            expect_same(states + n * (size_t)e, after + n * (size_t)++made[e], n, "step", e, step);
+            expect_same(look(all, &states) + n * (size_t)e, after + n * (size_t)++made[e], n, "step", e, step);
+        ck_assert(all->merged.world->resident.loaded); /* nothing has gone by way of the host */
     }
+    free(states.host);
+    free(state.host);
     sadmm_environments_destroy(all);
     sadmm_environments_destroy(one);
     sadmm_world_destroy(origin);
@@ -193,15 +232,17 @@ START_TEST(what_goes_wrong_stays_alone)
     sadmm_world *origin = template_of("ragdolls:1", _i);
     step_world(origin, 2);
     sadmm_environments *good = replicate(origin, MANY), *bad = replicate(origin, MANY);
-    const double *states[2] = {array_of(good, SADMM_ARRAY_BODY_STATE), array_of(bad, SADMM_ARRAY_BODY_STATE)};
-    double *wrench = array_of(bad, SADMM_ARRAY_BODY_WRENCH);
+    const struct view views[2] = {view_of(good, SADMM_ARRAY_BODY_STATE), view_of(bad, SADMM_ARRAY_BODY_STATE)},
+                      wrench = view_of(bad, SADMM_ARRAY_BODY_WRENCH);
+    const double *states[2] = {look(good, &views[0]), look(bad, &views[1])};
     const size_t n = numbers_of(good, SADMM_ARRAY_BODY_STATE), wrenches = numbers_of(good, SADMM_ARRAY_BODY_WRENCH);
     double *left = calloc(n, sizeof *left);
     for (int step = 0; step < STEPS; ++step) {
         if (step == AT) {
             const int32_t flies = 2;
             double *state = calloc(n, sizeof *state);
-            wrench[wrenches + 6 * 2 + 1] = NAN;
+            wrench.host[wrenches + 6 * 2 + 1] = NAN;
+            give(bad, &wrench);
             memcpy(left, states[1] + n, n * sizeof *left);
             memcpy(state, states[1] + 2 * n, n * sizeof *state);
             state[13 * 3 + 8] = 1e308;
@@ -210,6 +251,8 @@ START_TEST(what_goes_wrong_stays_alone)
         }
         MUST_ALL(good, sadmm_environments_step(good, 1));
         MUST_ALL(bad, sadmm_environments_step(bad, 1));
+        (void)look(good, &views[0]);
+        (void)look(bad, &views[1]);
         for (int32_t e = 0; e < MANY; ++e)
             if (step < AT || (e != 1 && e != 2))
                 expect_same(states[1] + n * (size_t)e, states[0] + n * (size_t)e, n, "alone", e, step);
@@ -225,16 +268,22 @@ START_TEST(what_goes_wrong_stays_alone)
                   sadmm_environments_mark(bad, 1));
     ck_assert_msg(strstr(sadmm_environments_mark(bad, 2), "not finite") != NULL, "\"%s\"",
                   sadmm_environments_mark(bad, 2));
-    wrench[wrenches + 6 * 2 + 1] = 0;
+    wrench.host[wrenches + 6 * 2 + 1] = 0;
+    give(bad, &wrench);
     MUST_ALL(bad, sadmm_environments_reset(bad, both, 2, NULL));
     ck_assert_int_eq(marked[1] + marked[2], 0);
     MUST_ALL(good, sadmm_environments_reset(good, NULL, 0, NULL));
     MUST_ALL(good, sadmm_environments_step(good, 3));
     MUST_ALL(bad, sadmm_environments_step(bad, 3));
+    (void)look(good, &views[0]);
+    (void)look(bad, &views[1]);
     for (int32_t e = 1; e < 3; ++e)
         expect_same(states[1] + n * (size_t)e, states[0] + n * (size_t)e, n, "again", e, 3);
     free(left);
     free(read);
+    free(views[0].host);
+    free(views[1].host);
+    free(wrench.host);
     sadmm_environments_destroy(good);
     sadmm_environments_destroy(bad);
     sadmm_world_destroy(origin);
@@ -251,33 +300,40 @@ START_TEST(inputs_and_contacts_are_an_environments_own)
     sadmm_world *origin = template_of("grippers:1", _i);
     step_world(origin, 2);
     sadmm_environments *all = replicate(origin, FEW), *own[FEW];
-    const double *states = array_of(all, SADMM_ARRAY_BODY_STATE), *mine[FEW];
-    const size_t n = numbers_of(all, SADMM_ARRAY_BODY_STATE);
-    double *views[INPUTS], *given[FEW][INPUTS];
+    const struct view states = view_of(all, SADMM_ARRAY_BODY_STATE);
+    struct view mine[FEW], views[INPUTS], given[FEW][INPUTS];
+    const size_t n = states.numbers;
     MUST_ALL(all, sadmm_environments_record_contacts(all, true));
-    for (int k = 0; k < INPUTS; ++k) views[k] = array_of(all, inputs[k]);
+    for (int k = 0; k < INPUTS; ++k) {
+        views[k] = view_of(all, inputs[k]);
+        (void)look(all, &views[k]);
+    }
     for (int32_t e = 0; e < FEW; ++e) {
         own[e] = replicate(origin, 1);
         MUST_ALL(own[e], sadmm_environments_record_contacts(own[e], true));
-        mine[e] = array_of(own[e], SADMM_ARRAY_BODY_STATE);
-        for (int k = 0; k < INPUTS; ++k) given[e][k] = array_of(own[e], inputs[k]);
+        mine[e] = view_of(own[e], SADMM_ARRAY_BODY_STATE);
+        for (int k = 0; k < INPUTS; ++k) given[e][k] = view_of(own[e], inputs[k]);
     }
     int points = 0;
     for (int step = 0; step < STEPS; ++step) {
-        for (int32_t e = 0; e < FEW && step % 3 == 0; ++e)
-            for (int k = 0; k < INPUTS; ++k)
-                for (size_t i = 0; i < numbers_of(all, inputs[k]); ++i) {
-                    double *number = &views[k][numbers_of(all, inputs[k]) * (size_t)e + i];
+        for (int k = 0; k < INPUTS && step % 3 == 0; ++k) {
+            for (int32_t e = 0; e < FEW; ++e) {
+                for (size_t i = 0; i < views[k].numbers; ++i) {
+                    double *number = &views[k].host[views[k].numbers * (size_t)e + i];
                     *number *= 1 + 0.01 * noise((uint32_t)e + 7, (uint32_t)i);
-                    given[e][k][i] = *number;
+                    given[e][k].host[i] = *number;
                 }
+                give(own[e], &given[e][k]);
+            }
+            give(all, &views[k]);
+        }
         MUST_ALL(all, sadmm_environments_step(all, 1));
         for (int32_t e = 0; e < FEW; ++e) {
             const sadmm_contact *contacts[2];
             int32_t count[2];
             ck_assert_str_eq(sadmm_environments_mark(all, e), "");
             MUST_ALL(own[e], sadmm_environments_step(own[e], 1));
-            expect_same(states + n * (size_t)e, mine[e], n, "inputs", e, step);
+            expect_same(look(all, &states) + n * (size_t)e, look(own[e], &mine[e]), n, "inputs", e, step);
             MUST_ALL(all, sadmm_environments_contacts(all, e, &contacts[0], &count[0]));
             MUST_ALL(own[e], sadmm_environments_contacts(own[e], 0, &contacts[1], &count[1]));
             ck_assert_int_eq(count[0], count[1]);
@@ -286,6 +342,12 @@ START_TEST(inputs_and_contacts_are_an_environments_own)
         }
     }
     ck_assert_int_gt(points, 0);
+    free(states.host);
+    for (int k = 0; k < INPUTS; ++k) {
+        free(views[k].host);
+        for (int32_t e = 0; e < FEW; ++e) free(given[e][k].host);
+    }
+    for (int32_t e = 0; e < FEW; ++e) free(mine[e].host);
     for (int32_t e = 0; e < FEW; ++e) sadmm_environments_destroy(own[e]);
     sadmm_environments_destroy(all);
     sadmm_world_destroy(origin);

@@ -309,12 +309,19 @@ sadmm_status sadmm_environments_write_merged_outputs(struct sadmm_environments *
 
 /* ---- binding ----------------------------------------------------------------------------------------------------- */
 
-/* What an array has of an environment, whose input arrays are read where it is no input itself. */
+/* Where an array's numbers are to be had without a look at the environment's state: of inputs, and of a merged world,
+ * from which one environment is taken at the price of many. */
+static struct sadmm_bound_array *source_of(const struct sadmm_environments *environments, sadmm_array array)
+{
+    if (sadmm_environments_is_input(array)) return bound_of(environments, array, -1);
+    return environments->merged.world ? bound_of(environments, array, SADMM_F64) : NULL;
+}
+
+/* What an array has of an environment. */
 static sadmm_status read_environment(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
                                      int32_t environment, sadmm_array array, double *values)
 {
-    const struct sadmm_bound_array *bound =
-        sadmm_environments_is_input(array) ? bound_of(environments, array, -1) : NULL;
+    const struct sadmm_bound_array *bound = source_of(environments, array);
     if (bound) {
         load_numbers(bound, environment, values);
         return SADMM_OK;
@@ -430,7 +437,7 @@ sadmm_status sadmm_environments_get(sadmm_environments *environments, sadmm_arra
     TRY(sadmm_environments_check_which(environments, which, &count));
     struct rows_of rows = {.array = array, .numbers = numbers_of(environments, array), .out = values};
     if (rows.numbers > 0 && count > 0) TRY(sadmm_check_given(values, "values", &environments->error));
-    struct sadmm_bound_array *bound = sadmm_environments_is_input(array) ? bound_of(environments, array, -1) : NULL;
+    struct sadmm_bound_array *bound = source_of(environments, array);
     if (bound) TRY(sadmm_environments_pull_array(environments, bound));
     return sadmm_environments_each(environments, which, count, get_one, &rows);
 }

@@ -221,19 +221,7 @@ sadmm_status sadmm_environments_measure(struct sadmm_environments *environments)
     merged->measurable = false;
     TRY(pass(environments, kernels_of(environments)->measure(world->context, &merged->copies, merged->measures,
                                                              &world->error)));
-    for (int32_t e = 0; e < environments->count; ++e) {
-        sadmm_step_report *report = &merged->progress[e].report;
-        const struct sadmm_copy_measures *own = &merged->measures[e];
-        if (environments->marked[e]) continue;
-        report->error = own->error;
-        report->error_kind = SADMM_STEP_ERROR_LAW;
-        report->unsolved = world->def.settings.tolerance > 0 ? own->unsolved : -1;
-        report->converged = world->def.settings.tolerance > 0 && own->unsolved == 0;
-        report->penetration_max = own->penetration_max;
-        report->joint_drift = own->joint_drift;
-        report->contacts = own->contacts;
-        report->iterations = own->iterations;
-    }
+    merged->measured = true;
     return SADMM_OK;
 }
 
@@ -420,7 +408,8 @@ sadmm_status sadmm_environments_put_kept(struct sadmm_environments *environments
                                                                          blocks, done, &world->error));
     for (int32_t k = 0; status == SADMM_OK && *done && k < count; ++k) {
         const struct sadmm_kept_block *kept = &merged->kept[states ? states[k] : 0];
-        merged->progress[all[k]] = (struct sadmm_environment_progress){kept->report, kept->stepped, false};
+        merged->progress[all[k]] = (struct sadmm_environment_progress){kept->report.step, kept->report.time,
+                                                                       kept->stepped, false, kept->report};
         sadmm_environments_take_mark(environments, all[k]);
     }
     if (status == SADMM_OK && *done) set_behind(world);

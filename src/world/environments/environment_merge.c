@@ -350,16 +350,27 @@ static sadmm_status take_contacts(struct sadmm_environments *environments, sadmm
 
 static void take_report(const struct sadmm_environments *environments, sadmm_world *world, int32_t environment)
 {
-    const struct sadmm_environment_progress *progress = &environments->merged.progress[environment];
-    const struct sadmm_contact_set *set = &world->contacts;
+    const struct sadmm_merged_world *merged = &environments->merged;
+    const struct sadmm_environment_progress *progress = &merged->progress[environment];
+    const struct sadmm_copy_measures *own = merged->measured ? &merged->measures[environment] : NULL;
+    const bool checked = merged->world->def.settings.tolerance > 0;
     sadmm_step_report *report = &world->report;
     world->stepped = progress->stepped;
-    *report = progress->report;
+    *report = progress->moved ? merged->world->report : progress->report;
+    report->step = progress->step;
+    report->time = progress->time;
     if (!progress->moved) return;
-    world->plan = environments->merged.world->plan;
+    world->plan = merged->world->plan;
     world->plan.bodies = report->bodies = world->dynamic_count;
-    world->plan.pairs = report->pairs = (int32_t)set->pair_count;
-    world->plan.points = report->contacts = (int32_t)set->point_count;
+    world->plan.pairs = report->pairs = (int32_t)world->contacts.pair_count;
+    world->plan.points = report->contacts = (int32_t)world->contacts.point_count;
+    report->error = own ? own->error : -1;
+    report->error_kind = own ? SADMM_STEP_ERROR_LAW : SADMM_STEP_ERROR_NONE;
+    report->unsolved = own && checked ? own->unsolved : -1;
+    report->converged = own && checked && own->unsolved == 0;
+    report->penetration_max = own ? own->penetration_max : 0;
+    report->joint_drift = own ? own->joint_drift : 0;
+    if (own) report->iterations = own->iterations;
 }
 
 sadmm_status sadmm_environments_take(struct sadmm_environments *environments, sadmm_world *world, int32_t environment)
@@ -459,7 +470,8 @@ sadmm_status sadmm_environments_put(struct sadmm_environments *environments, sad
         all->couplings[coupling].last = world->couplings[slot].last;
         all->couplings[coupling++].joint.last = world->couplings[slot].joint.last;
     }
-    merged->progress[environment] = (struct sadmm_environment_progress){world->report, world->stepped, false};
+    merged->progress[environment] = (struct sadmm_environment_progress){
+        world->report.step, world->report.time, world->stepped, false, world->report};
     sadmm_world_moved(all);
     return SADMM_OK;
 }

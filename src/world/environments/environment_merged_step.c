@@ -95,20 +95,17 @@ static sadmm_status read_inputs(struct sadmm_environments *environments)
 /* Steps that the merged world has made are those of all that are not marked. */
 static void count_steps(struct sadmm_environments *environments, int64_t steps, double dt)
 {
-    const sadmm_step_report *report = &environments->merged.world->report;
+    struct sadmm_merged_world *merged = &environments->merged;
     if (steps <= 0) return;
     for (int32_t e = 0; e < environments->count; ++e) {
-        struct sadmm_environment_progress *progress = &environments->merged.progress[e];
+        struct sadmm_environment_progress *progress = &merged->progress[e];
         if (environments->marked[e]) continue;
-        const int64_t step = progress->report.step + steps;
-        double time = progress->report.time;
-        for (int64_t k = 0; k < steps; ++k) time += dt; /* as a world would */
-        progress->report = *report;
-        progress->report.step = step;
-        progress->report.time = time;
+        progress->step += steps;
+        for (int64_t k = 0; k < steps; ++k) progress->time += dt; /* as a world would */
         progress->stepped = progress->moved = true;
     }
-    environments->merged.measurable = true;
+    merged->measurable = true;
+    merged->measured = false;
 }
 
 /* As many as there are left, or until one fails. */

@@ -34,8 +34,10 @@ struct sadmm_environment_slots {
 
 /* How far an environment of a merged world has come. */
 struct sadmm_environment_progress {
-    sadmm_step_report report; /* of its last step, but for its contacts where it has moved */
-    bool stepped, moved;      /* since the template; since a state was put into it */
+    int64_t step;
+    double time;          /* s */
+    bool stepped, moved;  /* since the template; since a state was put into it, */
+    sadmm_step_report report; /* which this is of */
 };
 
 /* A state that is kept, in the backend's memory; NULL: it is not there. */
@@ -61,8 +63,8 @@ struct sadmm_merged_world {
     const int32_t *objects;   /* of rows of bodies; then of rows of anything else */
     uint8_t *left, *refused;  /* (count) not 0: marked; what is out of range */
     uint8_t *refusals;        /* (count) as they were read last */
-    struct sadmm_copy_measures *measures; /* (count) likewise */
-    bool measurable;          /* the last step's are not read yet, and can be */
+    struct sadmm_copy_measures *measures; /* (count) of the last step, where they are */
+    bool measurable, measured; /* not read yet, and can be; read */
     struct sadmm_kept_block *kept; /* by state; made when it is begun with */
     size_t kept_count;
 };
