@@ -120,7 +120,9 @@ static void expect_report(sadmm_world *world, const double *row, int precision)
     const sadmm_step_report report = world_report(world);
     const double rounding = precision == SADMM_F64 ? 1e-12 : 1e-6; /* of some m/s */
     ck_assert_double_eq_tol(row[0], report.certificate.ncp_max, 1e-6 * report.certificate.ncp_max + rounding);
-    ck_assert_double_eq_tol(row[2], report.penetration_max, 1e-15);
+    /* a world's is the deepest of all sub-steps, an environment's of the last one */
+    ck_assert_double_ge(row[2], 0);
+    ck_assert_double_le(row[2], report.penetration_max);
     ck_assert_double_eq_tol(row[3], report.joint_drift, 1e-12);
     ck_assert_double_eq(row[4], report.contacts);
 }
@@ -320,7 +322,8 @@ START_TEST(inputs_and_contacts_are_an_environments_own)
             for (int32_t e = 0; e < FEW; ++e) {
                 for (size_t i = 0; i < views[k].numbers; ++i) {
                     double *number = &views[k].host[views[k].numbers * (size_t)e + i];
-                    *number *= 1 + 0.01 * noise((uint32_t)e + 7, (uint32_t)i);
+                    /* a row alike: moments fit each other */
+                    *number *= 1 + 0.01 * noise((uint32_t)e + 7, (uint32_t)(i / (size_t)views[k].in.columns));
                     given[e][k].host[i] = *number;
                 }
                 give(own[e], &given[e][k]);

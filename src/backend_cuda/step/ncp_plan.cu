@@ -8,9 +8,9 @@
 #include "core/base/memory.h"
 #include "core/solve/articulation_order.h"
 
-/* Memory of all blocks at most, and of one. */
+/* Memory of all blocks at most, and of one: large ones have as much however many there are. */
 #define NCP_MEMORY ((size_t)512 << 20)
-#define NCP_BLOCK_MEMORY ((size_t)2 << 20)
+#define NCP_BLOCK_MEMORY ((size_t)1900 << 10)
 
 /* In BUFFER_NCP, in this order: what the host gives; then what is the device's own. */
 struct ncp_arrays {
@@ -18,7 +18,7 @@ struct ncp_arrays {
     struct cuda_ncp_node *nodes;
     int32_t *joints, *part_of;
     size_t given;
-    int32_t *number, *solved, *islands, *count, *unsolved, *missed; /* the last three side by side */
+    int32_t *number, *solved, *islands, *left, *count, *unsolved, *missed, *left_count; /* the last four side by side */
     size_t bytes;
 };
 
@@ -34,10 +34,12 @@ static struct ncp_arrays arrays_at(char *at, const struct cuda_step *s)
     a.given = (size_t)((char *)a.number - at);
     a.solved = a.number + n;
     a.islands = a.solved + n;
-    a.count = a.islands + n;
+    a.left = a.islands + n;
+    a.count = a.left + n;
     a.unsolved = a.count + 1;
     a.missed = a.unsolved + 1;
-    a.bytes = (size_t)((char *)(a.missed + 1) - at);
+    a.left_count = a.missed + 1;
+    a.bytes = (size_t)((char *)(a.left_count + 1) - at);
     return a;
 }
 
@@ -180,11 +182,15 @@ sadmm_status CUDA(reserve_ncp)(struct sadmm_context *c, struct sadmm_error *erro
 {
     struct cuda_step *s = c->step;
     if (!solves_ncp(c)) return SADMM_OK;
-    const int each = has_large_ncp_blocks(c) ? (int)NCP_LARGE_EACH : (int)NCP_SMALL_EACH;
-    s->ncp_blocks = std::min(s->bodies, each * c->multiprocessors);
-    s->ncp_bytes = std::min(NCP_BLOCK_MEMORY, NCP_MEMORY / (size_t)s->ncp_blocks / 16 * 16);
+    size_t most = 0;
+    for (int large = 0; large < 2; ++large) {
+        struct ncp_block_memory *blocks = &s->ncp_blocks[large];
+        blocks->count = std::min(s->bodies, (large ? (int)NCP_LARGE_EACH : (int)NCP_SMALL_EACH) * c->multiprocessors);
+        blocks->bytes = std::min(NCP_BLOCK_MEMORY, NCP_MEMORY / (size_t)blocks->count / 16 * 16);
+        if (large || !has_large_ncp_blocks(c)) most = std::max(most, (size_t)blocks->count * blocks->bytes);
+    }
     TRY(CUDA(reserve)(c, BUFFER_NCP_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
-    return CUDA(reserve)(c, BUFFER_NCP_MEMORY, (size_t)s->ncp_blocks * s->ncp_bytes, error);
+    return CUDA(reserve)(c, BUFFER_NCP_MEMORY, most, error);
 }
 
 void CUDA(view_ncp)(struct sadmm_context *c)
@@ -205,7 +211,8 @@ void CUDA(view_ncp)(struct sadmm_context *c)
     v->count = a.count;
     v->unsolved = a.unsolved;
     v->missed = a.missed;
+    v->left = a.left;
+    v->left_count = a.left_count;
     v->impulse = buffer<double>(c, BUFFER_NCP_IMPULSE);
     v->memory = buffer<char>(c, BUFFER_NCP_MEMORY);
-    v->bytes = c->step->ncp_bytes;
 }

@@ -71,7 +71,8 @@ static __device__ bool solve_island(const cuda_view &v, ncp_island *s, ncp_memor
     return true;
 }
 
-/* Blocks take islands in turn. args.count: after the iterations. */
+/* Blocks take islands in turn. args.count: after the iterations; args.left: enum cuda_ncp_pass. What an island takes at
+ * most is by its threads: with large blocks it is solved, or not, whether a small one has tried or not. */
 template <int BLOCK, int EACH>
 static __global__ void __launch_bounds__(BLOCK, EACH)
     ncp_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -83,13 +84,14 @@ static __global__ void __launch_bounds__(BLOCK, EACH)
         if (blockIdx.x == 0 && threadIdx.x == 0) *v.ncp.unsolved = 1;
         return;
     }
-    const int32_t islands = *v.ncp.count;
+    const bool of_left = args.left == NCP_LEFT;
+    const int32_t islands = of_left ? *v.ncp.left_count : *v.ncp.count, *const list = of_left ? v.ncp.left : v.ncp.islands;
 #pragma unroll 1
     for (int32_t k = (int32_t)blockIdx.x; k < islands; k += (int32_t)gridDim.x) {
         ncp_island s;
         ncp_memory memory;
-        char *far = v.ncp.memory + (size_t)blockIdx.x * v.ncp.bytes;
-        s.label = v.ncp.islands[k];
+        char *far = v.ncp.memory + (size_t)blockIdx.x * args.memory;
+        s.label = list[k];
         s.budget = NCP_BUDGET;
         if (args.count && v.ncp.solved[s.label]) continue;
         s.first_slot = v.graph.slot_of[s.label];
@@ -97,13 +99,14 @@ static __global__ void __launch_bounds__(BLOCK, EACH)
         memory.at = (char *)(shared + 1);
         memory.end = (char *)dynamic + args.cluster;
         memory.far_at = far;
-        memory.far_end = far + v.ncp.bytes;
+        memory.far_end = far + args.memory;
         memory.full = false;
         const bool solved = solve_island(v, &s, memory, args.count != 0, shared);
         __syncthreads();
         if (threadIdx.x > 0) continue;
         v.ncp.solved[s.label] = solved;
-        if (!solved) *v.ncp.unsolved = 1;
+        if (!solved && args.left == NCP_LEAVES) v.ncp.left[atomicAdd(v.ncp.left_count, 1)] = s.label;
+        else if (!solved) *v.ncp.unsolved = 1;
         if (solved && s.missed) atomicAdd(v.ncp.missed, 1);
         if (solved && !s.missed && args.checks > 0 && v.islands.info[s.label].stopped == 0) /* a check has counted it */
             atomicAdd(&v.islands.stop->unmet[args.checks % CHECKS_KEPT], -1);
@@ -216,23 +219,32 @@ static int ncp_shared_of(bool large, int shared_limit)
     return std::min(large ? (int)NCP_LARGE_SHARED : (int)NCP_SMALL_SHARED, shared_limit);
 }
 
-sadmm_status CUDA(launch_ncp)(struct sadmm_context *c, bool after, struct sadmm_error *error)
+static sadmm_status launch_pass(struct sadmm_context *c, bool large, enum cuda_ncp_pass pass, bool after,
+                                struct sadmm_error *error)
 {
     cuda_args args = {};
     struct cuda_partition blocks = {};
-    const bool large = has_large_ncp_blocks(c);
-    if (!after) {
-        CUDA_CALL(c, cudaMemsetAsync(c->view.ncp.count, 0, 3 * sizeof(int32_t), c->stream), "cudaMemsetAsync(islands)");
-        TRY(CUDA(launch)(c, begin_kernel, "islands to be solved", blocks_for(c->view.model.bodies), &args, error));
-    }
     args.count = after;
     args.checks = after ? c->checks : 0;
     args.cluster = ncp_shared_of(large, c->shared_limit);
-    blocks.parts = c->step->ncp_blocks;
+    args.left = pass;
+    args.memory = c->step->ncp_blocks[large].bytes;
+    blocks.parts = c->step->ncp_blocks[large].count;
     blocks.cluster = 1;
     blocks.threads = large ? (int)NCP_LARGE_BLOCK : (int)NCP_SMALL_BLOCK;
     blocks.shared = (size_t)args.cluster;
     return CUDA(launch_partition)(c, ncp_kernel_of(large), "dense contact solve", &blocks, &args, error);
+}
+
+sadmm_status CUDA(launch_ncp)(struct sadmm_context *c, bool after, struct sadmm_error *error)
+{
+    const cuda_args args = {};
+    const bool large = has_large_ncp_blocks(c);
+    if (after) return launch_pass(c, true, large ? NCP_ALL : NCP_LEFT, true, error);
+    CUDA_CALL(c, cudaMemsetAsync(c->view.ncp.count, 0, 4 * sizeof(int32_t), c->stream), "cudaMemsetAsync(islands)");
+    TRY(CUDA(launch)(c, begin_kernel, "islands to be solved", blocks_for(c->view.model.bodies), &args, error));
+    if (!large) TRY(launch_pass(c, false, NCP_LEAVES, false, error));
+    return launch_pass(c, true, large ? NCP_ALL : NCP_LEFT, false, error);
 }
 
 sadmm_status CUDA(launch_ncp_ask)(struct sadmm_context *c, bool after, unsigned long long condition,

@@ -53,6 +53,12 @@ enum { QUIET_STEPS = 32 };
 /* The same of hits, whose empty kernels take less. */
 enum { CALM_STEPS = 256 };
 
+/* Blocks of the dense contact solve of a size. */
+struct ncp_block_memory {
+    int32_t count;
+    size_t bytes; /* of each, in device memory */
+};
+
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
     int32_t bodies, slots, kinematic;
@@ -68,8 +74,7 @@ struct cuda_step {
         backoff; /* steps that could have been so since one could not; that it takes for it to be tried */
 
     bool ncp_trees;             /* some of them are trees (ncp_plan.cu); */
-    int32_t ncp_blocks;         /* blocks that solve islands, */
-    size_t ncp_bytes;           /* and memory of each */
+    struct ncp_block_memory ncp_blocks[2]; /* that solve islands: small ones, large ones */
     cudaStream_t part;          /* parts of a step with a condition are recorded on it; */
     cudaStream_t main;          /* while such a part is recorded: what it is a part of */
 
