@@ -1,6 +1,6 @@
 /* subadmm-bench environments: many copies of a scene stepped together (subadmm/environments.h), by their number and the
- * threads, or on a GPU. Each begins with other velocities. What a step of one takes, how far steps are from the laws, and the memory
- * of one. */
+ * threads, or on a GPU. Each begins with other velocities. What a step of one takes, how far steps are from the laws,
+ * and the memory of one. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -123,7 +123,8 @@ static sadmm_status run_steps(const struct options *o, sadmm_environments *envir
     for (long step = 0; step < o->steps && status == SADMM_OK && !interrupted(); ++step) {
         status = of_all(environments, sadmm_environments_step(environments, 1), error);
         if (status == SADMM_OK)
-            status = of_all(environments, sadmm_environments_get(environments, SADMM_ARRAY_REPORT, NULL, 0, rows), error);
+            status =
+                of_all(environments, sadmm_environments_get(environments, SADMM_ARRAY_REPORT, NULL, 0, rows), error);
         for (size_t e = 0; e < count && status == SADMM_OK; ++e) {
             const double *row = rows + REPORT_COLUMNS * e;
             errors[known++] = row[ERROR_COLUMN];

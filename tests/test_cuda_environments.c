@@ -110,7 +110,8 @@ static void push(const double *template_state, int32_t environment, size_t count
 static void keep_still(sadmm_world *world, double *state)
 {
     for (int32_t i = 0; i < sadmm_world_body_count(world); ++i)
-        if (body_def(world, body_at(world, i)).type != SADMM_BODY_DYNAMIC) memset(state + 13 * i + 7, 0, 6 * sizeof *state);
+        if (body_def(world, body_at(world, i)).type != SADMM_BODY_DYNAMIC)
+            memset(state + 13 * i + 7, 0, 6 * sizeof *state);
 }
 
 /* What the device says of the first environment is what the host says of the same world: its natural map is that of

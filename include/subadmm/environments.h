@@ -11,9 +11,15 @@
  * (a velocity that is not finite, a number in an input array that is out of range) is left as it was before that step,
  * is marked, makes no further steps until it is reset, and does not keep the others from making theirs.
  *
- * On the CPU only. Threads: use environments from one thread at a time; steps use settings.threads of the template's
- * (0: all cores), and its `tasks`. Errors that every call has besides its own: INVALID_ARGUMENT where a pointer is NULL
- * that must not be.
+ * Where the template's steps are made on the CPU, environments are shared out over settings.threads of the template's
+ * (0: all cores), or its `tasks`. On CUDA all are on the template's device and make each step together; bound arrays
+ * are in its memory. There a first step begins without impulses, as every later one does with new contacts, where a
+ * world's first step on CUDA has some initialised; gravity is that of the settings, in all; contacts, rays and saves go
+ * by way of the host; and errors that every call has besides its own are OUT_OF_MEMORY and DEVICE (after which all
+ * environments are to be made anew). AUTO: on what has made the template's steps; the CPU where there were none.
+ *
+ * Threads: use environments from one thread at a time. Errors that every call has besides its own: INVALID_ARGUMENT
+ * where a pointer is NULL that must not be.
  */
 #ifndef SUBADMM_ENVIRONMENTS_H
 #define SUBADMM_ENVIRONMENTS_H
@@ -31,15 +37,16 @@ extern "C" {
 typedef struct sadmm_environments sadmm_environments;
 
 /* `count` copies, in [1, 2^20], of the template `world` as it is now, impulses for warm starting included. The world
- * does not change, and may be destroyed. Errors: INVALID_ARGUMENT (count), UNAVAILABLE (the world's backend is CUDA),
- * OUT_OF_MEMORY; those of steps begun (world.h). The message is the world's. */
+ * does not change, and may be destroyed. Errors: INVALID_ARGUMENT (count), OUT_OF_MEMORY, LIMIT (more objects than a
+ * world holds, on CUDA); UNAVAILABLE (on CUDA: bodies of the template are in several environments of its own, and
+ * others in -1); those of steps begun (world.h). The message is the world's. */
 SADMM_API sadmm_status sadmm_world_replicate(sadmm_world *world, int32_t count, sadmm_environments **out);
 SADMM_API void sadmm_environments_destroy(sadmm_environments *environments); /* NULL is fine */
 /* The message of the last failed call, "" when none failed or environments is NULL; valid until the next call. */
 SADMM_API const char *sadmm_environments_message(const sadmm_environments *environments);
 SADMM_API int32_t sadmm_environments_count(const sadmm_environments *environments); /* of NULL: 0 */
 /* Bytes of all that is stored, over the number of environments: states, those that are kept, arrays, contacts that are
- * recorded. Of NULL: 0. */
+ * recorded; without the world that they are in on CUDA. Of NULL: 0. */
 SADMM_API size_t sadmm_environments_memory(const sadmm_environments *environments);
 
 /* `steps` time steps, >= 1, of settings.dt each, in every environment that is not marked. Input arrays are read once,
@@ -108,9 +115,11 @@ typedef struct sadmm_environments_array {
 } sadmm_environments_array;
 
 /* *out stays valid until the environments are destroyed, at the same place. Output and state: the numbers after each
- * call that steps, resets or sets; do not write to it. Input: write to it between calls; environments have it from the
- * next step on. It begins with what they have now. An input array has one precision, that of the first call. Errors:
- * INVALID_ARGUMENT (array, precision; an input array that has the other precision), OUT_OF_MEMORY. */
+ * call that steps, resets or sets, once it has returned; do not write to it. Input: write to it between calls;
+ * environments have it from the next step on. It begins with what they have now. An input array has one precision, that
+ * of the first call. On CUDA most arrays are read and written by the device alone; limits, inertia, materials, sizes
+ * and places of shapes, and report, go by way of the host. Errors: INVALID_ARGUMENT (array, precision; an input array
+ * that has the other precision), OUT_OF_MEMORY; UNAVAILABLE (gravity, on CUDA). */
 SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_array array,
                                                sadmm_precision precision, sadmm_environments_array *out);
 

@@ -64,7 +64,8 @@ static __device__ __forceinline__ double number_of(const sadmm_resident_array &a
     return array.single ? (double)((const float *)array.values)[k] : ((const double *)array.values)[k];
 }
 
-static __device__ __forceinline__ void put_numbers(const sadmm_resident_array &array, int64_t row, const double *numbers)
+static __device__ __forceinline__ void put_numbers(const sadmm_resident_array &array, int64_t row,
+                                                   const double *numbers)
 {
     const int64_t first = row * array.columns;
     for (int k = 0; k < array.columns; ++k) {
@@ -248,7 +249,8 @@ static __device__ __forceinline__ bool take_body(const cuda_view &v, const copie
             if (!(x[k] == 0)) return false;
         return true;
     }
-    const bool wrench = a.array.array == SADMM_ARRAY_BODY_WRENCH, scale = a.array.array == SADMM_ARRAY_BODY_GRAVITY_SCALE;
+    const bool wrench = a.array.array == SADMM_ARRAY_BODY_WRENCH,
+               scale = a.array.array == SADMM_ARRAY_BODY_GRAVITY_SCALE;
     for (int k = 0; k < columns; ++k)
         if (!is_taken(a.array, x[k])) return false;
     for (int k = 0; k < columns; ++k) {

@@ -85,7 +85,8 @@ static __global__ void __launch_bounds__(BLOCK, EACH)
         return;
     }
     const bool of_left = args.left == NCP_LEFT;
-    const int32_t islands = of_left ? *v.ncp.left_count : *v.ncp.count, *const list = of_left ? v.ncp.left : v.ncp.islands;
+    const int32_t islands = of_left ? *v.ncp.left_count : *v.ncp.count,
+                  *const list = of_left ? v.ncp.left : v.ncp.islands;
 #pragma unroll 1
     for (int32_t k = (int32_t)blockIdx.x; k < islands; k += (int32_t)gridDim.x) {
         ncp_island s;

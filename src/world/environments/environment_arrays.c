@@ -396,6 +396,7 @@ sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_arr
 {
     struct sadmm_bound_array *bound;
     TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_environments_check_backend(environments));
     struct sadmm_error *error = &environments->error;
     TRY(sadmm_check_given(out, "out", error));
     TRY(check_array(environments, array));
@@ -433,6 +434,7 @@ sadmm_status sadmm_environments_get(sadmm_environments *environments, sadmm_arra
                                     int32_t count, double *values)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_environments_check_backend(environments));
     TRY(check_array(environments, array));
     TRY(sadmm_environments_check_which(environments, which, &count));
     struct rows_of rows = {.array = array, .numbers = numbers_of(environments, array), .out = values};
@@ -474,6 +476,7 @@ sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_arra
                                     int32_t count, const double *values)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_environments_check_backend(environments));
     TRY(check_array(environments, array));
     TRY(sadmm_environments_check_which(environments, which, &count));
     struct rows_of rows = {.array = array, .numbers = numbers_of(environments, array), .in = values};

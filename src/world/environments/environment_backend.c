@@ -81,6 +81,12 @@ sadmm_status sadmm_environments_open_backend(struct sadmm_environments *environm
     return SADMM_OK;
 }
 
+sadmm_status sadmm_environments_check_backend(struct sadmm_environments *environments)
+{
+    if (!environments->merged.has_backend || environments->merged.world->context) return SADMM_OK;
+    return sadmm_fail(&environments->error, SADMM_ERROR_DEVICE, "the device has failed: make the environments anew");
+}
+
 static void release(struct sadmm_environments *environments, void *memory)
 {
     const sadmm_world *world = environments->merged.world;

@@ -9,6 +9,9 @@
 sadmm_status sadmm_environments_open_backend(struct sadmm_environments *environments);
 void sadmm_environments_close_backend(struct sadmm_environments *environments);
 
+/* DEVICE where the device has failed, and what it had of environments is lost. */
+sadmm_status sadmm_environments_check_backend(struct sadmm_environments *environments);
+
 /* Memory of a bound array, where the backend has it; without, it is the host's. Errors: OUT_OF_MEMORY, DEVICE. */
 sadmm_status sadmm_environments_place_array(struct sadmm_environments *environments, struct sadmm_bound_array *bound);
 void sadmm_environments_release_array(struct sadmm_environments *environments, struct sadmm_bound_array *bound);
@@ -19,11 +22,12 @@ sadmm_status sadmm_environments_pull_array(struct sadmm_environments *environmen
 /* Can the backend do that with the array, as the merged world is now? */
 bool sadmm_environments_may_exchange(const struct sadmm_environments *environments,
                                      const struct sadmm_bound_array *bound);
-/* Numbers of all that are not marked: of the world into the array, or (an input array) the array's into the world; it is
- * enqueued. Until it has been done; *any: since that was asked last, numbers of some environments, which merged.refusals
- * says, were out of range, and not taken. */
+/* Numbers of all that are not marked: of the world into the array, or (an input array) the array's into the world. It
+ * is enqueued. */
 sadmm_status sadmm_environments_exchange(struct sadmm_environments *environments, struct sadmm_bound_array *bound);
+/* Until that has been done. */
 sadmm_status sadmm_environments_wait_backend(struct sadmm_environments *environments);
+/* And were any numbers since that was asked last out of range, and not taken? merged.refusals says of which. */
 sadmm_status sadmm_environments_find_refused(struct sadmm_environments *environments, bool *any);
 
 /* Reports of all that are not marked say how well the last step was solved. */

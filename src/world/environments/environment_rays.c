@@ -1,6 +1,7 @@
 /* Rays in environments. */
 #include "core/base/check.h"
 #include "environment_arrays.h"
+#include "environment_backend.h"
 
 struct casting {
     int32_t each;
@@ -25,6 +26,7 @@ sadmm_status sadmm_environments_cast_rays(sadmm_environments *environments, cons
                                           sadmm_ray_hit *hits)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_environments_check_backend(environments));
     struct sadmm_error *error = &environments->error;
     struct casting casting = {each, rays, filter, hits};
     TRY(sadmm_environments_check_which(environments, which, &count));

@@ -255,6 +255,7 @@ static sadmm_status make_steps(struct sadmm_environments *environments, struct s
 sadmm_status sadmm_environments_step(sadmm_environments *environments, int32_t steps)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_environments_check_backend(environments));
     if (steps < 1)
         return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "steps = %d: must be >= 1", steps);
     if (environments->merged.world) return sadmm_environments_step_merged(environments, steps);
@@ -298,6 +299,7 @@ static sadmm_status reset_merged(struct sadmm_environments *environments, const 
                                  const int32_t *states)
 {
     bool done;
+    if (count == 0) return SADMM_OK;
     TRY(sadmm_environments_put_kept(environments, which, count, states, &done));
     if (!done) TRY(sadmm_environments_each(environments, which, count, begin_again, (void *)states));
     for (int32_t k = 0; environments->contacts && k < count; ++k)
@@ -309,6 +311,7 @@ sadmm_status sadmm_environments_reset(sadmm_environments *environments, const in
                                       const int32_t *states)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_environments_check_backend(environments));
     TRY(sadmm_environments_check_which(environments, which, &count));
     for (int32_t k = 0; states && k < count; ++k) TRY(check_state(environments, k, states[k]));
     if (environments->merged.world) return reset_merged(environments, which, count, states);
@@ -318,6 +321,7 @@ sadmm_status sadmm_environments_reset(sadmm_environments *environments, const in
 sadmm_status sadmm_environments_keep(sadmm_environments *environments, int32_t environment, int32_t *state)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_environments_check_backend(environments));
     struct sadmm_error *error = &environments->error;
     TRY(sadmm_check_given(state, "state", error));
     TRY(sadmm_environments_check(environments, "environment", environment));
@@ -365,6 +369,7 @@ sadmm_status sadmm_environments_save(sadmm_environments *environments, int32_t e
                                      size_t capacity, size_t *size)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));
+    TRY(sadmm_environments_check_backend(environments));
     struct sadmm_error *error = &environments->error;
     TRY(sadmm_environments_check(environments, "environment", environment));
     TRY(sadmm_check_given(size, "size", error));
