@@ -11,9 +11,13 @@
  * (a velocity that is not finite, a number in an input array that is out of range) is left as it was before that step,
  * is marked, makes no further steps until it is reset, and does not keep the others from making theirs.
  *
- * On the CPU only. Threads: use environments from one thread at a time; steps use settings.threads of the template's
- * (0: all cores), and its `tasks`. Errors that every call has besides its own: INVALID_ARGUMENT where a pointer is NULL
- * that must not be.
+ * They are where the template's backend has it: on the CPU, or in the memory of a CUDA device, where all of them make
+ * a step together. There they have one gravity, that of the settings. Limits of joints, inertias, materials, sizes and
+ * frames of shapes, states that are set, reports, contacts and rays go by way of the host, which is slower.
+ *
+ * Threads: use environments from one thread at a time; steps on the CPU use settings.threads of the template's (0: all
+ * cores), and its `tasks`. Errors that every call has besides its own: INVALID_ARGUMENT where a pointer is NULL that
+ * must not be; DEVICE where they are on CUDA.
  */
 #ifndef SUBADMM_ENVIRONMENTS_H
 #define SUBADMM_ENVIRONMENTS_H
@@ -31,8 +35,8 @@ extern "C" {
 typedef struct sadmm_environments sadmm_environments;
 
 /* `count` copies, in [1, 2^20], of the template `world` as it is now, impulses for warm starting included. The world
- * does not change, and may be destroyed. Errors: INVALID_ARGUMENT (count), UNAVAILABLE (the world's backend is CUDA),
- * OUT_OF_MEMORY; those of steps begun (world.h). The message is the world's. */
+ * does not change, and may be destroyed. Errors: INVALID_ARGUMENT (count), UNAVAILABLE (the world's backend is CUDA,
+ * which is not there), OUT_OF_MEMORY; those of steps begun (world.h). The message is the world's. */
 SADMM_API sadmm_status sadmm_world_replicate(sadmm_world *world, int32_t count, sadmm_environments **out);
 SADMM_API void sadmm_environments_destroy(sadmm_environments *environments); /* NULL is fine */
 /* The message of the last failed call, "" when none failed or environments is NULL; valid until the next call. */
@@ -110,9 +114,18 @@ typedef struct sadmm_environments_array {
 /* *out stays valid until the environments are destroyed, at the same place. Output and state: the numbers after each
  * call that steps, resets or sets; do not write to it. Input: write to it between calls; environments have it from the
  * next step on. It begins with what they have now. An input array has one precision, that of the first call. Errors:
- * INVALID_ARGUMENT (array, precision; an input array that has the other precision), OUT_OF_MEMORY. */
+ * INVALID_ARGUMENT (array, precision; an input array that has the other precision), UNAVAILABLE (gravity on CUDA),
+ * OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_array array,
                                                sadmm_precision precision, sadmm_environments_array *out);
+
+/* CUDA: work that was enqueued on this stream (a cudaStream_t of the device; NULL, as it begins: the default one) ends
+ * before a step reads BODY_WRENCH, BODY_DAMPING, BODY_GRAVITY_SCALE, or targets, gains, largest drive forces, friction,
+ * springs and armature of joints in the device's memory. Other input arrays, all of them in the first step and after
+ * what takes the world to the host, and what _get, _set and _save read or write go by way of the host, which does not
+ * wait for the stream: end its work first. Output and state arrays are complete when a call returns. The stream must be
+ * there for as long as it is set. On the CPU it says nothing. */
+SADMM_API sadmm_status sadmm_environments_set_stream(sadmm_environments *environments, void *stream);
 
 /* ---- contacts and rays --------------------------------------------------------------------------------------- */
 
