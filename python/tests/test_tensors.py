@@ -11,6 +11,7 @@ pytest.importorskip("mujoco")
 
 import subadmm  # noqa: E402
 from subadmm import namespace, rotations  # noqa: E402
+from subadmm.environments import Environments  # noqa: E402
 
 ROBOT = """
 <mujoco>
@@ -225,3 +226,84 @@ def test_calls_wait_for_torch(make):
         wrench[:] = 1
         call()
         assert calls and calls[0] == wrench.numel()
+
+
+# ---- tasks -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def gym():
+    pytest.importorskip("gymnasium", minversion="1.1")
+    import subadmm.gym
+
+    return subadmm.gym
+
+
+def pair(gym, monkeypatch, name):
+    """The task with arrays, and with tensors."""
+    plain = getattr(gym, name)(4, episode=3, autoreset_mode="SameStep")
+    monkeypatch.setattr(Environments, "_tensors", True)
+    task = getattr(gym, name)(4, episode=3, autoreset_mode="SameStep")
+    assert isinstance(task.robots.q, torch.Tensor) and isinstance(plain.robots.q, np.ndarray)
+    return plain, task
+
+
+@pytest.mark.parametrize("name", ["CartPole", "Ant", "LiftCube", "TurnCube", "Quadruped"])
+def test_tasks_see_what_those_of_numpy_see(gym, monkeypatch, name):
+    """In the same states, since contacts make more of a rounding: controls, observations, rewards and ends."""
+    plain, task = pair(gym, monkeypatch, name)
+    random = np.random.default_rng(3)
+    for seed in (2, 3):
+        np.testing.assert_allclose(task.reset(seed=seed)[0], plain.reset(seed=seed)[0], rtol=0, atol=1e-15)
+        for _ in range(5):
+            actions = random.uniform(-1, 1, plain.action_space.shape)
+            plain.act(actions)
+            task.act(torch.from_numpy(actions))
+            expect_equal(task.robots.ctrl, plain.robots.ctrl)
+            plain.robots.step(10)
+            task.robots.step(1)
+            task.robots.set("body_state", plain.robots.get("body_state"))
+            expect_equal(task.observe(), plain.observe(), 1e-12)  # states pass through the joints
+            expect_equal(task.reward(), plain.reward(), 1e-10)  # with rates over a time step
+            assert (task.done().numpy() == plain.done()).all()
+
+
+@pytest.mark.parametrize("name", ["CartPole", "Ant"])
+def test_steps_of_tasks_are_those_of_numpy(gym, monkeypatch, name):
+    """With resets in between."""
+    plain, task = pair(gym, monkeypatch, name)
+    random = np.random.default_rng(3)
+    for envs in (plain, task):
+        envs.reset(seed=2)
+    ended = 0
+    for _ in range(7):
+        actions = random.uniform(-1, 1, plain.action_space.shape)
+        seen, expected = task.step(actions), plain.step(actions)
+        assert all(isinstance(x, np.ndarray) for x in seen[:4]) and seen[0] in task.observation_space
+        for ours, theirs in zip(seen[:4], expected[:4]):
+            np.testing.assert_allclose(ours.astype(float), theirs.astype(float), rtol=0, atol=1e-9)
+        assert seen[4].keys() == expected[4].keys()
+        if seen[3].any():
+            np.testing.assert_allclose(np.stack(seen[4]["final_obs"]), np.stack(expected[4]["final_obs"]), atol=1e-9)
+        ended += seen[3].sum()
+    assert ended == 8
+    observations, rewards, terminated, *_ = task.advance(torch.zeros(plain.action_space.shape))
+    assert isinstance(observations, torch.Tensor) and isinstance(rewards, torch.Tensor)
+    assert observations.dtype == rewards.dtype == torch.float64 and isinstance(terminated, np.ndarray)
+
+
+def test_rsl_rl_has_them_as_they_are(gym, monkeypatch):
+    pytest.importorskip("tensordict")
+    plain = gym.RslRl(gym.Ant(3, episode=4), seed=5)
+    monkeypatch.setattr(Environments, "_tensors", True)
+    envs = gym.RslRl(gym.Ant(3, episode=4), seed=5)
+    assert envs.device == torch.device("cpu")
+    random = np.random.default_rng(4)
+    for _ in range(6):  # with ends of episodes
+        actions = torch.from_numpy(random.uniform(-1.2, 1.2, (3, 8)).astype(np.float32))
+        with torch.inference_mode():
+            seen, rewards, dones, extras = envs.step(actions)
+            expected, wanted, done, _ = plain.step(actions)
+        assert torch.allclose(seen["policy"], expected["policy"], rtol=1e-6, atol=1e-6)
+        assert torch.allclose(rewards, wanted, rtol=1e-6, atol=1e-6) and (dones == done).all()
+        assert isinstance(envs._now, torch.Tensor) and seen["policy"].dtype == rewards.dtype == torch.float32
