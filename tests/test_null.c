@@ -102,6 +102,8 @@ static void on_environments(void)
     REFUSES("values", sadmm_environments_set(environments, SADMM_ARRAY_BODY_STATE, NULL, 0, NULL));
     REFUSES("environments", sadmm_environments_bind(NULL, SADMM_ARRAY_BODY_STATE, SADMM_F64, &array));
     REFUSES("out", sadmm_environments_bind(environments, SADMM_ARRAY_BODY_STATE, SADMM_F64, NULL));
+    REFUSES("environments", sadmm_environments_set_stream(NULL, NULL));
+    ck_assert_int_eq(sadmm_environments_set_stream(environments, NULL), SADMM_OK); /* the default one */
     ck_assert_ptr_null(sadmm_environments_marked(NULL));
     ck_assert_str_eq(sadmm_environments_mark(NULL, 0), "");
     const sadmm_contact *contacts;
@@ -649,6 +651,7 @@ static const struct {
       "sadmm_environments_get",
       "sadmm_environments_set",
       "sadmm_environments_bind",
+      "sadmm_environments_set_stream",
       "sadmm_environments_marked",
       "sadmm_environments_mark",
       "sadmm_environments_record_contacts",

@@ -123,6 +123,12 @@ typedef struct sadmm_environments_array {
 SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_array array,
                                                sadmm_precision precision, sadmm_environments_array *out);
 
+/* CUDA: work that was enqueued on this stream (a cudaStream_t of the device; NULL, as it begins: the default one) ends
+ * before a call reads or writes arrays; where these go by way of the host, all work on the device does. Output and state
+ * arrays are complete when a call returns. The stream must be there for as long as it is set. On the CPU it says
+ * nothing. */
+SADMM_API sadmm_status sadmm_environments_set_stream(sadmm_environments *environments, void *stream);
+
 /* ---- contacts and rays --------------------------------------------------------------------------------------- */
 
 /* From now on keep the contacts of the last step of each sadmm_environments_step, or (false) no more. */

@@ -45,13 +45,29 @@ environments *replicate(world &w, whole count)
     return new environments(made);
 }
 
+// An array keeps the C environments, and not their Python object: an attribute of that may hold the array. One on a
+// device is for DLPack, of which torch takes no arrays that are not to be written to.
 template <class T> nb::object view_of(environments &e, const sadmm_environments_array &a, bool writable)
 {
     const size_t shape[3] = {(size_t)a.environments, (size_t)a.rows, (size_t)a.columns};
     nb::capsule owner(new std::shared_ptr<sadmm_environments>(e.kept),
                       [](void *p) noexcept { delete (std::shared_ptr<sadmm_environments> *)p; });
+    if (a.device >= 0)
+        return nb::cast(
+            nb::ndarray<T>(a.values, 3, shape, owner, nullptr, nb::dtype<T>(), nb::device::cuda::value, a.device));
     if (writable) return nb::cast(nb::ndarray<nb::numpy, T>((T *)a.values, 3, shape, owner));
     return nb::cast(nb::ndarray<nb::numpy, const T>((const T *)a.values, 3, shape, owner));
+}
+
+// Where arrays lie: by one that costs steps nothing, where couplings are none.
+int32_t device_of(environments &e)
+{
+    sadmm_environments_array a;
+    call(e, [&](sadmm_environments *h) {
+        const bool empty = sadmm_environments_rows(h, SADMM_ARRAY_COUPLING_TARGET) == 0;
+        return sadmm_environments_bind(h, empty ? SADMM_ARRAY_COUPLING_TARGET : SADMM_ARRAY_BODY_STATE, SADMM_F64, &a);
+    });
+    return a.device;
 }
 
 nb::object bind(environments &e, const std::string &name, const std::string &precision)
@@ -180,6 +196,13 @@ void bind_environments(nb::module_ &m)
             },
             "environment"_a)
         .def("bind", &bind, "array"_a, "precision"_a)
+        .def("device", &device_of)
+        .def(
+            "set_stream",
+            [](environments &e, uintptr_t stream) {
+                call(e, [&](sadmm_environments *h) { return sadmm_environments_set_stream(h, (void *)stream); });
+            },
+            "stream"_a)
         .def("get", &get, "array"_a, "which"_a.none())
         .def("set", &set, "array"_a, "values"_a, "which"_a.none())
         .def("marked",

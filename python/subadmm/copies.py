@@ -9,7 +9,11 @@ from .robots import Robots
 def replicate(template, count):
     """`count` environments, each a copy of `template` as it is now: a World, or what load() returned. They do not see
     each other, and make the same steps as worlds of their own, bit for bit, on settings.threads threads (0: all cores).
-    The template does not change. Of a robot (MJCF or URDF) a Robots, else an Environments. On the CPU.
+    The template does not change. Of a robot (MJCF or URDF) a Robots, else an Environments.
+
+    They are where the template's backend has it. On CUDA (World(backend="cuda"), load(..., backend="cuda")) all are in
+    the memory of the device and make a step together; arrays are tensors of torch there, which share that memory, and
+    all have the settings' gravity.
 
     A motor whose control is 0 is a drive in a Robots, and none in the loaded robot: their steps are equal to rounding.
     The script of a scene's world is not copied: turn it off first (World.script)."""

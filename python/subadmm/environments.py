@@ -1,9 +1,13 @@
 """Many copies of a world, stepped together."""
 
+import functools
+import warnings
+
 import numpy as np
 
 from . import _core
 from .given import whole
+from .namespace import NUMPY, of_torch, to_numpy, torch_with_cuda
 
 
 class Environments:
@@ -13,11 +17,27 @@ class Environments:
     lie, without a copy: output and state arrays are read only and have the numbers after each step and reset; input
     arrays are written to, and read by each step. An environment whose step fails is marked in `failed` and makes no
     steps until it is reset; the others go on.
+
+    Copies of a world on CUDA are in the memory of the device, and `array` gives tensors of torch there. What torch has
+    begun on its current stream is done before a step, or any other call, reads or writes them, and they are complete
+    when it returns.
     """
 
+    _tensors = False  # tensors on the host, too: for tests without a device
+
     def __init__(self, world, count):
-        self._core = _core._replicate(world, count)
-        self._failed = self._core.marked()
+        self._library = _core._replicate(world, count)
+        self._count = self._library.count
+        self._failed = self._library.marked()
+        self._bound = {}  # tensors on a device
+        self._stream = None  # of torch, on the device
+
+    @property
+    def _core(self):
+        """The library's environments, which wait for what torch has begun."""
+        if self._stream is not None:
+            self._library.set_stream(self._stream().cuda_stream)
+        return self._library
 
     def __repr__(self):
         return f"<subadmm environments: {self.count}>"
@@ -28,7 +48,23 @@ class Environments:
     @property
     def count(self):
         """How many there are."""
-        return self._core.count
+        return self._count
+
+    @functools.cached_property
+    def device(self):
+        """The CUDA device that they are on; -1: they are on the CPU."""
+        return self._library.device()
+
+    @functools.cached_property
+    def xp(self):
+        """numpy, or torch on the device, whichever the arrays are of; with array (of anything), copy, zeros and full
+        (float64 on the device), and norm (along the last axis, which stays) and cross of both."""
+        if self.device < 0 and not self._tensors:
+            return NUMPY
+        if self.device < 0:
+            return of_torch("cpu")
+        torch_with_cuda()
+        return of_torch(f"cuda:{self.device}")
 
     @property
     def memory(self):
@@ -46,7 +82,7 @@ class Environments:
 
     @property
     def failed(self):
-        """Which are marked: bool, count; the array stays the same."""
+        """Which are marked: bool, count, of numpy; the array stays the same."""
         return self._failed
 
     def reason(self, environment):
@@ -60,7 +96,7 @@ class Environments:
         """int32 numbers, of numbers or of a mask; None: all."""
         if which is None:
             return None
-        which = np.asarray(which)
+        which = np.asarray(to_numpy(which))
         if which.dtype == bool:
             if which.shape != (self.count,):
                 raise ValueError(f"which: a mask must have shape ({self.count},), and has {which.shape}")
@@ -84,7 +120,7 @@ class Environments:
         stays."""
         rows = self._which(which)
         if states is not None:
-            given = np.asarray(states)
+            given = np.asarray(to_numpy(states))
             if given.dtype.kind not in "iu":
                 raise TypeError(f"states: must be whole numbers, is {given.dtype}")
             n = self.count if rows is None else len(rows)
@@ -105,11 +141,22 @@ class Environments:
 
     def array(self, name, precision="f64"):
         """An array of all environments where it lies, float64 or ('f32') float32: the same one every time. An input
-        array has one precision."""
-        return self._core.bind(name, precision)
+        array has one precision. On CUDA a tensor of torch; only input arrays may be written to."""
+        if (name, precision) in self._bound:
+            return self._bound[name, precision]
+        array = self._core.bind(name, precision)
+        if not isinstance(array, np.ndarray):
+            torch = torch_with_cuda()
+            array = self._bound[name, precision] = torch.from_dlpack(array)
+            self._stream = functools.partial(torch.cuda.current_stream, array.device)
+        elif self._tensors:
+            with warnings.catch_warnings():  # that it is not to be written to
+                warnings.simplefilter("ignore")
+                array = self._bound[name, precision] = self.xp.from_numpy(array)
+        return array
 
     def get(self, name, which=None):
-        """A copy of an array's numbers: of environments (numbers, or a mask; None: all)."""
+        """A copy of an array's numbers, of numpy: of environments (numbers, or a mask; None: all)."""
         return self._core.get(name, self._which(which))
 
     def set(self, name, values, which=None):
@@ -117,7 +164,7 @@ class Environments:
         rows x columns, or what fits that by NumPy's rules. If anything is refused, nothing is set."""
         rows = self._which(which)
         now = self._core.get(name, rows)
-        values = np.asarray(values)
+        values = np.asarray(to_numpy(values))
         if values.dtype.kind not in "iuf":
             raise TypeError(f"values: must be real numbers, is {values.dtype}")
         try:
@@ -147,10 +194,11 @@ class Environments:
     def cast_rays(self, origins, directions, length=np.inf, which=None, *, ignore=None, types=()):
         """What rays hit in environments (numbers, or a mask; None: all): origins and directions of shape environments x
         rays x 3, or what fits that by NumPy's rules (m, world); how far to search (m). Distances (infinite: nothing),
-        points and normals. ignore: a Body of the template; types: of bodies, like ("static",) for heights of terrain."""
+        points and normals, of numpy. ignore: a Body of the template; types: of bodies, like ("static",) for heights of
+        terrain."""
         rows = self._which(which)
         n = self.count if rows is None else len(rows)
-        origins, directions = np.asarray(origins), np.asarray(directions)
+        origins, directions = np.asarray(to_numpy(origins)), np.asarray(to_numpy(directions))
         for name, given in (("origins", origins), ("directions", directions)):
             if given.dtype.kind not in "iuf" or given.ndim < 1 or given.shape[-1] != 3:
                 raise TypeError(f"{name}: must be real numbers, 3 in the last axis; is {given.dtype} of {given.shape}")
@@ -166,5 +214,8 @@ class Environments:
 
     @property
     def error(self):
-        """How far the last step of each is from the laws, m/s; -1: not known. count numbers, a copy."""
-        return self.array("report")[:, 0, 0].copy()
+        """How far the last step of each is from the laws, m/s; -1: not known. count numbers of numpy, a copy. On CUDA
+        the natural map, which is worked out when it is asked for."""
+        if self.device >= 0:
+            return self.get("report")[:, 0, 0].copy()
+        return np.array(to_numpy(self.array("report")[:, 0, 0]))

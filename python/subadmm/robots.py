@@ -9,6 +9,7 @@ from .environments import Environments
 from .given import numbers, point
 from .importing.actuators import FORCE_SPEED
 from .importing.model import name_of
+from .namespace import to_numpy
 from .rotations import conjugate, multiply, of_vector, rotate, to_vector, unit
 
 #: Positions, velocities and accelerations that may be given.
@@ -16,12 +17,13 @@ MOST = 1e9
 
 
 class _Free:
-    """A joint of type 'free': where its numbers are, and the bodies that move with it."""
+    """A joint of type 'free': where its numbers are, and the bodies that move with it. own: its frame in `xp`."""
 
-    def __init__(self, joint, q, qd, rows, ties):
+    def __init__(self, joint, q, qd, rows, ties, xp):
         self.q, self.qd = slice(q, q + 7), slice(qd, qd + 6)
         self.body = rows[joint.body]
         self.place, self.turn = joint._frame
+        self.own = xp.array(self.place), xp.array(self.turn)
         self.tree = _joined(self.body, ties)
 
 
@@ -37,13 +39,15 @@ def _joined(body, ties):
 class Robots(Environments):
     """Copies of a robot. `q`, `qd`: all positions and velocities in MuJoCo's order and frames (count x nq, count x nv);
     `ctrl`: controls of the actuators (count x nu), which are written to and hold from the next step on; `loaded`: the
-    template."""
+    template. On CUDA these, sensors and dynamics are tensors of torch, worked out on the device."""
 
     def __init__(self, loaded, count):
         self._drives = _Drives(loaded)
         with self._drives.all_on():
             super().__init__(loaded.world, count)
         self.loaded = loaded
+        self._drives.place(self.xp)
+        self._mounts, self._pull = {}, (None, None)
         source, world = loaded.source, loaded.world
         rows = {body: k for k, body in enumerate(world.bodies)}
         joints = {joint: k for k, joint in enumerate(world.joints)}
@@ -51,22 +55,25 @@ class Robots(Environments):
         ties = [(rows[j.body_a], rows[j.body_b]) for j in own if j.body_a is not None and j.body_b is not None]
         dynamic = {rows[body] for body in rows if body.type == "dynamic"}
         ties = [pair for pair in ties if dynamic.issuperset(pair)]
-        self._tree = Tree(loaded, rows)
+        self._tree = Tree(loaded, rows, self.xp)
+        self._inputs = {name: world.get(name) for name in ("body_inertia", "body_gravity_scale", "joint_armature")}
         self._free, self._balls, hinges = [], [], []
         for k in range(source.njnt):
             joint = loaded.joints[name_of(source, "joint", k)]
             q, qd = int(source.jnt_qposadr[k]), int(source.jnt_dofadr[k])
             if joint.type == "free":
-                self._free.append(_Free(joint, q, qd, rows, ties))
+                self._free.append(_Free(joint, q, qd, rows, ties, self.xp))
             elif joint.type == "ball":
-                self._balls.append((slice(q, q + 4), slice(qd, qd + 3), joints[joint.joint], joint._turn))
+                self._balls.append((slice(q, q + 4), slice(qd, qd + 3), joints[joint.joint], joint._turn,
+                                    self.xp.array(joint._turn)))
             else:
                 hinges.append((q, qd, joints[joint.joint], joint.coordinate, joint.sign, joint.offset))
         self._hinges = [np.array(column) for column in zip(*hinges)] if hinges else [np.zeros(0, int)] * 6
+        self._own_hinges = [self.xp.array(column) for column in self._hinges]
         self._state = self.array("body_state")
         self._position, self._speed = self.array("joint_position"), self.array("joint_speed")
         #: Controls, as MuJoCo's ctrl, of the actuators in `loaded.actuators`.
-        self.ctrl = np.tile(self._drives.start, (count, 1))
+        self.ctrl = self.xp.array(np.tile(self._drives.start, (count, 1)))
         self._arrays = {name: self.array(name) for name in self._drives.arrays}
 
     def __repr__(self):
@@ -78,47 +85,59 @@ class Robots(Environments):
         shape = self.count, self._drives.start.size
         if np.shape(self.ctrl) != shape:
             raise ValueError(f"ctrl: must have shape {shape}, has {np.shape(self.ctrl)}")
-        self._drives.write(self.ctrl, self._arrays)
+        self._drives.write(self.xp.array(self.ctrl), self._arrays)
         super().step(steps)
+
+    def set(self, name, values, which=None):
+        super().set(name, values, which)
+        if self.device >= 0 and name in self._inputs and not self._bound_of(name):
+            self.array(name)
+
+    set.__doc__ = Environments.set.__doc__
+
+    def _bound_of(self, name):
+        return [array for (of, _), array in self._bound.items() if of == name]
 
     # ---- positions and velocities ----------------------------------------------------------------------------------
 
     @property
     def q(self):
         """Positions, as MuJoCo's qpos: count x nq, a copy."""
-        out = np.zeros((self.count, self.loaded.source.nq))
-        q, _, row, coordinate, sign, offset = self._hinges
+        out = self.xp.zeros((self.count, self.loaded.source.nq))
+        q, _, row, coordinate, sign, offset = self._own_hinges
         out[:, q] = sign * self._position[:, row, coordinate] + offset
-        for at, _, row, turn in self._balls:
+        for at, _, row, _, turn in self._balls:
             out[:, at] = of_vector(rotate(turn, self._position[:, row, 3:]))
         for free in self._free:
             turned = self._state[:, free.body, 3:7]
-            out[:, free.q] = np.concatenate(
-                [self._state[:, free.body, :3] + rotate(turned, free.place), multiply(turned, free.turn)], -1
+            place, turn = free.own
+            out[:, free.q] = self.xp.concatenate(
+                [self._state[:, free.body, :3] + rotate(turned, place), multiply(turned, turn)], -1
             )
         return out
 
     @property
     def qd(self):
         """Velocities, as MuJoCo's qvel: count x nv, a copy."""
-        out = np.zeros((self.count, self.loaded.source.nv))
-        _, qd, row, coordinate, sign, _ = self._hinges
+        xp = self.xp
+        out = xp.zeros((self.count, self.loaded.source.nv))
+        _, qd, row, coordinate, sign, _ = self._own_hinges
         out[:, qd] = sign * self._speed[:, row, coordinate]
-        for _, at, row, turn in self._balls:
+        for _, at, row, _, turn in self._balls:
             file = of_vector(rotate(turn, self._position[:, row, 3:]))
             out[:, at] = rotate(conjugate(file), rotate(turn, self._speed[:, row, 3:]))
         for free in self._free:
-            turned, linear, angular = np.split(self._state[:, free.body, 3:], (4, 7), -1)
-            out[:, free.qd] = np.concatenate(
-                [linear + np.cross(angular, rotate(turned, free.place)), rotate(conjugate(multiply(turned, free.turn)), angular)],
-                -1,
-            )
+            state = self._state[:, free.body]
+            turned, linear, angular = state[:, 3:7], state[:, 7:10], state[:, 10:]
+            place, turn = free.own
+            linear = linear + xp.cross(angular, rotate(turned, place))
+            out[:, free.qd] = xp.concatenate([linear, rotate(conjugate(multiply(turned, turn)), angular)], -1)
         return out
 
     def set_positions(self, q, qd=None, which=None):
         """Positions and velocities (None: 0) in MuJoCo's order, of environments (numbers, or a mask; None: all): one row
         for all, or one each. What moves with the bodies does so; contacts begin anew. If anything is refused, nothing is
-        set."""
+        set. On CUDA, too, the host does it."""
         rows = self._which(which)
         n = self.count if rows is None else len(rows)
         source = self.loaded.source
@@ -131,7 +150,7 @@ class Robots(Environments):
 
     @staticmethod
     def _rows(name, values, n, columns):
-        values = numbers(name, np.atleast_2d(values), columns)
+        values = numbers(name, np.atleast_2d(to_numpy(values)), columns)
         if len(values) not in (1, n):
             raise ValueError(f"{name}: must have 1 row or {n}, and has {len(values)}")
         if not (np.abs(values) <= MOST).all():
@@ -144,7 +163,7 @@ class Robots(Environments):
         at, of, row, coordinate, sign, offset = self._hinges
         position[:, row, coordinate] = sign * (q[:, at] - offset)
         speed[:, row, coordinate] = sign * qd[:, of]
-        for at, of, row, turn in self._balls:
+        for at, of, row, turn, _ in self._balls:
             file = unit(q[:, at])
             position[:, row, 3:] = rotate(conjugate(turn), to_vector(file))
             speed[:, row, 3:] = rotate(conjugate(turn), rotate(file, qd[:, of]))
@@ -178,7 +197,6 @@ class Robots(Environments):
         tree[..., 10:] = angular[:, None] + rotate(turn, spin)
         state[:, free.tree] = tree
 
-
     # ---- sensors ---------------------------------------------------------------------------------------------------
 
     def _named(self, body):
@@ -190,49 +208,77 @@ class Robots(Environments):
     def frame(self, body, place=(0.0, 0.0, 0.0), turn=(1.0, 0.0, 0.0, 0.0)):
         """Where a frame on a body of the file is (by name; place, m, and turn, w x y z, in the body's frame): positions
         (count x 3, world), orientations (count x 4, w x y z)."""
-        row, inner, _ = self._mounted(body, place, turn)
+        row, (place, turn) = self._mounted(body, place, turn)
         x, o = self._state[:, row, :3], self._state[:, row, 3:7]
-        return x + rotate(o, inner[0]), multiply(o, np.broadcast_to(inner[1], o.shape))
+        return x + rotate(o, place), multiply(o, turn)
 
     def _mounted(self, body, place, turn):
-        """The row of the world's body that has a frame, its pose there, and the row's orientation."""
+        """The row of the world's body that has a frame, and its pose there."""
+        place, turn = point("place", place), point("turn", turn, 4)
+        key = body, *place, *turn
+        if key not in self._mounts:
+            self._mounts[key] = self._mount(body, place, turn)
+        return self._mounts[key]
+
+    def _mount(self, body, place, turn):
         index = self._named(body)
         group = self.loaded.groups[index]
         if group.body is None or group.kind == "static":
             raise ValueError(f"body: {body!r} does not move")
-        place, turn = point("place", place), point("turn", turn, 4)
         if np.linalg.norm(turn) < 1e-6:
             raise ValueError("turn: must be a quaternion, not 0")
         outer = group.frame_in_body(index)
         inner = outer[0] + rotate(outer[1], place), multiply(outer[1], turn / np.linalg.norm(turn))
-        row = self.loaded.world.bodies.index(group.body)
-        return row, inner, self._state[:, row, 3:7]
+        return self.loaded.world.bodies.index(group.body), tuple(self.xp.array(x) for x in inner)
 
     def imu(self, body, place=(0.0, 0.0, 0.0), turn=(1.0, 0.0, 0.0, 0.0)):
         """What an inertial sensor in a frame on a body of the file reads (place, m, and turn, w x y z, in the body's
         frame): angular velocity (count x 3, rad/s) and acceleration less gravity (count x 3, m/s^2), in the sensor's
         axes. The acceleration is the mean of the last (sub-)step."""
-        row, inner, o = self._mounted(body, place, turn)
+        row, (place, turn) = self._mounted(body, place, turn)
+        xp, o = self.xp, self._state[:, row, 3:7]
         acceleration = self.array("body_acceleration")[:, row]
-        spin, arm = self._state[:, row, 10:], rotate(o, inner[0])
-        gravity = self._core.get("gravity", None)[:, 0]
-        there = acceleration[:, :3] + np.cross(acceleration[:, 3:], arm) + np.cross(spin, np.cross(spin, arm)) - gravity
-        back = conjugate(multiply(o, np.broadcast_to(inner[1], o.shape)))
+        spin, arm = self._state[:, row, 10:], rotate(o, place)
+        turning, inward = xp.cross(acceleration[:, 3:], arm), xp.cross(spin, xp.cross(spin, arm))
+        there = acceleration[:, :3] + turning + inward - self._gravity(None)
+        back = conjugate(multiply(o, turn))
         return rotate(back, spin), rotate(back, there)
 
     # ---- dynamics --------------------------------------------------------------------------------------------------
 
+    def _pick(self, rows):
+        return slice(None) if rows is None else self.xp.array(rows.astype(np.int64))
+
     def _motion(self, rows):
-        pick = slice(None) if rows is None else rows
+        pick = self._pick(rows)
         return Motion(self._tree, self.q[pick], self.qd[pick])
+
+    def _input(self, name, rows):
+        """Rows of an input array, n x rows x columns, where the robots are: those on a device have the template's where
+        they have no array of it."""
+        if self.device < 0:
+            return self.xp.array(self._core.get(name, rows))
+        for bound in self._bound_of(name):
+            return self.xp.asarray(bound[self._pick(rows)], dtype=self.xp.float64)
+        now = self.xp.array(self._inputs[name])
+        return self.xp.broadcast_to(now, (self.count if rows is None else len(rows), *now.shape))
+
+    def _gravity(self, rows):
+        """n x 3, or the three that all have."""
+        if self.device < 0:
+            return self.xp.array(self._core.get("gravity", rows))[:, 0]
+        now = tuple(self._library.settings.gravity)
+        if now != self._pull[0]:
+            self._pull = now, self.xp.array(now)
+        return self._pull[1]
 
     def _armature(self, rows):
         """n x nv: of joints what each has, of free bodies the file's."""
-        now = self._core.get("joint_armature", rows)
-        out = np.tile(self.loaded.source.dof_armature, (len(now), 1))
-        _, qd, row, coordinate, _, _ = self._hinges
+        now = self._input("joint_armature", rows)
+        out = self.xp.array(np.tile(self.loaded.source.dof_armature, (len(now), 1)))
+        _, qd, row, coordinate, _, _ = self._own_hinges
         out[:, qd] = now[:, row, coordinate]
-        for _, at, row, _ in self._balls:
+        for _, at, row, _, _ in self._balls:
             out[:, at] = now[:, row, 3:]
         return out
 
@@ -240,17 +286,17 @@ class Robots(Environments):
         """n x nv x nv of environments (numbers, or a mask; None: all): kinetic energy is qd M qd / 2. By the masses,
         inertias and armatures that each has."""
         rows = self._which(which)
-        return self._motion(rows).mass_matrix(self._core.get("body_inertia", rows), self._armature(rows))
+        return self._motion(rows).mass_matrix(self._input("body_inertia", rows), self._armature(rows))
 
     def inverse_dynamics(self, qdd, which=None):
         """n x nv: generalised forces that accelerations qdd (n x nv, or one row for all) take: M qdd and those of
-        gravity and velocities. Damping, springs, friction, loops and contacts are left out."""
+        gravity and velocities. Damping, springs, friction, loops and contacts are left out. The host checks qdd, on
+        CUDA, too."""
         rows = self._which(which)
         motion = self._motion(rows)
-        qdd = self._rows("qdd", qdd, *motion.qd.shape)
-        get = lambda name: self._core.get(name, rows)  # noqa: E731
-        return motion.forces(get("body_inertia"), get("gravity")[:, 0], get("body_gravity_scale")[..., 0],
-                             self._armature(rows), qdd)
+        qdd = self.xp.array(self._rows("qdd", qdd, *motion.qd.shape))
+        return motion.forces(self._input("body_inertia", rows), self._gravity(rows),
+                             self._input("body_gravity_scale", rows)[..., 0], self._armature(rows), qdd)
 
     def bias(self, which=None):
         """n x nv: generalised forces of gravity and velocities: MuJoCo's qfrc_bias, less its gravity compensation."""
@@ -299,6 +345,12 @@ class _Drives:
         if "force" in self.kinds:
             self.arrays.append("joint_drive_damping")
 
+    def place(self, xp):
+        """Numbers that steps need, as `xp` has them."""
+        self.xp = xp
+        self.own = [xp.array(x) for x in (*self.range.T, self.gain, self.constant, *self.force_range.T, self.share)]
+        self.parts = {kind: [xp.array(x) for x in parts] for kind, parts in self.kinds.items()}
+
     @contextlib.contextmanager
     def all_on(self):
         """A force of 0 is no drive: here it is one, since it may be another force in some environment."""
@@ -319,14 +371,16 @@ class _Drives:
     def write(self, ctrl, arrays):
         if not self.start.size:
             return
-        inputs = np.clip(np.clip(ctrl, *self.range.T) * self.gain + self.constant, *self.force_range.T)
-        forces = inputs @ self.share
-        for kind, (column, row, coordinate, sign, offset, scale) in self.kinds.items():
+        xp = self.xp
+        least, most, gain, constant, weakest, strongest, share = self.own
+        inputs = xp.clip(xp.clip(ctrl, least, most) * gain + constant, weakest, strongest)
+        forces = inputs @ share
+        for kind, (column, row, coordinate, sign, offset, scale) in self.parts.items():
             force = forces[:, column]
             if kind == "stiff":
                 arrays["joint_target_position"][:, row, coordinate] = sign * (force * scale - offset)
             elif kind == "damped":
                 arrays["joint_target_speed"][:, row, coordinate] = sign * force * scale
             else:
-                arrays["joint_drive_damping"][:, row, coordinate] = np.abs(force) / FORCE_SPEED
-                arrays["joint_target_speed"][:, row, coordinate] = sign * np.sign(force) * FORCE_SPEED
+                arrays["joint_drive_damping"][:, row, coordinate] = xp.abs(force) / FORCE_SPEED
+                arrays["joint_target_speed"][:, row, coordinate] = sign * xp.sign(force) * FORCE_SPEED

@@ -22,10 +22,13 @@ def blocks():
 
 
 def missing(need):
-    """What is missing of what a block needs: "a GPU", or packages by the names they are imported by."""
-    if need == "a GPU":
-        return None if any(b["name"] == "cuda" and b["f32"] for b in subadmm.backends()) else need
-    return next((name for name in need.split(", ") if importlib.util.find_spec(name) is None), None)
+    """What is missing of what a block needs: "a GPU", and packages by the names they are imported by."""
+    def is_there(name):
+        if name == "a GPU":
+            return any(b["name"] == "cuda" and b["f32"] for b in subadmm.backends())
+        return importlib.util.find_spec(name) is not None
+
+    return next((name for name in need.split(", ") if not is_there(name)), None)
 
 
 assert list(blocks()), "no guide"

@@ -26,18 +26,19 @@ class CartPole(Task):
     """A pole on a cart stays up: the action is a force on the cart, N; a reward of 1 a step, until the pole leans by
     more than 0.2 rad or the cart leaves +-2.4 m. Observation: place, angle and their rates."""
 
-    def __init__(self, count, *, threads=None, episode=500, **options):
-        super().__init__(load_text(MODEL, threads=threads), count, decimation=2, episode=episode, **options)
+    def __init__(self, count, *, backend="cpu", threads=None, episode=500, **options):
+        loaded = load_text(MODEL, backend=backend, threads=threads)
+        super().__init__(loaded, count, decimation=2, episode=episode, **options)
 
     def observe(self):
-        return np.concatenate([self.robots.q, self.robots.qd], axis=1)
+        return self.xp.concatenate([self.robots.q, self.robots.qd], axis=1)
 
     def reward(self):
-        return np.ones(self.num_envs)
+        return self.xp.full(self.num_envs, 1.0)
 
     def done(self):
         place, angle = self.robots.q.T
-        return (np.abs(place) > 2.4) | (np.abs(angle) > 0.2)
+        return (abs(place) > 2.4) | (abs(angle) > 0.2)
 
     def start(self, which):
         self.robots.set_positions(*np.split(0.05 * self.uniform(which, 4), 2, axis=1), which)

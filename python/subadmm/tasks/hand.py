@@ -55,14 +55,18 @@ class TurnCube(Task):
     change. Over when the cube is off the palm or tips over.
     """
 
-    def __init__(self, count, *, threads=None, episode=400, **options):
-        loaded = load_text(_model(), threads=threads)
+    def __init__(self, count, *, backend="cpu", threads=None, episode=400, **options):
+        loaded = load_text(_model(), backend=backend, threads=threads)
+        super().__init__(loaded, count, decimation=4, episode=episode, **options)
+
+    def prepare(self):
+        xp, count, loaded = self.xp, self.num_envs, self.robots.loaded
         world, cube = loaded.world, loaded.bodies["cube"]
         self._cube = world.bodies.index(cube)
         self._shape = next(k for k, shape in enumerate(world.shapes) if shape.body == cube)
-        self._half, self._turn, self._change = np.full(count, 0.03), np.zeros(count), np.zeros(count)
-        self._last = np.zeros((count, 12))
-        super().__init__(loaded, count, decimation=4, episode=episode, **options)
+        self._half, self._turn, self._change = xp.full(count, 0.03), xp.zeros(count), xp.zeros(count)
+        self._last = xp.zeros((count, 12))
+        self._middle, self._reach = xp.array((LEAST + MOST) / 2), xp.array((MOST - LEAST) / 2)
         self._size, self._material = self.robots.array("shape_size"), self.robots.array("shape_material")
         self._inertia = self.robots.array("body_inertia")
         palm = next(k for k, shape in enumerate(world.shapes) if shape.body.type == "static")
@@ -72,20 +76,20 @@ class TurnCube(Task):
         return gymnasium.spaces.Box(-1.0, 1.0, (12,), np.float64)
 
     def act(self, actions):
-        actions = np.clip(actions, -1, 1)
+        actions = self.xp.clip(actions, -1, 1)
         self._turn = self.turn()
-        self._change = np.square(actions - self._last).sum(axis=1)
+        self._change = self.xp.square(actions - self._last).sum(axis=1)
         self._last[:] = actions
-        self.robots.ctrl[:] = (LEAST + MOST) / 2 + (MOST - LEAST) / 2 * actions
+        self.robots.ctrl[:] = self._middle + self._reach * actions
 
     def turn(self):
         """Of the cube about the upright axis, rad, in (-pi, pi]."""
         w, x, y, z = self.robots.q[:, 15:19].T
-        return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return self.xp.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
     def observe(self):
         q, qd = self.robots.q, self.robots.qd
-        return np.concatenate([q, qd, self._half[:, None], self._last], axis=1)
+        return self.xp.concatenate([q, qd, self._half[:, None], self._last], axis=1)
 
     def reward(self):
         way = self.turn() - self._turn
@@ -93,24 +97,24 @@ class TurnCube(Task):
 
     def done(self):
         q = self.robots.q
-        upright = 1 - 2 * np.square(q[:, 16:18]).sum(axis=1)
-        return (np.linalg.norm(q[:, 12:14], axis=1) > 0.08) | (q[:, 14] < 0.5 * self._half) | (upright < 0.7)
+        upright = 1 - 2 * self.xp.square(q[:, 16:18]).sum(axis=1)
+        return (self.xp.norm(q[:, 12:14])[:, 0] > 0.08) | (q[:, 14] < 0.5 * self._half) | (upright < 0.7)
 
     def start(self, which):
-        n = len(which)
-        drawn = self.uniform(which, 18)
+        xp, n = self.xp, len(which)
+        drawn = xp.array(self.uniform(which, 18))
         half = 0.03 + 0.003 * drawn[:, 0]
         mass = 800 * (1 + 0.3 * drawn[:, 1]) * (2 * half) ** 3
         self._half[which] = half
         self._size[which, self._shape] = half[:, None]
-        self._inertia[which, self._cube] = np.stack([mass] + 3 * [mass * (2 * half) ** 2 / 6], axis=1)
+        self._inertia[which, self._cube] = xp.stack([mass] + 3 * [mass * (2 * half) ** 2 / 6], axis=1)
         self._material[which, self._shape, 0] = 1 + 0.3 * drawn[:, 2]
-        q = np.zeros((n, 19))
-        q[:, :12] = START + 0.05 * drawn[:, 6:]
+        q = xp.zeros((n, 19))
+        q[:, :12] = xp.array(START) + 0.05 * drawn[:, 6:]
         q[:, 12:14] = 0.005 * drawn[:, 3:5]
         q[:, 14] = 0.01 + half
         turn = 0.3 * drawn[:, 5]
-        q[:, 15], q[:, 18] = np.cos(turn / 2), np.sin(turn / 2)
-        self._last[which] = (START - (LEAST + MOST) / 2) / ((MOST - LEAST) / 2)
-        self.robots.ctrl[which] = START
+        q[:, 15], q[:, 18] = xp.cos(turn / 2), xp.sin(turn / 2)
+        self._last[which] = (xp.array(START) - self._middle) / self._reach
+        self.robots.ctrl[which] = xp.array(START)
         self.robots.set_positions(q, which=which)

@@ -59,13 +59,18 @@ class LiftCube(Task):
 
     LIFT = 0.15  # m
 
-    def __init__(self, count, *, threads=None, episode=200, **options):
-        loaded = load_text(MODEL, threads=threads)
+    def __init__(self, count, *, backend="cpu", threads=None, episode=200, **options):
+        loaded = load_text(MODEL, backend=backend, threads=threads)
+        super().__init__(loaded, count, decimation=4, episode=episode, **options)
+
+    def prepare(self):
+        xp, loaded = self.xp, self.robots.loaded
         world, cube = loaded.world, loaded.bodies["cube"]
         self._cube = world.bodies.index(cube)
         self._shape = next(k for k, shape in enumerate(world.shapes) if shape.body == cube)
-        self._half = np.full(count, 0.02)
-        super().__init__(loaded, count, decimation=4, episode=episode, **options)
+        self._half = xp.full(self.num_envs, 0.02)
+        self._bounds = xp.array([-0.3, -0.3, -0.28]), xp.array([0.3, 0.3, 0.1])
+        self._tip = xp.array([0, 0, 0.3 - 0.02])
         self._size, self._material = self.robots.array("shape_size"), self.robots.array("shape_material")
         self._inertia = self.robots.array("body_inertia")
 
@@ -73,47 +78,47 @@ class LiftCube(Task):
         return gymnasium.spaces.Box(-1.0, 1.0, (4,), np.float64)
 
     def act(self, actions):
-        actions = np.clip(actions, -1, 1)
-        ctrl = self.robots.ctrl
-        ctrl[:, :3] = np.clip(ctrl[:, :3] + RATE * actions[:, :3], (-0.3, -0.3, -0.28), (0.3, 0.3, 0.1))
-        ctrl[:, 3:] = np.where(actions[:, 3:] > 0, CLOSED, OPEN)
+        xp, ctrl = self.xp, self.robots.ctrl
+        actions = xp.clip(actions, -1, 1)
+        ctrl[:, :3] = xp.clip(ctrl[:, :3] + RATE * actions[:, :3], *self._bounds)
+        ctrl[:, 3:] = xp.where(actions[:, 3:] > 0, xp.full((), CLOSED), OPEN)
 
     def _tips(self, q):
         """Between the fingers' tips, m."""
-        return q[:, :3] + [0, 0, 0.3 - 0.02]
+        return q[:, :3] + self._tip
 
     def observe(self):
         q, qd = self.robots.q, self.robots.qd
         left = self.LIFT - (q[:, 7] - self._half)
-        return np.concatenate([q[:, :5], qd[:, :5], q[:, 5:8] - self._tips(q), q[:, 8:12], qd[:, 5:11],
-                               self._half[:, None], left[:, None]], axis=1)
+        return self.xp.concatenate([q[:, :5], qd[:, :5], q[:, 5:8] - self._tips(q), q[:, 8:12], qd[:, 5:11],
+                                    self._half[:, None], left[:, None]], axis=1)
 
     def reward(self):
-        q = self.robots.q
-        away = np.linalg.norm(q[:, 5:8] - self._tips(q), axis=1)
-        lifted = np.clip((q[:, 7] - self._half) / self.LIFT, 0, 1)
-        return 1 - np.tanh(10 * away) + 4 * lifted
+        xp, q = self.xp, self.robots.q
+        away = xp.norm(q[:, 5:8] - self._tips(q))[:, 0]
+        lifted = xp.clip((q[:, 7] - self._half) / self.LIFT, 0, 1)
+        return 1 - xp.tanh(10 * away) + 4 * lifted
 
     def done(self):
         place = self.robots.q[:, 5:8]
-        return (np.abs(place[:, :2]) > 0.4).any(axis=1) | (place[:, 2] < -0.01)
+        return (abs(place[:, :2]) > 0.4).any(axis=1) | (place[:, 2] < -0.01)
 
     def start(self, which):
-        n = len(which)
-        drawn = self.uniform(which, 9)
+        xp, n = self.xp, len(which)
+        drawn = xp.array(self.uniform(which, 9))
         half = 0.02 + 0.005 * drawn[:, 0]
         density = 1500 * (1 + 0.5 * drawn[:, 1])
         mass = density * (2 * half) ** 3
         self._half[which] = half
         self._size[which, self._shape] = half[:, None]
-        self._inertia[which, self._cube] = np.stack([mass] + 3 * [mass * (2 * half) ** 2 / 6], axis=1)
+        self._inertia[which, self._cube] = xp.stack([mass] + 3 * [mass * (2 * half) ** 2 / 6], axis=1)
         self._material[which, self._shape, 0] = 1 + 0.3 * drawn[:, 2]
-        q = np.zeros((n, 12))
-        q[:, :3] = 0.1 * drawn[:, 3:6] * [1, 1, 0.5]
+        q = xp.zeros((n, 12))
+        q[:, :3] = 0.1 * drawn[:, 3:6] * xp.array([1, 1, 0.5])
         q[:, 3:5] = OPEN
         q[:, 5:7] = 0.15 * drawn[:, 6:8]
         q[:, 7] = half
         turn = 0.3 * drawn[:, 8]
-        q[:, 8], q[:, 11] = np.cos(turn / 2), np.sin(turn / 2)
-        self.robots.ctrl[which] = np.concatenate([q[:, :3], np.full((n, 2), OPEN)], axis=1)
+        q[:, 8], q[:, 11] = xp.cos(turn / 2), xp.sin(turn / 2)
+        self.robots.ctrl[which] = xp.concatenate([q[:, :3], xp.full((n, 2), OPEN)], axis=1)
         self.robots.set_positions(q, which=which)

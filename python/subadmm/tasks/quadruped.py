@@ -69,14 +69,14 @@ def ground():
     return heights / heights.max()
 
 
-def robot(threads=None):
+def robot(backend="cpu", threads=None):
     """The robot, above the middle of its ground."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(_model())
     model.hfield_data[:] = ground().ravel()
     start = np.concatenate([[0, 0, 0.5, 1, 0, 0, 0], STANDING])
-    return load(model, backend="cpu", threads=threads, qpos=start)
+    return load(model, backend=backend, threads=threads, qpos=start)
 
 
 class Quadruped(Task):
@@ -92,74 +92,81 @@ class Quadruped(Task):
 
     SPEED = 0.5  # m/s
 
-    def __init__(self, count, *, threads=None, episode=500, **options):
-        loaded = robot(threads)
+    def __init__(self, count, *, backend="cpu", threads=None, episode=500, **options):
+        super().__init__(robot(backend, threads), count, decimation=4, episode=episode, **options)
+
+    def prepare(self):
+        xp, loaded = self.xp, self.robots.loaded
         world = loaded.world
         self._ground = next(k for k, shape in enumerate(world.shapes) if shape.definition.type == "mesh")
         self._trunk = world.bodies.index(loaded.bodies["trunk"])
         grid = np.stack(np.meshgrid(np.linspace(-0.3, 0.5, 5), np.linspace(-0.2, 0.2, 3)), -1).reshape(-1, 2)
-        self._grid = np.concatenate([grid, np.full((len(grid), 1), 1.0)], axis=1)
-        self._last = np.zeros((count, 12))
-        self._change = np.zeros(count)
-        super().__init__(loaded, count, decimation=4, episode=episode, **options)
+        self._grid = xp.array(np.concatenate([grid, np.full((len(grid), 1), 1.0)], axis=1))
+        self._up, self._standing, self._reach = xp.array([0.0, 0, 1]), xp.array(STANDING), xp.array(REACH)
+        self._last = xp.zeros((self.num_envs, 12))
+        self._change = xp.zeros(self.num_envs)
         self._frame = self.robots.array("shape_frame")
         self._material = self.robots.array("shape_material")
         self._inertia = self.robots.array("body_inertia")
-        self._mass = self._inertia[0, self._trunk].copy()
+        self._mass = xp.copy(self._inertia[0, self._trunk])
 
     def action_space_of(self):
         return gymnasium.spaces.Box(-1.0, 1.0, (12,), np.float64)
 
     def act(self, actions):
-        actions = np.clip(actions, -1, 1)
-        self._change = np.square(actions - self._last).sum(axis=1)
+        actions = self.xp.clip(actions, -1, 1)
+        self._change = self.xp.square(actions - self._last).sum(axis=1)
         self._last[:] = actions
-        self.robots.ctrl[:] = STANDING + REACH * actions
+        self.robots.ctrl[:] = self._standing + self._reach * actions
+
+    def _to_ground(self, origins, which=None):
+        """How far it is straight down; the host casts rays."""
+        return self.xp.array(self.robots.cast_rays(origins, [0, 0, -1.0], 4.0, which, types=("static",))[0])
 
     def _look(self):
         """Trunk's turn, its velocity in its frame, gravity's direction there, heights of the ground relative to it."""
-        q, qd = self.robots.q, self.robots.qd
+        xp, q, qd = self.xp, self.robots.q, self.robots.qd
         turn = q[:, 3:7]
-        heading = np.arctan2(2 * (turn[:, 0] * turn[:, 3] + turn[:, 1] * turn[:, 2]),
+        heading = xp.arctan2(2 * (turn[:, 0] * turn[:, 3] + turn[:, 1] * turn[:, 2]),
                              1 - 2 * (turn[:, 2] ** 2 + turn[:, 3] ** 2))
-        around = rotate(of_vector(heading[:, None] * [0.0, 0, 1])[:, None], self._grid)
-        distance, _, _ = self.robots.cast_rays(q[:, None, :3] + around, [0, 0, -1.0], 4.0, types=("static",))
-        heights = np.where(np.isfinite(distance), 1.0 - distance, -1.0)
+        around = rotate(of_vector(heading[:, None] * self._up)[:, None], self._grid)
+        distance = self._to_ground(q[:, None, :3] + around)
+        heights = xp.where(xp.isfinite(distance), 1.0 - distance, -1.0)
         back = conjugate(turn)
-        down = rotate(back, np.broadcast_to([0.0, 0, -1], (self.num_envs, 3)))
+        down = rotate(back, -self._up)
         return q, qd, rotate(back, qd[:, :3]), down, heights
 
     def observe(self):
         q, qd, velocity, down, heights = self._look()
-        return np.concatenate([down, velocity, qd[:, 3:6], q[:, 7:] - STANDING, qd[:, 6:], self._last, heights], axis=1)
+        return self.xp.concatenate([down, velocity, qd[:, 3:6], q[:, 7:] - self._standing, qd[:, 6:], self._last,
+                                    heights], axis=1)
 
     def reward(self):
         q, qd = self.robots.q, self.robots.qd
-        near = np.exp(-8 * (qd[:, 0] - self.SPEED) ** 2)
-        tilt = np.square(q[:, 4:6]).sum(axis=1)
-        return near - 0.2 * np.abs(qd[:, 1]) - 0.5 * tilt - 0.005 * self._change
+        near = self.xp.exp(-8 * (qd[:, 0] - self.SPEED) ** 2)
+        tilt = self.xp.square(q[:, 4:6]).sum(axis=1)
+        return near - 0.2 * abs(qd[:, 1]) - 0.5 * tilt - 0.005 * self._change
 
     def done(self):
         q = self.robots.q
-        distance, _, _ = self.robots.cast_rays(q[:, None, :3], [0, 0, -1.0], 4.0, types=("static",))
-        upright = 1 - 2 * np.square(q[:, 4:6]).sum(axis=1)
+        distance = self._to_ground(q[:, None, :3])
+        upright = 1 - 2 * self.xp.square(q[:, 4:6]).sum(axis=1)
         return (distance[:, 0] < 0.1) | (distance[:, 0] > 0.6) | (upright < 0.5)
 
     def start(self, which):
-        n = len(which)
-        drawn = self.uniform(which, 17)
+        xp, n = self.xp, len(which)
+        drawn = xp.array(self.uniform(which, 17))
         self._frame[which, self._ground, :2] = AWAY * drawn[:, :2]
         self._material[which, :, 0] = 0.8 + 0.3 * drawn[:, 2, None]
         self._inertia[which, self._trunk] = self._mass * (1 + 0.2 * drawn[:, 3, None])
         self._last[which] = 0
         self._change[which] = 0
-        self.robots.ctrl[which] = STANDING
-        q = np.zeros((n, 19))
+        self.robots.ctrl[which] = self._standing
+        q = xp.zeros((n, 19))
         heading = 0.1 * drawn[:, 4]
-        q[:, 3:7] = of_vector(heading[:, None] * [0.0, 0, 1])
-        q[:, 7:] = STANDING + 0.1 * drawn[:, 5:]
-        corners = np.array([[0.18, 0.11, 2], [0.18, -0.11, 2], [-0.18, 0.11, 2], [-0.18, -0.11, 2]])
-        origins = rotate(q[:, None, 3:7], corners)
-        distance, _, _ = self.robots.cast_rays(origins, [0, 0, -1.0], which=which, types=("static",))
-        q[:, 2] = 2 - distance.min(axis=1) + HEIGHT + 0.02
+        q[:, 3:7] = of_vector(heading[:, None] * self._up)
+        q[:, 7:] = self._standing + 0.1 * drawn[:, 5:]
+        corners = xp.array([[0.18, 0.11, 2], [0.18, -0.11, 2], [-0.18, 0.11, 2], [-0.18, -0.11, 2]])
+        distance = self._to_ground(rotate(q[:, None, 3:7], corners), which)
+        q[:, 2] = 2 - xp.amin(distance, axis=1) + HEIGHT + 0.02
         self.robots.set_positions(q, which=which)

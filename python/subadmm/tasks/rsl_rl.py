@@ -3,6 +3,7 @@
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from ..namespace import is_tensor
 from .task import Task
 
 
@@ -11,12 +12,13 @@ class RslRl:
     get_observations() and step().
 
     task: a Task whose episodes end (episode > 0); from here on this is what steps and resets it, and its environments
-    that are over begin again in the same step. device: of all tensors; the physics is on the CPU. seed: of the first
-    environment. Actions in [-1, 1] go over the range of the task's, where that is bounded, and are clipped to it.
-    Observations are the group "policy", float32.
+    that are over begin again in the same step. device: of all tensors; None: that of the task's robots, so that
+    nothing but what is over goes by way of the host where they are on CUDA. seed: of the first environment. Actions
+    in [-1, 1] go over the range of the task's, where that is bounded, and are clipped to it. Observations are the
+    group "policy", float32.
     """
 
-    def __init__(self, task, *, device="cpu", seed=0):
+    def __init__(self, task, *, device=None, seed=0):
         try:
             import torch
             from tensordict import TensorDict
@@ -31,7 +33,7 @@ class RslRl:
         self._torch, self._dict = torch, TensorDict
         task.mode = task.metadata["autoreset_mode"] = AutoresetMode.SAME_STEP
         self.task = task
-        self.device = torch.device(device)
+        self.device = torch.device(device or task.xp.device or "cpu")
         self.num_envs = task.num_envs
         self.num_actions = task.single_action_space.shape[0]
         self.max_episode_length = task.episode
@@ -39,9 +41,9 @@ class RslRl:
                     "decimation": task.decimation, "episode": task.episode, "seed": seed}
         low, high = task.single_action_space.low.astype(float), task.single_action_space.high.astype(float)
         bounded = np.isfinite(low) & np.isfinite(high)
-        self._bounded = bounded
-        self._middle = np.where(bounded, (np.where(bounded, low, 0) + np.where(bounded, high, 0)) / 2, 0.0)
-        self._half = np.where(bounded, (np.where(bounded, high, 0) - np.where(bounded, low, 0)) / 2, 1.0)
+        middle = np.where(bounded, (np.where(bounded, low, 0) + np.where(bounded, high, 0)) / 2, 0.0)
+        half = np.where(bounded, (np.where(bounded, high, 0) - np.where(bounded, low, 0)) / 2, 1.0)
+        self._bounded, self._middle, self._half = (task.xp.array(x) for x in (bounded, middle, half))
         self._now, _ = task.reset(seed=seed)
 
     @property
@@ -63,7 +65,9 @@ class RslRl:
         self.task.steps[:] = steps.cpu().numpy()
 
     def _tensor(self, values):
-        return self._torch.as_tensor(np.asarray(values, np.float32), device=self.device)
+        if not is_tensor(values):
+            values = np.asarray(values, np.float32)
+        return self._torch.as_tensor(values, dtype=self._torch.float32, device=self.device)
 
     def _observed(self):
         return self._dict({"policy": self._tensor(self._now)}, batch_size=[self.num_envs], device=self.device)
@@ -80,13 +84,13 @@ class RslRl:
     def step(self, actions):
         """(observations, rewards, dones, extras). extras: "time_outs" says which were cut off, "log" the share of those
         that ended whose state had failed."""
-        actions = actions.detach().cpu().numpy().astype(np.float64)
-        actions = np.where(self._bounded, np.clip(actions, -1, 1), actions)
-        self._now, rewards, terminated, truncated, info = self.task.step(self._middle + self._half * actions)
+        xp = self.task.xp
+        actions = xp.copy(actions.detach())
+        actions = xp.where(self._bounded, xp.clip(actions, -1, 1), actions)
+        self._now, rewards, terminated, truncated, failed, _ = self.task.advance(self._middle + self._half * actions)
         done = terminated | truncated
         extras = {"time_outs": self._torch.as_tensor(truncated, device=self.device)}
         if done.any():
-            failed = info.get("failed", np.zeros_like(done))
             extras["log"] = {"/episode/failed": float(failed[done].mean())}
         dones = self._torch.as_tensor(done, device=self.device).to(self._torch.long)
         return self._observed(), self._tensor(rewards), dones, extras

@@ -14,14 +14,15 @@ except ImportError as error:
 from ..copies import replicate
 from ..given import whole
 from ..importing import load
+from ..namespace import to_numpy
 
 
 def load_text(text, **options):
-    """What load() makes of a model's text, for the CPU."""
+    """What load() makes of a model's text."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.xml"
         path.write_text(text, encoding="utf-8")
-        return load(path, backend="cpu", **options)
+        return load(path, **options)
 
 
 def _mixed(x):
@@ -38,15 +39,21 @@ class Task(gymnasium.vector.VectorEnv):
     steps of the task (0: no limit); autoreset_mode: as gymnasium has it.
 
     A subclass has `observe() -> (n, k)`, `reward() -> (n,)`, `done() -> (n,)` and `start(which)`, which puts the
-    environments `which`, whose states are the template's by then, where they are to begin; and, if actions are not
-    controls between the actuators' bounds, `act(actions)` and `action_space_of()`. `self.robots` has their numbers (q,
-    qd, ctrl, array); `self.uniform(which, n)` random ones that depend on the environment's seed and episode alone.
+    environments `which` (numbers, of numpy), whose states are the template's by then, where they are to begin; and, if
+    actions are not controls between the actuators' bounds, `act(actions)` and `action_space_of()`. `prepare()` is for
+    numbers of its own. `self.robots` has the robots' numbers (q, qd, ctrl, array); `self.uniform(which, n)` random ones
+    that depend on the environment's seed and episode alone.
+
+    Robots that load(..., backend="cuda") made have tensors of torch, and actions are one. A task that is to run on both
+    takes its functions from `self.xp`, which is numpy or torch on the device: `self.xp.concatenate`, `self.xp.array(x)`
+    of what numpy has. step() and reset() take and give arrays of numpy; `advance` is a step without copies to the host.
     """
 
     def __init__(self, robot, count, *, decimation=1, episode=0, autoreset_mode=AutoresetMode.NEXT_STEP):
         if not hasattr(robot, "actuators"):
             raise TypeError(f"robot = {robot!r}: must be what subadmm.load returned")
         self.robots = replicate(robot, count)
+        self.xp = self.robots.xp
         self.decimation = whole("decimation", decimation, 1, 2**31 - 1)
         self.episode = whole("episode", episode, 0, 2**62)
         self.num_envs = self.robots.count
@@ -60,7 +67,8 @@ class Task(gymnasium.vector.VectorEnv):
         self._over = np.zeros(count, bool)
         self._time = self.decimation * robot.world.settings.dt
         self.single_action_space = self.action_space_of()
-        size = np.asarray(self.observe()).shape
+        self.prepare()
+        size = tuple(self.xp.array(self.observe()).shape)
         if len(size) != 2 or size[0] != count:
             raise ValueError(f"observe: must give one row each, {count} x n; gave {size}")
         self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, size[1:], np.float64)
@@ -68,6 +76,9 @@ class Task(gymnasium.vector.VectorEnv):
         self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, count)
 
     # ---- what a task says ------------------------------------------------------------------------------------------
+
+    def prepare(self):
+        """Once, before anything is observed."""
 
     def observe(self):
         raise NotImplementedError
@@ -97,7 +108,7 @@ class Task(gymnasium.vector.VectorEnv):
         return self._time
 
     def uniform(self, which, n):
-        """Random numbers in [-1, 1), n for each of these environments."""
+        """Random numbers in [-1, 1), n for each of these environments, of numpy."""
         which = np.asarray(which)
         first = self._draws[which]
         self._draws[which] += np.uint64(n)
@@ -130,12 +141,15 @@ class Task(gymnasium.vector.VectorEnv):
             self._seeds[which] = seeds[which].astype(np.uint64)
             self._episodes[which] = 0
         self._begin(which)
-        return np.asarray(self.observe(), np.float64).copy(), {}
+        return to_numpy(self._observed()), {}
 
-    def step(self, actions):
-        actions = np.asarray(actions)
-        if actions.shape != self.action_space.shape:
-            raise ValueError(f"actions: must have shape {self.action_space.shape}, and have {actions.shape}")
+    def _observed(self):
+        return self.xp.copy(self.observe())
+
+    def advance(self, actions):
+        """A step: observations, rewards, which are terminated, truncated and have failed, and observations before those
+        that are over began again (SAME_STEP; None: they did not). Actions, observations and rewards are on the device
+        that the robots are on, the rest is of numpy."""
         if self.mode == AutoresetMode.DISABLED and self._over.any():
             raise ValueError("step: environments are over, and must be reset first: reset(options={'reset_mask': ...})")
         over = self._over.copy()  # with next-step resets: this step begins those again
@@ -143,22 +157,33 @@ class Task(gymnasium.vector.VectorEnv):
         self.robots.step(self.decimation)
         self.steps += 1
         failed = self.robots.failed & ~over
-        rewards = np.where(failed, 0.0, self.reward())
-        terminated = np.asarray(self.done(), bool) | failed
+        rewards = self.xp.copy(self.reward())
+        terminated = np.asarray(to_numpy(self.done()), bool) | failed
         truncated = (self.steps >= self.episode) & ~terminated if self.episode else np.zeros_like(terminated)
-        info = {"failed": failed, "_failed": failed} if failed.any() else {}
+        if failed.any():
+            rewards[np.flatnonzero(failed)] = 0.0
         if over.any():
             self._begin(np.flatnonzero(over))
-            rewards[over] = 0.0
+            rewards[np.flatnonzero(over)] = 0.0
             terminated[over] = truncated[over] = False
         self._over = terminated | truncated
-        observations = np.asarray(self.observe(), np.float64).copy()
+        observations, final = self._observed(), None
         if self.mode == AutoresetMode.SAME_STEP and self._over.any():
-            ended = self._over.copy()
+            final = observations
+            self._begin(np.flatnonzero(self._over))
+            observations = self._observed()
+        return observations, rewards, terminated, truncated, failed, final
+
+    def step(self, actions):
+        actions = np.asarray(to_numpy(actions))
+        if actions.shape != self.action_space.shape:
+            raise ValueError(f"actions: must have shape {self.action_space.shape}, and have {actions.shape}")
+        observations, rewards, terminated, truncated, failed, last = self.advance(self.xp.array(actions))
+        info = {"failed": failed, "_failed": failed} if failed.any() else {}
+        if last is not None:
+            last, ended = to_numpy(last), terminated | truncated
             final = np.full(self.num_envs, None, dtype=object)
             for k in np.flatnonzero(ended):
-                final[k] = observations[k].copy()
+                final[k] = last[k].copy()
             info.update(final_obs=final, _final_obs=ended, final_info={}, _final_info=ended)
-            self._begin(np.flatnonzero(ended))
-            observations = np.asarray(self.observe(), np.float64).copy()
-        return observations, rewards, terminated, truncated, info
+        return to_numpy(observations), to_numpy(rewards), terminated, truncated, info

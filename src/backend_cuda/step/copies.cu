@@ -35,10 +35,21 @@ extern "C" void CUDA(release)(struct sadmm_context *c, void *memory)
     (void)cudaGetLastError();
 }
 
+/* Whatever may be at work on what the host reads or writes has ended. */
+static cudaError_t wait_for_all(void)
+{
+#ifdef SADMM_CUDA_EMULATED
+    return cudaSuccess;
+#else
+    return cudaDeviceSynchronize();
+#endif
+}
+
 extern "C" sadmm_status CUDA(to_backend)(struct sadmm_context *c, void *to, const void *from, size_t bytes,
                                          struct sadmm_error *error)
 {
     CUDA_ENTER(c);
+    CUDA_CALL(c, wait_for_all(), "cudaDeviceSynchronize");
     return bytes > 0 ? CUDA(put)(c, to, from, bytes, error) : SADMM_OK;
 }
 
@@ -46,6 +57,7 @@ extern "C" sadmm_status CUDA(from_backend)(struct sadmm_context *c, void *to, co
                                            struct sadmm_error *error)
 {
     CUDA_ENTER(c);
+    CUDA_CALL(c, wait_for_all(), "cudaDeviceSynchronize");
     return bytes > 0 ? CUDA(get)(c, to, from, bytes, error) : SADMM_OK;
 }
 

@@ -180,8 +180,9 @@ static sadmm_status begin_unsolved(struct sadmm_context *c, bool after, struct s
 {
     struct cuda_step *s = c->step;
     unsigned long long some = 0;
-    if (!solves_ncp(c) || c->plan.residuals || c->partition.tier == SADMM_CUDA_TIER_GRID)
-        return SADMM_OK; /* whose launches are cooperative */
+    const bool measured = c->plan.residuals && !stop_rule_checked(c); /* of iterations, which then are to be made */
+    if (!solves_ncp(c) || measured || c->partition.tier == SADMM_CUDA_TIER_GRID)
+        return SADMM_OK; /* GRID: launches are cooperative */
     CUDA_CALL(c, make_condition(c->stream, &some), "a condition of the step");
     if (!some) return SADMM_OK;
     TRY(CUDA(launch_ncp_ask)(c, after, some, error));
@@ -348,7 +349,7 @@ static sadmm_status record_solving(struct sadmm_context *c, const struct sadmm_s
         return CUDA(enqueue_iterations)(c, stage->count, stage->measure && (stage->last || !stop_rule_checked(c)),
                                         stage->last || stage->checked ? limit : LIMIT_NONE, error);
     case SADMM_STAGE_RESIDUALS: /* not reported where islands stop by themselves */
-        *residuals = stage->last;
+        *residuals = stage->last && !stop_rule_checked(c);
         return stage->last || stop_rule_checked(c) ? SADMM_OK : CUDA(enqueue_residuals)(c, error);
     case SADMM_STAGE_CHECK: return CUDA(enqueue_convergence_check)(c, stage->done, error);
     case SADMM_STAGE_WEIGHTS: return CUDA(enqueue_weights)(c, true, error);

@@ -190,7 +190,8 @@ struct sadmm_resident_kernels {
 
     /* ---- worlds of many equal ones; nothing may be enqueued ---- */
 
-    /* Memory of the backend, zeroed; NULL may be released. To the backend and from it. */
+    /* Memory of the backend, zeroed; NULL may be released. To the backend and from it, once nothing of the program is at
+     * work there any more. */
     sadmm_status (*allocate)(struct sadmm_context *, size_t bytes, void **out, struct sadmm_error *);
     void (*release)(struct sadmm_context *, void *memory);
     sadmm_status (*to_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *);

@@ -16,18 +16,6 @@ static size_t numbers_of(const struct sadmm_environments *environments, sadmm_ar
     return (size_t)sadmm_environments_rows(environments, array) * (size_t)sadmm_array_columns(array);
 }
 
-int32_t sadmm_environments_rows(const sadmm_environments *environments, sadmm_array array)
-{
-    return environments ? sadmm_world_array_rows(environments->worker[0].world, array) : 0;
-}
-
-bool sadmm_environments_is_input(sadmm_array array)
-{
-    const bool is_state = array == SADMM_ARRAY_BODY_STATE || array == SADMM_ARRAY_JOINT_POSITION ||
-                          array == SADMM_ARRAY_JOINT_SPEED || array == SADMM_ARRAY_COUPLING_TARGET;
-    return sadmm_array_is_settable(array) && !is_state;
-}
-
 static sadmm_status check_array(struct sadmm_environments *environments, sadmm_array array)
 {
     if ((unsigned)array < SADMM_ARRAY_COUNT) return SADMM_OK;

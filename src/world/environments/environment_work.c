@@ -7,6 +7,18 @@
 #include "core/base/memory.h"
 #include "environment_merge.h"
 
+int32_t sadmm_environments_rows(const sadmm_environments *environments, sadmm_array array)
+{
+    return environments ? sadmm_world_array_rows(environments->worker[0].world, array) : 0;
+}
+
+bool sadmm_environments_is_input(sadmm_array array)
+{
+    const bool is_state = array == SADMM_ARRAY_BODY_STATE || array == SADMM_ARRAY_JOINT_POSITION ||
+                          array == SADMM_ARRAY_JOINT_SPEED || array == SADMM_ARRAY_COUPLING_TARGET;
+    return sadmm_array_is_settable(array) && !is_state;
+}
+
 sadmm_status sadmm_environments_load(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
                                      int32_t environment)
 {

@@ -223,6 +223,13 @@ void sadmm_environments_settings_sized(const sadmm_environments *environments, s
     (void)sadmm_growing_give(&sadmm_growing_settings, settings, size, 0, &environments->settings, "settings", NULL);
 }
 
+sadmm_status sadmm_environments_set_stream(sadmm_environments *environments, void *stream)
+{
+    TRY(sadmm_check_given(environments, "environments", NULL));
+    environments->stream = stream;
+    return SADMM_OK;
+}
+
 /* ---- steps ------------------------------------------------------------------------------------------------------- */
 
 /* What failed is marked; memory that ran out is the call's affair, too. */
