@@ -2,7 +2,7 @@
  * fails is marked and alone; resets begin again. */
 #include "cuda_worlds.h"
 #include "subadmm/environments.h"
-#include "world/environments/environment_work.h"
+#include "world/environments/environment_types.h"
 
 #define MUST_ALL(environments, call) \
     ck_assert_msg((call) == SADMM_OK, #call ": %s", sadmm_environments_message(environments))

@@ -1020,8 +1020,8 @@ static void say_difference(sadmm_world *worlds[2], int c, int step)
                                b = body_state(worlds[1], body_at(worlds[1], i));
         const double *x = a.position, *y = b.position;
         ck_assert_msg(memcmp(&a, &b, sizeof a) == 0,
-                      "case %d, step %d, body %d: at %.17g %.17g %.17g, %.17g %.17g %.17g; %.17g and %.17g m/s", c, step,
-                      i, x[0], x[1], x[2], y[0], y[1], y[2], a.linear_velocity[0], b.linear_velocity[0]);
+                      "case %d, step %d, body %d: at %.17g %.17g %.17g, %.17g %.17g %.17g; %.17g and %.17g m/s", c,
+                      step, i, x[0], x[1], x[2], y[0], y[1], y[2], a.linear_velocity[0], b.linear_velocity[0]);
     }
     ck_abort_msg("case %d, step %d: something that is no state differs", c, step);
 }

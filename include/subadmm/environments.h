@@ -124,8 +124,8 @@ SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments,
                                                sadmm_precision precision, sadmm_environments_array *out);
 
 /* CUDA: work that was enqueued on this stream (a cudaStream_t of the device; NULL, as it begins: the default one) ends
- * before a call reads or writes arrays; where these go by way of the host, all work on the device does. Output and state
- * arrays are complete when a call returns. The stream must be there for as long as it is set. On the CPU it says
+ * before a call reads or writes arrays; where these go by way of the host, all work on the device does. Output and
+ * state arrays are complete when a call returns. The stream must be there for as long as it is set. On the CPU it says
  * nothing. */
 SADMM_API sadmm_status sadmm_environments_set_stream(sadmm_environments *environments, void *stream);
 

@@ -12,7 +12,7 @@
 #include "core/model/forces.h"
 #include "core/model/joint_law.h"
 #include "core/model/kinematic.h"
-#include "subadmm/arrays.h"
+#include "subadmm/array_kinds.h"
 #include "world.h"
 
 enum { COPIES_THREADS = 128 };

@@ -190,8 +190,8 @@ struct sadmm_resident_kernels {
 
     /* ---- worlds of many equal ones; nothing may be enqueued ---- */
 
-    /* Memory of the backend, zeroed; NULL may be released. To the backend and from it, once nothing of the program is at
-     * work there any more. */
+    /* Memory of the backend, zeroed; NULL may be released. To the backend and from it, once nothing of the program is
+     * at work there any more. */
     sadmm_status (*allocate)(struct sadmm_context *, size_t bytes, void **out, struct sadmm_error *);
     void (*release)(struct sadmm_context *, void *memory);
     sadmm_status (*to_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *);
@@ -199,9 +199,10 @@ struct sadmm_resident_kernels {
                                  struct sadmm_error *);
     /* Can an array be read (or, `in`, written) there? */
     bool (*has_array)(int32_t array, bool in);
-    /* The world's numbers into the array; or, `in`, the array's into the world. `left`: not 0: worlds whose part is left
-     * alone. refused (in): 1 where a number is out of range, which is not taken. All in the backend's memory, a byte a
-     * world. Before anything on `stream` (the backend's kind of one, NULL: its default) has ended nothing is read. */
+    /* The world's numbers into the array; or, `in`, the array's into the world. `left`: not 0: worlds whose part is
+     * left alone. refused (in): 1 where a number is out of range, which is not taken. All in the backend's memory, a
+     * byte a world. Before anything on `stream` (the backend's kind of one, NULL: its default) has ended nothing is
+     * read. */
     sadmm_status (*exchange)(struct sadmm_context *, const struct sadmm_resident_copies *,
                              const struct sadmm_resident_array *, bool in, const uint8_t *left, uint8_t *refused,
                              void *stream, struct sadmm_error *);

@@ -8,7 +8,9 @@
 #include "core/base/memory.h"
 #include "core/base/names.h"
 #include "environment_backend.h"
+#include "environment_checks.h"
 #include "environment_contacts.h"
+#include "environment_work.h"
 
 /* Numbers of an environment. */
 static size_t numbers_of(const struct sadmm_environments *environments, sadmm_array array)

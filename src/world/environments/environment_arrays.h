@@ -2,7 +2,7 @@
 #ifndef SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_ARRAYS_H
 #define SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_ARRAYS_H
 
-#include "environment_work.h"
+#include "environment_types.h"
 
 /* The worker's world, which is an environment already, has what its input arrays have. Errors: those of
  * sadmm_world_set_array. */

@@ -5,7 +5,7 @@
 #include "core/base/definition_fields.h"
 #include "core/base/memory.h"
 #include "core/model/kinematic.h"
-#include "environment_arrays.h"
+#include "environment_checks.h"
 #include "world/objects/body_check.h"
 #include "world/resident/resident.h"
 #include "world/step.h"

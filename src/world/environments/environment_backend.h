@@ -3,7 +3,7 @@
 #ifndef SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_BACKEND_H
 #define SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_BACKEND_H
 
-#include "environment_work.h"
+#include "environment_types.h"
 
 /* What the merged world's backend is to know of environments. Errors: OUT_OF_MEMORY, DEVICE. */
 sadmm_status sadmm_environments_open_backend(struct sadmm_environments *environments);

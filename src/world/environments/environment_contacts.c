@@ -3,6 +3,7 @@
 
 #include "core/base/check.h"
 #include "core/base/memory.h"
+#include "environment_checks.h"
 #include "environment_merge.h"
 
 sadmm_status sadmm_environments_keep_contacts(struct sadmm_environments *environments,

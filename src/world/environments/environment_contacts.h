@@ -2,7 +2,7 @@
 #ifndef SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_CONTACTS_H
 #define SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_CONTACTS_H
 
-#include "environment_work.h"
+#include "environment_types.h"
 
 /* Where they are recorded, those of the worker's world; none after a state was loaded. */
 sadmm_status sadmm_environments_keep_contacts(struct sadmm_environments *environments,

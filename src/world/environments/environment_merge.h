@@ -3,7 +3,7 @@
 #ifndef SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_MERGE_H
 #define SADMM_WORLD_ENVIRONMENTS_ENVIRONMENT_MERGE_H
 
-#include "environment_work.h"
+#include "environment_types.h"
 
 /* *environments have a merged world, of copies of their first worker's. Errors: LIMIT, OUT_OF_MEMORY, UNAVAILABLE (what
  * cannot be copied so); those of worlds. */

@@ -5,6 +5,7 @@
 #include "core/base/memory.h"
 #include "environment_arrays.h"
 #include "environment_backend.h"
+#include "environment_checks.h"
 #include "environment_contacts.h"
 #include "environment_merge.h"
 #include "world/resident/resident.h"

@@ -2,6 +2,8 @@
 #include "core/base/check.h"
 #include "environment_arrays.h"
 #include "environment_backend.h"
+#include "environment_checks.h"
+#include "environment_work.h"
 
 struct casting {
     int32_t each;

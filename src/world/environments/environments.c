@@ -10,9 +10,11 @@
 #include "core/model/settings.h"
 #include "environment_arrays.h"
 #include "environment_backend.h"
+#include "environment_checks.h"
 #include "environment_contacts.h"
 #include "environment_merge.h"
 #include "environment_merged_step.h"
+#include "environment_work.h"
 #include "subadmm/save.h"
 
 enum { MOST_ENVIRONMENTS = 1 << 20 };
