@@ -1012,9 +1012,16 @@ static void expect_same_wrenches(sadmm_world *a, sadmm_world *b)
     }
 }
 
-/* Where the two differ first. */
+/* Where the two differ first; their hits. */
 static void say_difference(sadmm_world *worlds[2], int c, int step)
 {
+    for (int w = 0; w < 2; ++w)
+        for (size_t k = 0; k < worlds[w]->start.hit_count; ++k) {
+            const struct sadmm_world_hit *hit = &worlds[w]->start.hits[k];
+            printf("%s: shapes %d %d (%u), at %.17g %.17g %.17g, %.9g m/s, impulse %.17g\n", w ? "device" : "host",
+                   hit->shape_a, hit->shape_b, hit->subshape, hit->position[0], hit->position[1], hit->position[2],
+                   hit->speed, hit->impulse[2]);
+        }
     for (int32_t i = 0; i < sadmm_world_body_count(worlds[0]); ++i) {
         const sadmm_body_state a = body_state(worlds[0], body_at(worlds[0], i)),
                                b = body_state(worlds[1], body_at(worlds[1], i));
