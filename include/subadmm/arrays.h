@@ -2,8 +2,9 @@
  *
  * An array (array_kinds.h) has a row for each body, shape, joint or coupling, in the order of sadmm_world_body_at
  * (shape_at, joint_at, coupling_at), or one for the world, and a fixed number of columns; doubles, row-major.
- * sadmm_world_body_at gives the id of a row, sadmm_world_body_index the row of an id. Rows stay the same until something
- * is added or removed. For contacts see sadmm_world_contacts; for arrays of many copies of a world see environments.h.
+ * sadmm_world_body_at gives the id of a row, sadmm_world_body_index the row of an id. Rows stay the same until
+ * something is added or removed. For contacts see sadmm_world_contacts; for arrays of many copies of a world see
+ * environments.h.
  *
  * Threads and errors: as world.h says.
  */
