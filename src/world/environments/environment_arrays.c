@@ -10,7 +10,9 @@
 #include "environment_backend.h"
 #include "environment_checks.h"
 #include "environment_contacts.h"
+#include "environment_merge.h"
 #include "environment_work.h"
+#include "world/state/report.h"
 
 /* Numbers of an environment. */
 static size_t numbers_of(const struct sadmm_environments *environments, sadmm_array array)
@@ -265,6 +267,27 @@ sadmm_status sadmm_environments_pull_inputs(struct sadmm_environments *environme
     return SADMM_OK;
 }
 
+/* Of those whose last step has been measured, or that have made none since a state was put into them; the others' rows
+ * are what they were. */
+static sadmm_status write_reports(struct sadmm_environments *environments, struct sadmm_bound_array *bound)
+{
+    TRY(sadmm_environments_measure(environments));
+    TRY(sadmm_environments_pull_array(environments, bound));
+    for (int32_t e = 0; e < environments->count; ++e) {
+        sadmm_step_report report;
+        double row[8];
+        if (environments->marked[e] || !sadmm_environments_report(environments, e, &report)) continue;
+        sadmm_report_numbers(&report, row);
+        store_numbers(bound, e, row);
+    }
+    return sadmm_environments_push_array(environments, bound);
+}
+
+static bool is_report(const struct sadmm_environments *environments, const struct sadmm_bound_array *bound)
+{
+    return bound->array == SADMM_ARRAY_REPORT && environments->merged.world->resident.loaded;
+}
+
 /* By the host. */
 static sadmm_status write_by_host(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
                                   int32_t environment, int32_t place, void *argument)
@@ -283,10 +306,11 @@ sadmm_status sadmm_environments_write_merged_outputs(struct sadmm_environments *
     for (size_t k = 0; k < environments->bound_count; ++k) {
         struct sadmm_bound_array *bound = &environments->bound[k];
         if (sadmm_environments_is_input(bound->array)) continue;
-        bound->by_host = !sadmm_environments_may_exchange(environments, bound);
+        bound->by_host = !is_report(environments, bound) && !sadmm_environments_may_exchange(environments, bound);
         by_host = by_host || bound->by_host;
-        TRY(bound->by_host ? sadmm_environments_pull_array(environments, bound)
-                           : sadmm_environments_exchange(environments, bound));
+        TRY(is_report(environments, bound) ? write_reports(environments, bound)
+            : bound->by_host               ? sadmm_environments_pull_array(environments, bound)
+                                           : sadmm_environments_exchange(environments, bound));
     }
     if (by_host) TRY(sadmm_environments_each(environments, which, count, write_by_host, NULL));
     for (size_t k = 0; k < environments->bound_count; ++k) {
@@ -307,6 +331,16 @@ static struct sadmm_bound_array *source_of(const struct sadmm_environments *envi
     return environments->merged.world ? bound_of(environments, array, SADMM_F64) : NULL;
 }
 
+/* The report of an environment of a merged world, which it is not taken from there for. */
+static sadmm_status read_report(struct sadmm_environments *environments, int32_t environment, double *row)
+{
+    sadmm_step_report report;
+    TRY(sadmm_environments_measure(environments));
+    (void)sadmm_environments_report(environments, environment, &report);
+    sadmm_report_numbers(&report, row);
+    return SADMM_OK;
+}
+
 /* What an array has of an environment. */
 static sadmm_status read_environment(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
                                      int32_t environment, sadmm_array array, double *values)
@@ -315,6 +349,12 @@ static sadmm_status read_environment(struct sadmm_environments *environments, st
     if (bound) {
         load_numbers(bound, environment, values);
         return SADMM_OK;
+    }
+    if (environments->merged.world && array == SADMM_ARRAY_REPORT && !environments->marked[environment]) {
+        const sadmm_status status = read_report(environments, environment, values);
+        return status == SADMM_OK
+                   ? status
+                   : sadmm_fail(&worker->world->error, status, "%s", environments->error.message);
     }
     TRY(sadmm_environments_load(environments, worker, environment));
     return get_all(worker->world, array, values);

@@ -348,29 +348,41 @@ static sadmm_status take_contacts(struct sadmm_environments *environments, sadmm
     return SADMM_OK;
 }
 
-static void take_report(const struct sadmm_environments *environments, sadmm_world *world, int32_t environment)
+bool sadmm_environments_report(const struct sadmm_environments *environments, int32_t environment,
+                               sadmm_step_report *report)
 {
     const struct sadmm_merged_world *merged = &environments->merged;
     const struct sadmm_environment_progress *progress = &merged->progress[environment];
     const struct sadmm_copy_measures *own = merged->measured ? &merged->measures[environment] : NULL;
     const bool checked = merged->world->def.settings.tolerance > 0;
-    sadmm_step_report *report = &world->report;
-    world->stepped = progress->stepped;
     *report = progress->moved ? merged->world->report : progress->report;
     report->step = progress->step;
     report->time = progress->time;
-    if (!progress->moved) return;
-    world->plan = merged->world->plan;
-    world->plan.bodies = report->bodies = world->dynamic_count;
-    world->plan.pairs = report->pairs = (int32_t)world->contacts.pair_count;
-    world->plan.points = report->contacts = (int32_t)world->contacts.point_count;
+    if (!progress->moved) return true;
+    report->bodies = environments->worker[0].world->dynamic_count;
     report->error = own ? own->error : -1;
     report->error_kind = own ? SADMM_STEP_ERROR_LAW : SADMM_STEP_ERROR_NONE;
     report->unsolved = own && checked ? own->unsolved : -1;
     report->converged = own && checked && own->unsolved == 0;
     report->penetration_max = own ? own->penetration_max : 0;
     report->joint_drift = own ? own->joint_drift : 0;
-    if (own) report->iterations = own->iterations;
+    if (own) {
+        report->iterations = own->iterations;
+        report->contacts = own->contacts;
+    }
+    return own != NULL;
+}
+
+static void take_report(const struct sadmm_environments *environments, sadmm_world *world, int32_t environment)
+{
+    const struct sadmm_environment_progress *progress = &environments->merged.progress[environment];
+    world->stepped = progress->stepped;
+    (void)sadmm_environments_report(environments, environment, &world->report);
+    if (!progress->moved) return;
+    world->plan = environments->merged.world->plan;
+    world->plan.bodies = world->dynamic_count;
+    world->plan.pairs = world->report.pairs = (int32_t)world->contacts.pair_count;
+    world->plan.points = world->report.contacts = (int32_t)world->contacts.point_count;
 }
 
 sadmm_status sadmm_environments_take(struct sadmm_environments *environments, sadmm_world *world, int32_t environment)

@@ -17,6 +17,11 @@ sadmm_status sadmm_environments_take(struct sadmm_environments *environments, sa
 sadmm_status sadmm_environments_put(struct sadmm_environments *environments, sadmm_world *world, int32_t environment);
 sadmm_status sadmm_environments_put_contacts(struct sadmm_environments *environments);
 
+/* The report of an environment that is not marked; false: nothing has measured its last step, and what would say how
+ * well it was solved is not known. Its pairs are not told. */
+bool sadmm_environments_report(const struct sadmm_environments *environments, int32_t environment,
+                               sadmm_step_report *report);
+
 /* The environment of a body of the merged world, by its slot. */
 int32_t sadmm_environments_of_body(const struct sadmm_environments *environments, size_t slot);
 /* Contacts of the merged world, an environment's as the template would have them. `all`: of sadmm_world_contacts. */

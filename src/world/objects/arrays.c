@@ -14,6 +14,7 @@
 #include "shape.h"
 #include "world/resident/resident.h"
 #include "world/state/ids.h"
+#include "world/state/report.h"
 
 enum owner { OF_BODY, OF_SHAPE, OF_JOINT, OF_COUPLING, OF_WORLD };
 enum { MOST_COLUMNS = 13 };
@@ -365,12 +366,9 @@ static sadmm_status set_gravity(sadmm_world *world, size_t slot, const double *r
 
 static sadmm_status get_report(sadmm_world *world, size_t slot, double *row)
 {
-    const sadmm_step_report *report = &world->report;
     (void)slot;
     TRY(sadmm_world_synchronise(world));
-    const double numbers[] = {report->error,    (double)report->unsolved, report->penetration_max, report->joint_drift,
-                              report->contacts, report->iterations,       (double)report->step,    report->time};
-    memcpy(row, numbers, sizeof numbers);
+    sadmm_report_numbers(&world->report, row);
     return SADMM_OK;
 }
 

@@ -1,6 +1,15 @@
 /* What is reported of steps, whoever made them. */
 #include "report.h"
 
+#include <string.h>
+
+void sadmm_report_numbers(const sadmm_step_report *report, double *row)
+{
+    const double numbers[] = {report->error,    (double)report->unsolved, report->penetration_max, report->joint_drift,
+                              report->contacts, report->iterations,       (double)report->step,    report->time};
+    memcpy(row, numbers, sizeof numbers);
+}
+
 void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sadmm_resident_report *done)
 {
     sadmm_step_report *report = &world->report;
