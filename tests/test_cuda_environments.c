@@ -298,7 +298,8 @@ START_TEST(inputs_and_contacts_are_an_environments_own)
 {
     static const sadmm_array inputs[] = {SADMM_ARRAY_BODY_WRENCH,  SADMM_ARRAY_JOINT_TARGET_POSITION,
                                          SADMM_ARRAY_BODY_INERTIA, SADMM_ARRAY_JOINT_DRIVE_DAMPING,
-                                         SADMM_ARRAY_BODY_DAMPING, SADMM_ARRAY_SHAPE_MATERIAL};
+                                         SADMM_ARRAY_BODY_DAMPING, SADMM_ARRAY_SHAPE_MATERIAL,
+                                         SADMM_ARRAY_JOINT_LOWER,  SADMM_ARRAY_JOINT_UPPER};
     enum { INPUTS = sizeof inputs / sizeof *inputs, STEPS = EMULATED ? 6 : 40 };
     sadmm_world *origin = template_of("grippers:1", _i);
     step_world(origin, 2);
@@ -358,6 +359,110 @@ START_TEST(inputs_and_contacts_are_an_environments_own)
 }
 END_TEST
 
+/* What is set by the host is seen by all: by rows of arrays, by those of environments that are marked, by another
+ * precision of an array, by contacts, by resets. */
+START_TEST(what_is_set_is_seen)
+{
+    sadmm_world *origin = template_of("grippers:1", _i);
+    step_world(origin, EMULATED ? 4 : 30);
+    sadmm_environments *all = replicate(origin, FEW), *fresh = replicate(origin, 1);
+    const struct view states = view_of(all, SADMM_ARRAY_BODY_STATE), wrench = view_of(all, SADMM_ARRAY_BODY_WRENCH),
+                      one = view_of(fresh, SADMM_ARRAY_BODY_STATE);
+    const size_t n = states.numbers;
+    double *start = calloc(n, sizeof *start), *state = calloc(n, sizeof *state);
+    const sadmm_contact *contacts;
+    int32_t count;
+    MUST_ALL(all, sadmm_environments_record_contacts(all, true));
+    memcpy(start, look(all, &states), n * sizeof *start);
+    MUST_ALL(all, sadmm_environments_step(all, 2));
+    MUST_ALL(all, sadmm_environments_contacts(all, 2, &contacts, &count));
+    ck_assert_int_gt(count, 0);
+
+    sadmm_environments_array single;
+    MUST_ALL(all, sadmm_environments_bind(all, SADMM_ARRAY_BODY_STATE, SADMM_F32, &single));
+    float *rounded = calloc(FEW * n, sizeof *rounded);
+    sadmm_world *merged = all->merged.world;
+    ck_assert_int_eq(merged->kernels->resident->from_backend(merged->context, rounded, single.values,
+                                                             FEW * n * sizeof *rounded, &merged->error), SADMM_OK);
+    (void)look(all, &states);
+    for (size_t k = 0; k < FEW * n; ++k) ck_assert(rounded[k] == (float)states.host[k]);
+    free(rounded);
+
+    wrench.host[wrench.numbers] = NAN; /* of environment 1 */
+    give(all, &wrench);
+    MUST_ALL(all, sadmm_environments_step(all, 1));
+    ck_assert_int_eq(sadmm_environments_marked(all)[1], 1);
+    const int32_t marked = 1, moved = 2;
+    MUST_ALL(all, sadmm_environments_set(all, SADMM_ARRAY_BODY_STATE, &marked, 1, start));
+    expect_same(look(all, &states) + n, start, n, "marked and set", 1, 3);
+    ck_assert_int_eq(sadmm_environments_marked(all)[1], 1);
+
+    /* all that is static is a little higher, until the environment begins again */
+    MUST_ALL(all, sadmm_environments_get(all, SADMM_ARRAY_BODY_STATE, &moved, 1, state));
+    int statics = 0;
+    for (int32_t i = 0; i < sadmm_world_body_count(origin); ++i)
+        if (body_def(origin, body_at(origin, i)).type == SADMM_BODY_STATIC) ++statics, state[13 * i + 2] += 0.01;
+    ck_assert_int_gt(statics, 0);
+    MUST_ALL(all, sadmm_environments_set(all, SADMM_ARRAY_BODY_STATE, &moved, 1, state));
+    MUST_ALL(all, sadmm_environments_contacts(all, 2, &contacts, &count));
+    ck_assert_int_eq(count, 0);
+    wrench.host[wrench.numbers] = 0;
+    give(all, &wrench);
+    MUST_ALL(all, sadmm_environments_step(all, 1));
+    MUST_ALL(all, sadmm_environments_reset(all, NULL, 0, NULL));
+    for (int step = 0; step < (EMULATED ? 4 : 30); ++step) {
+        for (int32_t e = 0; e < FEW; ++e)
+            expect_same(look(all, &states) + n * (size_t)e, look(fresh, &one), n, "again", e, step);
+        MUST_ALL(all, sadmm_environments_step(all, 1));
+        MUST_ALL(fresh, sadmm_environments_step(fresh, 1));
+    }
+    free(start);
+    free(state);
+    free(states.host);
+    free(wrench.host);
+    free(one.host);
+    sadmm_environments_destroy(all);
+    sadmm_environments_destroy(fresh);
+    sadmm_world_destroy(origin);
+}
+END_TEST
+
+/* An array that the host gives changes while one that the device takes has changed, too, since the host saw it. */
+START_TEST(host_and_device_give_the_same)
+{
+    sadmm_world *origin = template_of("grippers:1", _i);
+    sadmm_environments *all = replicate(origin, 2);
+    const struct view stiffness = view_of(all, SADMM_ARRAY_JOINT_DRIVE_STIFFNESS),
+                      upper = view_of(all, SADMM_ARRAY_JOINT_UPPER);
+    double *held = calloc(stiffness.numbers, sizeof *held);
+    (void)look(all, &upper);
+    MUST_ALL(all, sadmm_environments_step(all, 1));
+    const int32_t first = 0;
+    (void)look(all, &stiffness);
+    for (size_t k = 0; k < 2 * stiffness.numbers; ++k) stiffness.host[k] *= 0.9;
+    MUST_ALL(all, sadmm_environments_set(all, SADMM_ARRAY_JOINT_DRIVE_STIFFNESS, &first, 1, stiffness.host));
+    MUST_ALL(all, sadmm_environments_step(all, 1));
+    for (size_t k = 0; k < 2 * stiffness.numbers; ++k) stiffness.host[k] *= 0.9;
+    give(all, &stiffness);
+    for (size_t k = 0; k < 2 * upper.numbers; ++k) upper.host[k] *= 1.25;
+    give(all, &upper);
+    MUST_ALL(all, sadmm_environments_step(all, 1));
+    double most = 0;
+    for (size_t k = 0; k < stiffness.numbers; ++k) most = fmax(most, stiffness.host[k]);
+    ck_assert_double_gt(most, 0);
+    ck_assert(all->merged.world->resident.loaded);
+    sadmm_world *merged = all->merged.world; /* as the world has them */
+    MUST(merged, sadmm_world_get_array(merged, SADMM_ARRAY_JOINT_DRIVE_STIFFNESS, 0,
+                                       sadmm_environments_rows(all, SADMM_ARRAY_JOINT_DRIVE_STIFFNESS), held));
+    expect_same(held, stiffness.host, stiffness.numbers, "stiffness", 0, 3);
+    free(held);
+    free(stiffness.host);
+    free(upper.host);
+    sadmm_environments_destroy(all);
+    sadmm_world_destroy(origin);
+}
+END_TEST
+
 int main(void)
 {
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
@@ -365,6 +470,8 @@ int main(void)
     ADD_CASE(suite, environments_step_as_if_alone, 0, SCENES * tested_precisions());
     ADD_CASE(suite, resets_begin_again, 0, tested_precisions());
     ADD_CASE(suite, what_goes_wrong_stays_alone, 0, tested_precisions());
+    ADD_CASE(suite, what_is_set_is_seen, 0, tested_precisions());
+    ADD_CASE(suite, host_and_device_give_the_same, 0, tested_precisions());
     ADD_CASE(suite, inputs_and_contacts_are_an_environments_own, 0, tested_precisions());
     return run_cuda_suite(suite);
 }

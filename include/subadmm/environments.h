@@ -51,7 +51,8 @@ SADMM_API size_t sadmm_environments_memory(const sadmm_environments *environment
 
 /* `steps` time steps, >= 1, of settings.dt each, in every environment that is not marked. Input arrays are read once,
  * before the first of them; output arrays are written once, after the last. Errors: INVALID_ARGUMENT (steps),
- * OUT_OF_MEMORY, LIMIT (of any environment, which is marked; the others have made their steps). */
+ * OUT_OF_MEMORY, LIMIT (of any environment, which is marked; the others have made their steps); on CUDA NON_FINITE
+ * (an environment fails even as the template was; none is marked for it) and DEVICE. */
 SADMM_API sadmm_status sadmm_environments_step(sadmm_environments *environments, int32_t steps);
 
 /* The settings of all; gravity is that of an input array where there is one, and no more threads than the template's

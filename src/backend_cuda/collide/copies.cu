@@ -168,12 +168,12 @@ static bool has_room(const struct sadmm_cuda_collision *c, int which, int64_t pa
 extern "C" sadmm_status COLLISION(put_contacts)(struct sadmm_cuda_collision *c, void *stream,
                                                 const struct sadmm_resident_copies *copies,
                                                 const struct cuda_kept_state *const *states,
-                                                struct sadmm_cuda_contact_counts most, bool *fits,
+                                                struct sadmm_cuda_contact_counts *counts, bool *fits,
                                                 struct sadmm_error *error)
 {
     const int which = c->current;
-    const int64_t pairs = (int64_t)c->counts[which].pairs + most.pairs,
-                  points = (int64_t)c->counts[which].points + most.points, n = copies->count;
+    const int64_t pairs = (int64_t)c->counts[which].pairs + counts->pairs,
+                  points = (int64_t)c->counts[which].points + counts->points, n = copies->count;
     *fits = points <= INT32_MAX && has_room(c, which, pairs, points);
     if (!*fits) return SADMM_OK;
     ENTER(c);
@@ -203,5 +203,8 @@ extern "C" sadmm_status COLLISION(put_contacts)(struct sadmm_cuda_collision *c, 
     TRY(wait(c, error));
     c->counts[which].pairs = sum->pairs;
     c->counts[which].points = sum->points;
+    counts->pairs = sum->pairs;
+    counts->points = sum->points;
+    counts->dt = c->counts[which].dt;
     return SADMM_OK;
 }

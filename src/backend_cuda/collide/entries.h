@@ -77,12 +77,12 @@ int COLLISION(current)(const struct sadmm_cuda_collision *collision);
 void COLLISION(undo)(struct sadmm_cuda_collision *collision);
 
 /* Contacts of worlds of many equal ones (core/solve/resident.h): worlds with a state begin with its contacts. The
- * current set; `states`, on the device: a world each, NULL: its contacts stay; most: pairs and points of all of these.
- * *fits: false: there is no room, and nothing is done. Waits. */
+ * current set; `states`, on the device: a world each, NULL: its contacts stay; *counts: pairs and points of all of
+ * these, and then what the set has. *fits: false: there is no room, and nothing is done. Waits. */
 sadmm_status COLLISION(put_contacts)(struct sadmm_cuda_collision *collision, void *stream,
                                      const struct sadmm_resident_copies *copies,
                                      const struct cuda_kept_state *const *states,
-                                     struct sadmm_cuda_contact_counts most, bool *fits, struct sadmm_error *error);
+                                     struct sadmm_cuda_contact_counts *counts, bool *fits, struct sadmm_error *error);
 
 struct sadmm_cuda_collision_stats COLLISION(stats)(const struct sadmm_cuda_collision *collision);
 /* From the next find on. */

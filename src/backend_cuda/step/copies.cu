@@ -508,12 +508,12 @@ extern "C" sadmm_status CUDA(put_states)(struct sadmm_context *c, const struct s
                                          int32_t count, const int32_t *which, void *const *states, bool *fits,
                                          struct sadmm_error *error)
 {
-    const struct cuda_step *s = c->step;
+    struct cuda_step *s = c->step;
     const size_t n = (size_t)copies->count;
-    struct sadmm_cuda_contact_counts most = {};
+    struct sadmm_cuda_contact_counts counts = {};
     CUDA_ENTER(c);
     TRY(CUDA(wait)(c, error));
-    TRY(count_contacts(c, count, states, &most, error));
+    TRY(count_contacts(c, count, states, &counts, error));
     TRY(CUDA(reserve)(c, BUFFER_COPIES, n * sizeof *states, error));
     const void **listed = (const void **)sadmm_alloc(n, sizeof *listed);
     if (!listed) return sadmm_fail_memory(error, "states of environments");
@@ -522,8 +522,9 @@ extern "C" sadmm_status CUDA(put_states)(struct sadmm_context *c, const struct s
     sadmm_free(listed);
     TRY(status);
     struct states_args args = {*copies, buffer<const struct cuda_kept_state *>(c, BUFFER_COPIES), nullptr, nullptr, 1};
-    TRY(COLLISION(put_contacts)(s->collision, c->stream, copies, args.states, most, fits, error));
+    TRY(COLLISION(put_contacts)(s->collision, c->stream, copies, args.states, &counts, fits, error));
     if (!*fits) return SADMM_OK;
+    s->now = counts;
     const int32_t widths[] = {copies->bodies, copies->kinematic, copies->joints + copies->couplings, copies->gears};
     for (int32_t width : widths) args.width = std::max(args.width, width);
     view_now(c, &args.wrench, &args.kinematic_wrench);

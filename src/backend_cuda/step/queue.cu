@@ -210,6 +210,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     const struct cuda_step_report report = step_reports(c)[s->seen % STEPS_AHEAD];
     if (report.abort_code != ABORT_NONE) return recover(c, s->seen, &report, error);
     s->last = report;
+    s->now = report.counts;
     struct queued_step *q = slot_of(s, s->seen);
     q->update_count = 0;
     s->last_settings = q->settings;
@@ -321,7 +322,7 @@ extern "C" sadmm_status CUDA(wait_world)(struct sadmm_context *c, struct sadmm_r
         *error = later;
         status = SADMM_ERROR_DEVICE;
     }
-    COLLISION(set_current)(s->collision, 1 - s->into, s->last.counts);
+    COLLISION(set_current)(s->collision, 1 - s->into, s->now);
     CUDA(report_step)(c, out);
     return status;
 }

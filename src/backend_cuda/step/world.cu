@@ -146,6 +146,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->backoff = LEAST_BACKOFF;
     for (struct queued_step &q : s->queue) q.update_count = 0;
     memset(&s->last, 0, sizeof s->last);
+    memset(&s->now, 0, sizeof s->now);
     TRY(CUDA(use_settings)(c, &share, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_BODIES, 3 * n * sizeof *world->rigid, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_EXTRAPOLATION, 3 * n * sizeof *world->extrapolation, error));

@@ -106,6 +106,7 @@ struct cuda_step {
     int into;                   /* set and state the next step writes */
 
     struct cuda_step_report last; /* of the last step that was done, */
+    struct sadmm_cuda_contact_counts now; /* contacts after it, or those that were put there since, */
     struct sadmm_settings last_settings;
     bool last_hits;               /* queued_step */
     double time;                  /* simulated until after it, s */

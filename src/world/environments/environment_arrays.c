@@ -7,11 +7,13 @@
 #include "core/base/check.h"
 #include "core/base/memory.h"
 #include "core/base/names.h"
+#include "core/model/joint_law.h"
 #include "environment_backend.h"
 #include "environment_checks.h"
 #include "environment_contacts.h"
 #include "environment_merge.h"
 #include "environment_work.h"
+#include "world/objects/joint.h"
 #include "world/state/report.h"
 
 /* Numbers of an environment. */
@@ -106,16 +108,25 @@ static sadmm_status set_all(sadmm_world *world, sadmm_array array, const double 
 
 /* ---- in steps ---------------------------------------------------------------------------------------------------- */
 
+static sadmm_status open_joint(sadmm_world *world, struct sadmm_world_joint *joint)
+{
+    const sadmm_joint_def *def = &joint->def;
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        if (def->locks >> k & 1 || !joint_has_coordinate(def, k)) continue;
+        joint->def.coordinates[k].lower = -INFINITY;
+        joint->def.coordinates[k].upper = INFINITY;
+        TRY(sadmm_world_take_update(world, joint, (enum sadmm_joint_update)k));
+    }
+    return SADMM_OK;
+}
+
 /* Limits are checked against each other: where both are an environment's own, none is left of another one's. */
-static void open_limits(const struct sadmm_environments *environments, sadmm_world *world)
+static sadmm_status open_limits(const struct sadmm_environments *environments, sadmm_world *world)
 {
     if (!bound_of(environments, SADMM_ARRAY_JOINT_LOWER, -1) || !bound_of(environments, SADMM_ARRAY_JOINT_UPPER, -1))
-        return;
-    for (SADMM_OBJECTS(slot, &world->joint_ids)) {
-        sadmm_joint_def *def = &world->joints[slot].def;
-        for (int k = 0; k < JOINT_COORDINATES; ++k)
-            if (!(def->locks >> k & 1)) def->coordinates[k].lower = -INFINITY, def->coordinates[k].upper = INFINITY;
-    }
+        return SADMM_OK;
+    for (SADMM_OBJECTS(slot, &world->joint_ids)) TRY(open_joint(world, &world->joints[slot]));
+    return SADMM_OK;
 }
 
 /* good: one that is refused is the template's. */
@@ -132,7 +143,7 @@ static sadmm_status read_input(struct sadmm_environment_worker *worker, const st
 static sadmm_status read_inputs(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
                                 int32_t environment, int but, bool good)
 {
-    open_limits(environments, worker->world);
+    TRY(open_limits(environments, worker->world));
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
         if (!sadmm_environments_is_input(bound->array) || (int)bound->array == but) continue;
@@ -182,7 +193,7 @@ static sadmm_status give_merged(struct sadmm_environments *environments, struct 
 }
 
 /* Limits are checked against each other: where one is to be another one, both are set anew. */
-static void open_merged_limits(struct sadmm_environments *environments, int32_t environment)
+static sadmm_status open_merged_limits(struct sadmm_environments *environments, int32_t environment)
 {
     static const sadmm_array limits[2] = {SADMM_ARRAY_JOINT_LOWER, SADMM_ARRAY_JOINT_UPPER};
     struct sadmm_bound_array *bound[2];
@@ -190,27 +201,25 @@ static void open_merged_limits(struct sadmm_environments *environments, int32_t 
     bool differ = false;
     for (int k = 0; k < 2; ++k) {
         bound[k] = bound_of(environments, limits[k], -1);
-        if (!bound[k]) return;
+        if (!bound[k]) return SADMM_OK;
         load_numbers(bound[k], environment, environments->worker[0].numbers);
         differ = differ || bound[k]->given_unknown || memcmp(bound[k]->given + bound[k]->numbers * (size_t)environment,
                                   environments->worker[0].numbers, bound[k]->numbers * sizeof(double)) != 0;
     }
-    if (!differ) return;
+    if (!differ) return SADMM_OK;
     const size_t joints = (size_t)environments->merged.joints.count;
-    for (size_t i = 0; i < joints; ++i) {
-        sadmm_joint_def *def = &world->joints[joints * (size_t)environment + i].def;
-        for (int k = 0; k < JOINT_COORDINATES; ++k)
-            if (!(def->locks >> k & 1)) def->coordinates[k].lower = -INFINITY, def->coordinates[k].upper = INFINITY;
-    }
+    for (size_t i = 0; i < joints; ++i)
+        TRY(open_joint(world, &world->joints[joints * (size_t)environment + i]));
     for (int k = 0; k < 2; ++k)
         for (size_t i = 0; i < bound[k]->numbers; ++i)
             bound[k]->given[bound[k]->numbers * (size_t)environment + i] = NAN; /* it has none of them now */
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_environments_read_merged_inputs(struct sadmm_environments *environments, int32_t environment)
 {
     struct sadmm_environment_worker *worker = &environments->worker[0];
-    open_merged_limits(environments, environment);
+    TRY(open_merged_limits(environments, environment));
     for (size_t k = 0; k < environments->bound_count; ++k) {
         struct sadmm_bound_array *bound = &environments->bound[k];
         if (!bound->given) continue;
@@ -299,13 +308,45 @@ static sadmm_status write_by_host(struct sadmm_environments *environments, struc
     return sadmm_environments_write_outputs(environments, worker, environment);
 }
 
+static bool is_output(const struct sadmm_bound_array *bound)
+{
+    return !sadmm_environments_is_input(bound->array) && bound->numbers > 0;
+}
+
+/* What environments were left as that are marked. */
+static sadmm_status write_marked(struct sadmm_environments *environments)
+{
+    struct sadmm_environment_worker *worker = &environments->worker[0];
+    struct sadmm_merged_world *merged = &environments->merged;
+    struct sadmm_bound_array *bound = environments->bound, *end = bound + environments->bound_count, *output;
+    if (!merged->any_unwritten) return SADMM_OK;
+    for (output = bound; output < end; ++output)
+        if (is_output(output)) TRY(sadmm_environments_pull_array(environments, output));
+    for (int32_t e = 0; e < environments->count; ++e) {
+        if (!merged->unwritten[e] || !environments->marked[e]) continue;
+        sadmm_status status = sadmm_environment_state_load(worker->world, &environments->states[e]);
+        for (output = bound; output < end && status == SADMM_OK; ++output) {
+            if (!is_output(output)) continue;
+            status = get_all(worker->world, output->array, worker->numbers);
+            if (status == SADMM_OK) store_numbers(output, e, worker->numbers);
+        }
+        if (status != SADMM_OK)
+            return sadmm_fail(&environments->error, status, "environment %d: %s", e, worker->world->error.message);
+    }
+    for (output = bound; output < end; ++output)
+        if (is_output(output)) TRY(sadmm_environments_push_array(environments, output));
+    memset(merged->unwritten, 0, (size_t)environments->count * sizeof *merged->unwritten);
+    merged->any_unwritten = false;
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_environments_write_merged_outputs(struct sadmm_environments *environments, const int32_t *which,
                                                      int32_t count)
 {
     bool by_host = false;
     for (size_t k = 0; k < environments->bound_count; ++k) {
         struct sadmm_bound_array *bound = &environments->bound[k];
-        if (sadmm_environments_is_input(bound->array)) continue;
+        if (!is_output(bound)) continue;
         bound->by_host = !is_report(environments, bound) && !sadmm_environments_may_exchange(environments, bound);
         by_host = by_host || bound->by_host;
         TRY(is_report(environments, bound) ? write_reports(environments, bound)
@@ -315,9 +356,9 @@ sadmm_status sadmm_environments_write_merged_outputs(struct sadmm_environments *
     if (by_host) TRY(sadmm_environments_each(environments, which, count, write_by_host, NULL));
     for (size_t k = 0; k < environments->bound_count; ++k) {
         struct sadmm_bound_array *bound = &environments->bound[k];
-        if (!sadmm_environments_is_input(bound->array) && bound->by_host)
-            TRY(sadmm_environments_push_array(environments, bound));
+        if (is_output(bound) && bound->by_host) TRY(sadmm_environments_push_array(environments, bound));
     }
+    TRY(write_marked(environments));
     return by_host || environments->bound_count == 0 ? SADMM_OK : sadmm_environments_wait_backend(environments);
 }
 
@@ -409,6 +450,8 @@ static sadmm_status bind(struct sadmm_environments *environments, sadmm_array ar
     if (status == SADMM_OK && input) status = read_template(environments, array, fresh.start);
     for (size_t e = 0; status == SADMM_OK && merged && e < (size_t)environments->count; ++e)
         memcpy(fresh.given + fresh.numbers * e, fresh.start, fresh.numbers * sizeof *fresh.start);
+    struct sadmm_bound_array *source = source_of(environments, array);
+    if (status == SADMM_OK && source) status = sadmm_environments_pull_array(environments, source);
     if (status == SADMM_OK) status = sadmm_environments_each(environments, NULL, environments->count, fill, &fresh);
     if (status == SADMM_OK) status = sadmm_environments_place_array(environments, &fresh);
     if (status != SADMM_OK) {
@@ -499,6 +542,8 @@ static sadmm_status set_one(struct sadmm_environments *environments, struct sadm
     }
     TRY(try_one(environments, worker, environment, place, argument));
     TRY(sadmm_environments_store(environments, worker, environment));
+    if (environments->merged.world && environments->marked[environment])
+        environments->merged.unwritten[environment] = environments->merged.any_unwritten = true;
     return environments->merged.world ? SADMM_OK : sadmm_environments_write_outputs(environments, worker, environment);
 }
 
@@ -523,5 +568,7 @@ sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_arra
     TRY(sadmm_environments_each(environments, which, count, try_one, &rows));
     TRY(sadmm_environments_each(environments, which, count, set_one, &rows));
     if (rows.bound) return sadmm_environments_push_array(environments, rows.bound);
-    return environments->merged.world ? sadmm_environments_write_merged_outputs(environments, which, count) : SADMM_OK;
+    if (!environments->merged.world) return SADMM_OK;
+    sadmm_environments_forget_contacts(environments, which, count);
+    return sadmm_environments_write_merged_outputs(environments, which, count);
 }

@@ -32,6 +32,10 @@ static sadmm_status upload(struct sadmm_environments *environments, const void *
     const struct sadmm_resident_kernels *kernels = kernels_of(environments);
     sadmm_status status = kernels->allocate(world->context, bytes, to, &world->error);
     if (status == SADMM_OK && from) status = kernels->to_backend(world->context, *to, from, bytes, &world->error);
+    if (status != SADMM_OK) {
+        if (*to) kernels->release(world->context, *to);
+        *to = NULL;
+    }
     return pass(environments, status);
 }
 
@@ -308,7 +312,7 @@ static void list_state(const sadmm_world *world, struct listed_state *list)
                 .rigid = body->rigid, .extrapolation = body->extrapolation, .target = body->target.set};
             memcpy(to->position, body->target.position, sizeof to->position);
             memcpy(to->orientation, body->target.orientation, sizeof to->orientation);
-            to->dt = sadmm_settings_of_substep(&world->def.settings).dt * world->def.settings.substeps;
+            to->dt = world->def.settings.dt;
             memcpy(list->kinematic_wrench + 6 * kinematic++, body->contact_wrench, sizeof body->contact_wrench);
         }
     }
@@ -348,6 +352,10 @@ static sadmm_status keep(struct sadmm_environments *environments, struct sadmm_k
         kept->report = world->report;
         kept->stepped = world->stepped;
     }
+    if (status == SADMM_OK) {
+        kept->enabled = list.enabled;
+        list.enabled = NULL;
+    }
     free_listed(&list);
     return status;
 }
@@ -371,7 +379,8 @@ void sadmm_environments_forget_kept(struct sadmm_environments *environments, siz
     struct sadmm_merged_world *merged = &environments->merged;
     if (state >= merged->kept_count) return;
     release(environments, merged->kept[state].block);
-    merged->kept[state].block = NULL;
+    sadmm_free(merged->kept[state].enabled);
+    merged->kept[state].block = merged->kept[state].enabled = NULL;
 }
 
 /* The host's copy of the world is behind, of all of it. */
@@ -397,7 +406,8 @@ sadmm_status sadmm_environments_put_kept(struct sadmm_environments *environments
     struct sadmm_merged_world *merged = &environments->merged;
     sadmm_world *world = merged->world;
     *done = false;
-    if (!merged->has_backend || !world->resident.loaded || has_updates(world)) return SADMM_OK;
+    if (!merged->has_backend || !world->resident.loaded || has_updates(world) || merged->static_moved) return SADMM_OK;
+    TRY(sadmm_environments_measure(environments)); /* of those that go on */
     void **blocks = (void **)sadmm_alloc((size_t)count, sizeof *blocks);
     int32_t *all = (int32_t *)sadmm_alloc((size_t)count, sizeof *all);
     sadmm_status status =
@@ -417,6 +427,9 @@ sadmm_status sadmm_environments_put_kept(struct sadmm_environments *environments
         merged->progress[all[k]] = (struct sadmm_environment_progress){kept->report.step, kept->report.time,
                                                                        kept->stepped, false, kept->report};
         sadmm_environments_take_mark(environments, all[k]);
+        const size_t joints = (size_t)merged->joints.count;
+        for (size_t j = 0; j < joints; ++j)
+            world->joints[joints * (size_t)all[k] + j].def.enabled = kept->enabled[j];
     }
     if (status == SADMM_OK && *done) set_behind(world);
     sadmm_free(blocks);

@@ -44,6 +44,12 @@ sadmm_status sadmm_environments_keep_merged_contacts(struct sadmm_environments *
     return SADMM_OK;
 }
 
+void sadmm_environments_forget_contacts(struct sadmm_environments *environments, const int32_t *which, int32_t count)
+{
+    for (int32_t k = 0; environments->contacts && k < count; ++k)
+        environments->contacts[which ? which[k] : k].count = 0;
+}
+
 sadmm_status sadmm_environments_record_contacts(sadmm_environments *environments, bool record)
 {
     TRY(sadmm_check_given(environments, "environments", NULL));

@@ -9,6 +9,8 @@ sadmm_status sadmm_environments_keep_contacts(struct sadmm_environments *environ
                                               struct sadmm_environment_worker *worker, int32_t environment);
 /* The same of all of a merged world that are not marked. */
 sadmm_status sadmm_environments_keep_merged_contacts(struct sadmm_environments *environments);
+/* There are none of these environments, which have new states. which NULL: of the first `count`. */
+void sadmm_environments_forget_contacts(struct sadmm_environments *environments, const int32_t *which, int32_t count);
 /* No contacts are recorded any more. */
 void sadmm_environments_free_contacts(struct sadmm_environments *environments);
 

@@ -4,6 +4,7 @@
 
 #include "core/base/memory.h"
 #include "core/model/forces.h"
+#include "core/model/joint_law.h"
 #include "environment_backend.h"
 #include "subadmm/coupling.h"
 #include "subadmm/gear.h"
@@ -245,7 +246,9 @@ sadmm_status sadmm_environments_merge(struct sadmm_environments *environments, s
     merged->progress = (struct sadmm_environment_progress *)sadmm_alloc(count, sizeof *merged->progress);
     merged->contacts = (struct sadmm_contact_set *)sadmm_alloc(count, sizeof *merged->contacts);
     merged->replaced = (bool *)sadmm_alloc(count, sizeof *merged->replaced);
-    if (!merged->progress || !merged->contacts || !merged->replaced) return sadmm_fail_memory(error, "environments");
+    merged->unwritten = (bool *)sadmm_alloc(count, sizeof *merged->unwritten);
+    if (!merged->progress || !merged->contacts || !merged->replaced || !merged->unwritten)
+        return sadmm_fail_memory(error, "environments");
     const sadmm_status status = sadmm_world_create(&def, &merged->world);
     if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_last_message());
     merged->world->def.backend = from->def.backend;
@@ -270,7 +273,7 @@ void sadmm_environments_free_merged(struct sadmm_environments *environments)
     void *blocks[] = {merged->bodies.slots,    merged->bodies.numbers, merged->shapes.slots, merged->shapes.numbers,
                       merged->joints.slots,    merged->joints.numbers, merged->groups,       merged->progress,
                       merged->contacts,        merged->replaced,       merged->refusals,     merged->measures,
-                      merged->kept};
+                      merged->kept,            merged->unwritten};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
 }
 
@@ -354,7 +357,7 @@ bool sadmm_environments_report(const struct sadmm_environments *environments, in
     const struct sadmm_merged_world *merged = &environments->merged;
     const struct sadmm_environment_progress *progress = &merged->progress[environment];
     const struct sadmm_copy_measures *own = merged->measured ? &merged->measures[environment] : NULL;
-    const bool checked = merged->world->def.settings.tolerance > 0;
+    const bool checked = merged->world->step_settings.tolerance > 0;
     *report = progress->moved ? merged->world->report : progress->report;
     report->step = progress->step;
     report->time = progress->time;
@@ -373,6 +376,11 @@ bool sadmm_environments_report(const struct sadmm_environments *environments, in
     return own != NULL;
 }
 
+static bool takes_part(const struct sadmm_world_joint *joint)
+{
+    return joint->def.enabled && !joint->last.broken && joint_most_laws(&joint->def) > 0;
+}
+
 static void take_report(const struct sadmm_environments *environments, sadmm_world *world, int32_t environment)
 {
     const struct sadmm_environment_progress *progress = &environments->merged.progress[environment];
@@ -381,6 +389,11 @@ static void take_report(const struct sadmm_environments *environments, sadmm_wor
     if (!progress->moved) return;
     world->plan = environments->merged.world->plan;
     world->plan.bodies = world->dynamic_count;
+    world->report.joints = world->report.couplings = 0;
+    for (SADMM_OBJECTS(slot, &world->joint_ids))
+        world->report.joints += takes_part(&world->joints[slot]);
+    for (SADMM_OBJECTS(slot, &world->coupling_ids))
+        world->report.couplings += takes_part(&world->couplings[slot].joint);
     world->plan.pairs = world->report.pairs = (int32_t)world->contacts.pair_count;
     world->plan.points = world->report.contacts = (int32_t)world->contacts.point_count;
 }
@@ -421,6 +434,12 @@ sadmm_status sadmm_environments_take(struct sadmm_environments *environments, sa
     take_report(environments, world, environment);
     sadmm_environment_state_taken(world);
     return SADMM_OK;
+}
+
+static bool is_placed(const struct sadmm_world_body *a, const struct sadmm_world_body *b)
+{
+    return memcmp(a->rigid.position, b->rigid.position, sizeof a->rigid.position) == 0 &&
+           memcmp(a->rigid.orientation, b->rigid.orientation, sizeof a->rigid.orientation) == 0;
 }
 
 /* What input arrays give a body stays. */
@@ -468,8 +487,12 @@ sadmm_status sadmm_environments_put(struct sadmm_environments *environments, sad
     const sadmm_status status = sadmm_world_detach(all);
     if (status != SADMM_OK) return sadmm_fail(&world->error, status, "%s", all->error.message);
     TRY(put_contacts(environments, world, environment));
-    for (size_t i = 0; i < bodies; ++i)
-        put_body(&all->bodies[bodies * e + i], &world->bodies[merged->bodies.slots[i]]);
+    for (size_t i = 0; i < bodies; ++i) {
+        const struct sadmm_world_body *from = &world->bodies[merged->bodies.slots[i]];
+        struct sadmm_world_body *to = &all->bodies[bodies * e + i];
+        merged->static_moved = merged->static_moved || (from->type == SADMM_BODY_STATIC && !is_placed(to, from));
+        put_body(to, from);
+    }
     for (size_t i = 0; i < joints; ++i) {
         const struct sadmm_world_joint *from = &world->joints[merged->joints.slots[i]];
         struct sadmm_world_joint *to = &all->joints[joints * e + i];
@@ -500,9 +523,9 @@ static void fit_impulses(struct sadmm_contact_set *set, double dt)
 sadmm_status sadmm_environments_put_contacts(struct sadmm_environments *environments)
 {
     struct sadmm_merged_world *merged = &environments->merged;
+    if (!merged->world || !merged->any_replaced) return SADMM_OK;
     struct sadmm_contact_set *now = &merged->world->contacts, *next = &merged->spare;
     size_t pairs = now->pair_count, points = now->point_count, migrating = now->migrating;
-    if (!merged->world || !merged->any_replaced) return SADMM_OK;
     for (int32_t e = 0; e < environments->count; ++e) {
         if (!merged->replaced[e]) continue;
         pairs += merged->contacts[e].pair_count;

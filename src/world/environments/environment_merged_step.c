@@ -18,6 +18,7 @@ static sadmm_status take_out(struct sadmm_environments *environments, int32_t en
         TRY(sadmm_environments_take(environments, world, environment));
         TRY(sadmm_environment_state_store(world, &environments->states[environment]));
         sadmm_environments_put_mark(environments, environment, why);
+        environments->merged.unwritten[environment] = environments->merged.any_unwritten = true;
     }
     TRY(sadmm_environment_state_load(world, &environments->kept[0]));
     TRY(sadmm_environments_put(environments, world, environment));
@@ -48,12 +49,17 @@ static sadmm_status read_all(struct sadmm_environments *environments)
     return SADMM_OK;
 }
 
-/* Arrays that the host gives to the world: of environments in which one has changed. */
+/* Arrays that the host gives to the world: of environments in which one has changed. These have all others from the
+ * host, too. */
 static sadmm_status read_changed(struct sadmm_environments *environments)
 {
-    for (int32_t e = 0; e < environments->count; ++e)
-        if (!environments->marked[e] && sadmm_environments_inputs_differ(environments, e))
-            TRY(read_environment(environments, e));
+    bool pulled = false;
+    for (int32_t e = 0; e < environments->count; ++e) {
+        if (environments->marked[e] || !sadmm_environments_inputs_differ(environments, e)) continue;
+        if (!pulled) TRY(sadmm_environments_pull_inputs(environments, true));
+        pulled = true;
+        TRY(read_environment(environments, e));
+    }
     return SADMM_OK;
 }
 
@@ -139,6 +145,7 @@ static sadmm_status make_steps(struct sadmm_environments *environments, int32_t 
             return sadmm_fail(&environments->error, status, "%s", cause.message);
         out = environment;
         last_failed = all->report.step;
+        environments->merged.measurable = false; /* the backend has some of the step that failed */
         TRY(take_out(environments, environment, cause.message));
         TRY(sadmm_environments_pull_inputs(environments, true)); /* the others' go on from where the backend had them */
         TRY(read_all(environments));

@@ -43,6 +43,7 @@ struct sadmm_environment_progress {
 /* A state that is kept, in the backend's memory; NULL: it is not there. */
 struct sadmm_kept_block {
     void *block;
+    uint8_t *enabled; /* of the template's joints, in order: is it? */
     sadmm_step_report report;
     bool stepped;
 };
@@ -55,6 +56,7 @@ struct sadmm_merged_world {
     struct sadmm_environment_progress *progress; /* (count) */
     struct sadmm_contact_set *contacts;          /* (count) of those whose contacts are to be replaced */
     bool *replaced, any_replaced;                /* (count) which these are */
+    bool *unwritten, any_unwritten; /* (count) marked, and output arrays do not have what they are left as */
     struct sadmm_contact_set spare;
 
     /* In the backend's memory, where it has some for environments (environment_backend.h). */
@@ -65,6 +67,7 @@ struct sadmm_merged_world {
     uint8_t *refusals;        /* (count) as they were read last */
     struct sadmm_copy_measures *measures; /* (count) of the last step, where they are */
     bool measurable, measured; /* not read yet, and can be; read */
+    bool static_moved;         /* some static body may not be where the template has it */
     struct sadmm_kept_block *kept; /* by state; made when it is begun with */
     size_t kept_count;
 };

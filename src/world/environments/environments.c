@@ -206,6 +206,8 @@ sadmm_status sadmm_environments_set_settings(sadmm_environments *environments, c
     sadmm_settings settings;
     TRY(sadmm_check_given(environments, "environments", NULL));
     TRY(sadmm_settings_take(&settings, given, &environments->error));
+    if (settings.dt != environments->settings.dt) /* targets of kinematic bodies there are for the one before */
+        for (size_t k = 0; k < environments->kept_count; ++k) sadmm_environments_forget_kept(environments, k);
     environments->settings = settings;
     settings.threads = 1;
     for (int t = 0; t < environments->workers; ++t) environments->worker[t].world->def.settings = settings;
@@ -311,8 +313,7 @@ static sadmm_status reset_merged(struct sadmm_environments *environments, const 
     if (count == 0) return SADMM_OK;
     TRY(sadmm_environments_put_kept(environments, which, count, states, &done));
     if (!done) TRY(sadmm_environments_each(environments, which, count, begin_again, (void *)states));
-    for (int32_t k = 0; environments->contacts && k < count; ++k)
-        environments->contacts[which ? which[k] : k].count = 0;
+    sadmm_environments_forget_contacts(environments, which, count);
     return sadmm_environments_write_merged_outputs(environments, which, count);
 }
 

@@ -27,7 +27,11 @@ static void take_kinematic(sadmm_world *world, size_t k, const struct sadmm_kine
     body->extrapolation = read->extrapolation;
     if (body->set_at[SADMM_UPDATE_STATE] < world->resident.done) body->rigid = read->rigid;
     else extrapolation_place(&body->extrapolation, &read->rigid, body->rigid.position, body->rigid.orientation);
-    if (body->set_at[SADMM_UPDATE_TARGET] < world->resident.done) body->target.set = false;
+    if (body->set_at[SADMM_UPDATE_TARGET] < world->resident.done) {
+        body->target.set = read->target != 0;
+        memcpy(body->target.position, read->position, sizeof read->position);
+        memcpy(body->target.orientation, read->orientation, sizeof read->orientation);
+    }
     if (world->plan.wrenches)
         memcpy(body->contact_wrench, world->resident.kinematic_wrench + 6 * k, sizeof body->contact_wrench);
 }
