@@ -1,11 +1,8 @@
 /* Environments on the device: each makes the same steps, bit for bit, as if it were alone, whatever the others do; what
  * fails is marked and alone; resets begin again. */
 #include "cuda_worlds.h"
-#include "subadmm/environments.h"
+#include "environment_tools.h"
 #include "world/environments/environment_types.h"
-
-#define MUST_ALL(environments, call) \
-    ck_assert_msg((call) == SADMM_OK, #call ": %s", sadmm_environments_message(environments))
 
 static sadmm_environments *replicate(sadmm_world *world, int32_t count)
 {
@@ -67,20 +64,6 @@ static size_t numbers_of(const sadmm_environments *environments, sadmm_array arr
     return (size_t)sadmm_environments_rows(environments, array) * (size_t)sadmm_array_columns(array);
 }
 
-static double noise(uint32_t a, uint32_t b)
-{
-    uint32_t x = a * 2654435761U ^ (b + 1) * 2246822519U;
-    x ^= x >> 15, x *= 2246822519U, x ^= x >> 13;
-    return (double)x / 2147483647.5 - 1;
-}
-
-static void expect_same(const double *a, const double *b, size_t count, const char *what, int32_t environment, int step)
-{
-    for (size_t k = 0; k < count; ++k)
-        ck_assert_msg(memcmp(&a[k], &b[k], sizeof *a) == 0, "%s, environment %d, step %d, number %zu: %.17g, %.17g",
-                      what, environment, step, k, a[k], b[k]);
-}
-
 static const struct {
     const char *name;
     int warm, steps; /* of the template; of all */
@@ -90,12 +73,6 @@ static const struct {
               {"pile:12", EMULATED ? 20 : 40, EMULATED ? 6 : 60},
               {"hand_demo", 2, EMULATED ? 2 : 30}};
 enum { SCENES = sizeof scenes / sizeof *scenes, FEW = 4 };
-static const sadmm_array outputs[] = {
-    SADMM_ARRAY_BODY_STATE,          SADMM_ARRAY_JOINT_POSITION,    SADMM_ARRAY_JOINT_SPEED,
-    SADMM_ARRAY_BODY_CONTACT_WRENCH, SADMM_ARRAY_BODY_ACCELERATION, SADMM_ARRAY_JOINT_DRIVE_FORCE,
-    SADMM_ARRAY_JOINT_WRENCH,        SADMM_ARRAY_BODY_WRENCH,       SADMM_ARRAY_REPORT};
-enum { OUTPUTS = sizeof outputs / sizeof *outputs };
-
 /* Pushes that differ from environment to environment, of bodies that move. */
 static void push(const double *template_state, int32_t environment, size_t count, double *state)
 {
@@ -106,7 +83,7 @@ static void push(const double *template_state, int32_t environment, size_t count
                 state[i + k] += 0.1 * noise((uint32_t)environment, (uint32_t)(i + k));
 }
 
-/* Whether a body takes a velocity: statics refuse it. */
+/* A body that is not dynamic has no velocity to be pushed to. */
 static void keep_still(sadmm_world *world, double *state)
 {
     for (int32_t i = 0; i < sadmm_world_body_count(world); ++i)

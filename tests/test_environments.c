@@ -6,13 +6,10 @@
 
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
+#include "environment_tools.h"
 #include "fixed_work.h"
-#include "scene_tools.h"
-#include "subadmm/environments.h"
 #include "subadmm/save.h"
 
-#define MUST_ALL(environments, call) \
-    ck_assert_msg((call) == SADMM_OK, #call ": %s", sadmm_environments_message(environments))
 #define REFUSED(environments, part, call)                                                       \
     do {                                                                                        \
         ck_assert_int_ne((call), SADMM_OK);                                                     \
@@ -77,21 +74,6 @@ static void write_array(sadmm_world *world, sadmm_array array, const double *num
     MUST(world, sadmm_world_set_array(world, array, 0, sadmm_world_array_rows(world, array), numbers));
 }
 
-/* Between -1 and 1, the same every time. */
-static double noise(uint32_t a, uint32_t b)
-{
-    uint32_t x = a * 2654435761U ^ (b + 1) * 2246822519U;
-    x ^= x >> 15, x *= 2246822519U, x ^= x >> 13;
-    return (double)x / 2147483647.5 - 1;
-}
-
-static void expect_same(const double *a, const double *b, size_t count, const char *what, int32_t environment, int step)
-{
-    for (size_t k = 0; k < count; ++k)
-        ck_assert_msg(memcmp(&a[k], &b[k], sizeof *a) == 0, "%s, environment %d, step %d, number %zu: %.17g, %.17g",
-                      what, environment, step, k, a[k], b[k]);
-}
-
 /* ---- as worlds of their own -------------------------------------------------------------------------------------- */
 
 static const struct {
@@ -101,14 +83,8 @@ static const struct {
               {"pile:12", 0, 80},     {"card_houses:1", 20, 20}, {"vertical_stacks:3", 5, 40},
               {"chain:6", 0, 40},     {"mixed_pile:20", 0, 60}};
 enum { SCENES = sizeof scenes / sizeof *scenes, FEW = 5 };
-static const sadmm_array outputs[] = {
-    SADMM_ARRAY_BODY_STATE,          SADMM_ARRAY_JOINT_POSITION,    SADMM_ARRAY_JOINT_SPEED,
-    SADMM_ARRAY_BODY_CONTACT_WRENCH, SADMM_ARRAY_BODY_ACCELERATION, SADMM_ARRAY_JOINT_DRIVE_FORCE,
-    SADMM_ARRAY_JOINT_WRENCH,        SADMM_ARRAY_BODY_WRENCH,       SADMM_ARRAY_REPORT};
-enum { OUTPUTS = sizeof outputs / sizeof *outputs };
-
-/* Which of the bodies are dynamic: others take no velocity. */
-static void start_of(sadmm_world *world, int32_t environment, double *state)
+/* Velocities differ from environment to environment, of dynamic bodies: others take none. */
+static void push_bodies(sadmm_world *world, int32_t environment, double *state)
 {
     const int32_t bodies = sadmm_world_body_count(world);
     for (int32_t i = 0; i < bodies; ++i) {
@@ -134,7 +110,7 @@ START_TEST(environments_step_as_worlds_of_their_own)
     for (int32_t e = 0; e < FEW; ++e) {
         worlds[e] = alone(origin);
         double *state = read_array(worlds[e], SADMM_ARRAY_BODY_STATE);
-        start_of(worlds[e], e, state);
+        push_bodies(worlds[e], e, state);
         memcpy(starts + bodies * (size_t)e, state, bodies * sizeof *state);
         write_array(worlds[e], SADMM_ARRAY_BODY_STATE, state);
         free(state);

@@ -90,7 +90,7 @@ static sadmm_status make(struct sadmm_environments *environments, const struct s
     if (!environments->worker || !environments->states || !environments->marked || !environments->marks ||
         !environments->seen || !SADMM_GROW(environments->kept, 0, 1))
         return sadmm_fail_memory(error, "environments");
-    for (int t = 0; t < environments->workers; ++t) 
+    for (int t = 0; t < environments->workers; ++t)
         TRY(create_worker(environments, &environments->worker[t], kernels, bytes, size, error));
     environments->kept_count = 1;
     sadmm_world *world = environments->worker[0].world;
@@ -160,9 +160,8 @@ void sadmm_environments_destroy(sadmm_environments *environments)
     for (int32_t i = 0; environments->marks && i < environments->count; ++i) sadmm_free(environments->marks[i]);
     sadmm_environments_free_contacts(environments);
     for (size_t k = 0; k < environments->kept_count; ++k) sadmm_environment_state_free(&environments->kept[k]);
-    for (size_t k = 0; k < environments->bound_count; ++k) {
+    for (size_t k = 0; k < environments->bound_count; ++k)
         sadmm_environments_release_array(environments, &environments->bound[k]);
-    }
     sadmm_environments_close_backend(environments);
     sadmm_environments_free_merged(environments);
     void *blocks[] = {environments->worker, environments->states, environments->kept, environments->marked,
@@ -194,7 +193,10 @@ size_t sadmm_environments_memory(const sadmm_environments *environments)
     for (size_t k = 0; k < environments->kept_count; ++k) bytes += SADMM_ROOM(environments->kept[k].bytes);
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
-        bytes += count * bound->numbers * (bound->precision == SADMM_F64 ? sizeof(double) : sizeof(float));
+        const size_t array = count * bound->numbers *
+                             (bound->precision == SADMM_F64 ? sizeof(double) : sizeof(float));
+        bytes += bound->in_backend ? 2 * array : array; /* the host has a copy */
+        if (bound->given) bytes += count * bound->numbers * sizeof *bound->given;
     }
     return (bytes + count - 1) / count;
 }

@@ -19,8 +19,8 @@ sadmm_status sadmm_world_list_kinematic(sadmm_world *world)
     return SADMM_OK;
 }
 
-/* A target is done with by the step that it was set for. Neither that nor a state that was set after the last step is
- * older than what the backend has. */
+/* A target is done with by the step that it was set for; what the backend has then is none, or that of a state that was
+ * put there since. Neither a target nor a state that was set after the last step is older than what the backend has. */
 static void take_kinematic(sadmm_world *world, size_t k, const struct sadmm_kinematic_body *read)
 {
     struct sadmm_world_body *body = &world->bodies[world->kinematic_slots[k]];
