@@ -67,7 +67,7 @@ static sadmm_status iterate(const struct sadmm_kernels *k, struct sadmm_context 
 {
     sadmm_status status = SADMM_OK;
     if (k->iterate) {
-        status = k->iterate(c, count, false, error);
+        status = k->iterate(c, count, false, false, error);
     } else {
         for (int i = 0; i < count && status == SADMM_OK; ++i) {
             status = k->update_velocity(c, error);

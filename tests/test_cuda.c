@@ -139,7 +139,7 @@ START_TEST(tiers_equal_stepwise)
         for (size_t s = 0; s < sizeof batches / sizeof *batches; ++s) {
             bool measure = s % 2 == 0;
             for (int i = 1; i <= batches[s]; ++i) runner_step(&step, measure && i == batches[s]);
-            CALL(&fused, table->iterate(fused.c, batches[s], measure, &fused.error));
+            CALL(&fused, table->iterate(fused.c, batches[s], false, measure, &fused.error));
             snprintf(what, sizeof what, "%s, tier %d, batch %zu", scene->name, (int)tiers[t], s);
             if (measure) {
                 struct sadmm_residual wanted = runner_residual(&step), got = runner_residual(&fused);
@@ -172,8 +172,8 @@ START_TEST(cluster_sizes)
         const struct scene *scene = find_scene(cases[k].scene);
         struct runner wanted;
         runner_start(&wanted, table, scene, SADMM_CUDA_TIER_STREAM);
-        CALL(&wanted, table->iterate(wanted.c, 6, true, &wanted.error));
-        CALL(&wanted, table->iterate(wanted.c, 5, false, &wanted.error));
+        CALL(&wanted, table->iterate(wanted.c, 6, false, true, &wanted.error));
+        CALL(&wanted, table->iterate(wanted.c, 5, false, false, &wanted.error));
         const struct sadmm_residual residual = runner_residual(&wanted);
         for (int size = 2; size <= 16; size *= 2) {
             struct runner got;
@@ -197,8 +197,8 @@ START_TEST(cluster_sizes)
             cuda_emulation_descending = size % 3 == 1; /* 4 and 16 */
 #endif
             runner_assemble(&got);
-            CALL(&got, table->iterate(got.c, 6, true, &got.error));
-            CALL(&got, table->iterate(got.c, 5, false, &got.error));
+            CALL(&got, table->iterate(got.c, 6, false, true, &got.error));
+            CALL(&got, table->iterate(got.c, 5, false, false, &got.error));
 #ifdef CUDA_EMULATED
             cuda_emulation_descending = 0;
 #endif
@@ -252,21 +252,21 @@ START_TEST(aborted_does_nothing)
         if (!(scene->tiers >> tiers[t] & 1)) continue;
         runner_start(&plain, table, scene, tiers[t]);
         runner_start(&aborted, table, scene, tiers[t]);
-        CALL(&plain, table->iterate(plain.c, 3, false, &plain.error));
-        CALL(&aborted, table->iterate(aborted.c, 3, false, &aborted.error));
+        CALL(&plain, table->iterate(plain.c, 3, false, false, &plain.error));
+        CALL(&aborted, table->iterate(aborted.c, 3, false, false, &aborted.error));
         set_abort(&aborted, ABORT_PARTITION);
-        CALL(&aborted, table->iterate(aborted.c, 20, false, &aborted.error)); /* 20: STREAM launches its graph */
+        CALL(&aborted, table->iterate(aborted.c, 20, false, false, &aborted.error)); /* 20: STREAM launches its graph */
         runner_step(&aborted, false);
         set_abort(&aborted, ABORT_NONE);
         check_same(&aborted, &plain, "aborted");
-        CALL(&plain, table->iterate(plain.c, 4, true, &plain.error));
-        CALL(&aborted, table->iterate(aborted.c, 4, true, &aborted.error));
+        CALL(&plain, table->iterate(plain.c, 4, false, true, &plain.error));
+        CALL(&aborted, table->iterate(aborted.c, 4, false, true, &aborted.error));
         check_same(&aborted, &plain, "after the abort");
         const struct sadmm_residual wanted = runner_residual(&plain), got = runner_residual(&aborted);
         ck_assert(got.primal == wanted.primal && got.dual == wanted.dual);
         /* A measured iteration that is aborted measures nothing. */
         set_abort(&aborted, ABORT_NON_FINITE);
-        CALL(&aborted, table->iterate(aborted.c, 2, true, &aborted.error));
+        CALL(&aborted, table->iterate(aborted.c, 2, false, true, &aborted.error));
         const struct sadmm_residual none = runner_residual(&aborted);
         ck_assert(none.primal == 0 && none.dual == 0);
         set_abort(&aborted, ABORT_NONE);

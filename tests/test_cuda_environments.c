@@ -73,22 +73,32 @@ static const struct {
               {"pile:12", EMULATED ? 20 : 40, EMULATED ? 6 : 60},
               {"hand_demo", 2, EMULATED ? 2 : 30}};
 enum { SCENES = sizeof scenes / sizeof *scenes, FEW = 4 };
-/* Pushes that differ from environment to environment, of bodies that move. */
-static void push(const double *template_state, int32_t environment, size_t count, double *state)
+/* Pushes that differ from environment to environment, of every body that moves; one without joints is thrown up, so
+ * that nothing in it touches. */
+static void push(sadmm_world *world, const double *template_state, int32_t environment, size_t count, double *state)
 {
+    const bool thrown = environment == 2 && sadmm_world_joint_count(world) == 0;
     memcpy(state, template_state, count * sizeof *state);
-    for (size_t i = 0; i < count; i += 13)
-        for (size_t k = 7; k < 13; ++k)
-            if (environment > 0 && state[i + 2] > 0.3)
-                state[i + k] += 0.1 * noise((uint32_t)environment, (uint32_t)(i + k));
+    for (int32_t i = 0; thrown && i < (int32_t)(count / 13); ++i)
+        if (body_def(world, body_at(world, i)).type == SADMM_BODY_DYNAMIC) {
+            state[13 * i + 2] += 1 + 0.5 * i;
+            state[13 * i + 9] = 1;
+        }
+    for (int32_t i = 0; environment > 0 && i < (int32_t)(count / 13); ++i)
+        for (size_t k = 13 * (size_t)i + 7; k < 13 * (size_t)i + 13; ++k)
+            if (body_def(world, body_at(world, i)).type == SADMM_BODY_DYNAMIC)
+                state[k] += 0.1 * noise((uint32_t)environment, (uint32_t)k);
 }
 
-/* A body that is not dynamic has no velocity to be pushed to. */
-static void keep_still(sadmm_world *world, double *state)
+/* Without friction: the others have contacts of as many rows as before. */
+static void make_slippery(sadmm_environments *environments, int32_t environment)
 {
-    for (int32_t i = 0; i < sadmm_world_body_count(world); ++i)
-        if (body_def(world, body_at(world, i)).type != SADMM_BODY_DYNAMIC)
-            memset(state + 13 * i + 7, 0, 6 * sizeof *state);
+    const size_t n = numbers_of(environments, SADMM_ARRAY_SHAPE_MATERIAL);
+    double *material = calloc(n + 1, sizeof *material);
+    MUST_ALL(environments, sadmm_environments_get(environments, SADMM_ARRAY_SHAPE_MATERIAL, &environment, 1, material));
+    for (size_t i = 0; i < n; i += (size_t)sadmm_array_columns(SADMM_ARRAY_SHAPE_MATERIAL)) material[i] = 0;
+    MUST_ALL(environments, sadmm_environments_set(environments, SADMM_ARRAY_SHAPE_MATERIAL, &environment, 1, material));
+    free(material);
 }
 
 /* What the device says of the first environment is what the host says of the same world: its natural map is that of
@@ -122,11 +132,14 @@ START_TEST(environments_step_as_if_alone)
     for (int32_t e = 0; e < FEW; ++e) {
         own[e] = replicate(origin, 1);
         for (int k = 0; k < OUTPUTS; ++k) mine[e][k] = view_of(own[e], outputs[k]);
-        push(look(own[e], &mine[e][0]), e, n, state + n * (size_t)e);
+        push(origin, look(own[e], &mine[e][0]), e, n, state + n * (size_t)e);
         if (e > 0) {
-            keep_still(origin, state + n * (size_t)e);
             MUST_ALL(own[e], sadmm_environments_set(own[e], SADMM_ARRAY_BODY_STATE, NULL, 0, state + n * (size_t)e));
             MUST_ALL(all, sadmm_environments_set(all, SADMM_ARRAY_BODY_STATE, &e, 1, state + n * (size_t)e));
+        }
+        if (e == FEW - 1) {
+            make_slippery(own[e], 0);
+            make_slippery(all, e);
         }
     }
     for (int step = 0; step < scenes[scene].steps; step += 2) {

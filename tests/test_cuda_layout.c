@@ -367,7 +367,8 @@ static void same_statistics(const struct cuda_graph_statistics *got, const struc
                             const char *about)
 {
     static const char *const names[] = {"islands",     "island_bodies", "island_sides", "sides",      "degree",
-                                        "point_slots", "rough",         "warm",          "part_sides", "part_bodies"};
+                                        "point_slots", "rough",         "warm",          "cold",       "part_sides",
+                                        "part_bodies"};
     const int32_t *a = (const int32_t *)got, *b = (const int32_t *)wanted;
     ck_assert_uint_eq(sizeof *got, sizeof names / sizeof *names * sizeof *a);
     for (size_t i = 0; i < sizeof names / sizeof *names; ++i)

@@ -21,7 +21,7 @@ static int single_count;
 
 static void iterate(struct runner *r, int count, bool measure)
 {
-    CALL(r, r->k->iterate(r->c, count, measure, &r->error));
+    CALL(r, r->k->iterate(r->c, count, false, measure, &r->error));
 }
 
 static void update_weights(struct runner *r)

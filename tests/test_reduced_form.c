@@ -150,7 +150,7 @@ START_TEST(fused_equals_stepwise)
         CALL(&step, step.k->measure_residuals(step.c, &wanted, &step.error));
         for (int t = 0; t < 3; ++t) {
             struct spread v = {0, 0}, lambda = {0, 0};
-            CALL(&fused[t], table->iterate(fused[t].c, batches[s], true, &fused[t].error));
+            CALL(&fused[t], table->iterate(fused[t].c, batches[s], false, true, &fused[t].error));
             CALL(&fused[t], table->measure_residuals(fused[t].c, &got, &fused[t].error));
             compare_solutions(&fused[t], &step, &v, &lambda);
             ck_assert_msg(v.difference == 0 && lambda.difference == 0, "%s, batch %zu, %d threads: v %g, lambda %g",

@@ -44,7 +44,7 @@ static bool stands_after(const struct list *list, enum sadmm_stage_kind kind, in
 static struct sadmm_plan contacts_plan(const sadmm_settings *settings, bool warm)
 {
     struct sadmm_plan plan = {.bodies = 2, .pairs = 1, .points = 4, .contact_rows = 3, .rigid = true, .threads = 1};
-    sadmm_plan_complete(&plan, settings, warm);
+    sadmm_plan_complete(&plan, settings, warm, warm);
     return plan;
 }
 
@@ -86,7 +86,7 @@ START_TEST(a_world_without_constraints)
     sadmm_settings settings = fixed_settings();
     struct sadmm_plan plan = {.bodies = 1, .rigid = true, .threads = 1};
     settings.recover_wrenches = false;
-    sadmm_plan_complete(&plan, &settings, false);
+    sadmm_plan_complete(&plan, &settings, false, false);
     take_list(&list, &plan, &settings, true, 0);
     /* Step 1 once is exact; nothing that belongs to constraints is there. */
     static const enum sadmm_stage_kind wanted[] = {SADMM_STAGE_GATHER, SADMM_STAGE_HITS, SADMM_STAGE_FIND,

@@ -14,9 +14,9 @@
  * Where the template's steps are made on the CPU, environments are shared out over settings.threads of the template's
  * (0: all cores), or its `tasks`. On CUDA all are on the template's device and make each step together; bound arrays
  * are in its memory. There a first step begins without impulses, as every later one does with new contacts, where a
- * world's first step on CUDA has some initialised; bodies without joints move as alone within the tolerance, not to
- * the last bit; gravity is that of the settings, in all; contacts, rays and saves go by way of the host; and errors
- * that every call has besides its own are OUT_OF_MEMORY and DEVICE (after which all environments are to be made anew).
+ * world's first step on CUDA has some initialised; gravity is that of the settings, in all; contacts, rays and saves go
+ * by way of the host; and errors that every call has besides its own are OUT_OF_MEMORY and DEVICE (after which all
+ * environments are to be made anew).
  * AUTO: on what has made the template's steps; the CPU where there were none.
  *
  * Threads: use environments from one thread at a time. Errors that every call has besides its own: INVALID_ARGUMENT

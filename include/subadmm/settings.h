@@ -104,7 +104,7 @@ typedef struct sadmm_settings {
                                     rounding: with joints before the iterations, which they need none of then; without,
                                     where some iterations miss the tolerance (none with tolerance 0). In [0,
                                     SADMM_MOST_NCP_POINTS = 128]; 0: none; default 64. Up to 20 ms on one core are lost
-                                    on an island that nothing solves. Not on CUDA, where islands are iterated */
+                                    on an island that nothing solves. On CUDA islands without joints have none */
 
     double residual_tolerance;   /* stop when |r_primal|_inf (m/s) and |r_dual|_inf (N s) are both <= this;
                                     0 = never; finite, >= 0; default 0 */

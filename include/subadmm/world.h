@@ -256,8 +256,8 @@ typedef struct sadmm_step_report {
     bool converged;                /* a stop rule was met, by every island */
     int32_t limited;               /* islands that ended the iterations with more kinetic energy than contacts can
                                       leave them with. FAST: they were slowed down; and so were those counted here that,
-                                      with fewer than 60 iterations in a step that starts warm, were in a bounce that
-                                      they cannot make. PAPER: they are left as they are. In a few steps after an
+                                      with fewer than 60 iterations and a warm start, were in a bounce that they
+                                      cannot make. PAPER: they are left as they are. In a few steps after an
                                       impact that is no reason for more iterations; in many it is */
     int64_t repeated;              /* steps since creation that an asynchronous backend (CUDA) began with too little
                                       capacity or the wrong plan, and repeated; this only costs time */

@@ -56,8 +56,13 @@ static void add_pair(const struct sadmm_context *c, size_t record, struct island
     sum->drive += drive;
 }
 
+static bool tests_rebound(const struct sadmm_context *c, const struct cpu_island *island)
+{
+    return c->fast && energy_limit_tests_rebound(island->warm, c->settings.iterations);
+}
+
 /* Sums over islands in the order of bodies, whatever the threads. */
-static bool any_candidate(struct sadmm_context *c, bool rebounds)
+static bool any_candidate(struct sadmm_context *c)
 {
     bool any = false;
     for (int32_t i = 0; i < c->bodies; ++i) {
@@ -85,7 +90,7 @@ static bool any_candidate(struct sadmm_context *c, bool rebounds)
         if (c->label[i] != i || island->rows || island->energies.kinematic) continue;
         if (energy_limit_is_rounding(&island->energies, (double)SADMM_EPSILON)) continue;
         any = any || energy_limit_exceeded(island->energies.now, island->energies.free) ||
-              (rebounds &&
+              (tests_rebound(c, island) &&
                energy_limit_rebounds(island->energies.now, island->energies.free, island->along,
                                      (double)SADMM_EPSILON));
     }
@@ -137,12 +142,12 @@ static void impulses_share(void *context, int thread, int threads)
 }
 
 /* By what the island of body i is slowed down. */
-static double factor_of(const struct sadmm_context *c, int32_t i, bool rebounds)
+static double factor_of(const struct sadmm_context *c, int32_t i)
 {
     const struct cpu_island *island = &c->islands[c->label[i]];
     if (island->rows) return 1; /* the energies are those of contacts alone */
     const double factor = energy_limit_factor(&island->energies, (double)SADMM_EPSILON);
-    if (!rebounds) return factor;
+    if (!tests_rebound(c, island)) return factor;
     return min_of(factor, energy_limit_rebound_factor(&island->energies, island->along, (double)SADMM_EPSILON));
 }
 
@@ -165,14 +170,13 @@ static void prepare_paper(struct sadmm_context *c)
 
 static void limit_energies(struct sadmm_context *c, int32_t *limited)
 {
-    const bool rebounds = c->fast && energy_limit_tests_rebound(c->plan.warm, c->settings.iterations);
     cpu_parallel(c, energies_share, c);
-    if (!any_candidate(c, rebounds)) return;
+    if (!any_candidate(c)) return;
     CPU(sum_wrenches)(c);
     cpu_parallel(c, impulses_share, c);
     add_impulses(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
-        const double factor = factor_of(c, i, rebounds);
+        const double factor = factor_of(c, i);
         const int32_t floating = c->floating_of[c->label[i]];
         if (factor == 1) continue;
         *limited += c->label[i] == i;

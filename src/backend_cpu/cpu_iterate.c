@@ -78,7 +78,7 @@ sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *e
 struct batch {
     struct sadmm_context *c;
     int count;
-    bool measure;
+    bool goes_on, measure;
 };
 
 static void constraints_share(void *argument, int thread, int threads)
@@ -93,7 +93,7 @@ sadmm_status CPU(update_constraints)(struct sadmm_context *c, bool measure, stru
 {
     if (refuse_fast(c, error) != SADMM_OK) return SADMM_ERROR_UNSUPPORTED;
     clear_max(c);
-    cpu_parallel(c, constraints_share, &(struct batch){c, 1, measure});
+    cpu_parallel(c, constraints_share, &(struct batch){c, 1, false, measure});
     c->measured = measure;
     if (measure) c->residual.primal = cpu_reduce_max(c);
     return SADMM_OK;
@@ -107,25 +107,30 @@ static bool recomputes_residuals(const struct sadmm_context *c, int i)
 }
 
 /* The method `fast`: constraints first, then bodies (math/relax.h). */
-static void iterate_fast(struct sadmm_context *c, int thread, int threads, int count, bool measure, double *primal)
+static void iterate_fast(const struct batch *s, int thread, int threads, double *primal)
 {
+    struct sadmm_context *c = s->c;
     const double relaxation = c->settings.relaxation;
+    const bool on = s->goes_on && c->any_warm; /* of islands that start warm */
+    const int batch = on ? s->count + 1 : s->count;
     size_t first, past;
     cpu_share_bodies(c, thread, threads, &first, &past);
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < s->count; ++i) {
         if (recomputes_residuals(c, i)) {
             CPU(recompute_residuals)(c, first, past);
             sadmm_barrier_wait(&c->barrier, threads);
         }
-        bool relaxes = relax_constraints(i, count), step1_done = c->step1_done || i > 0;
+        const bool relaxes = relax_constraints(i, batch), step1_done = c->step1_done || i > 0,
+                   warm = on && c->any_cold && i + 1 == s->count;
         update_constraints(c, thread, threads,
-                           relaxes   ? CPU_SWEEP_RELAX
-                           : measure ? CPU_SWEEP_PLAIN_MEASURE
+                           warm      ? CPU_SWEEP_RELAX_WARM
+                           : relaxes ? CPU_SWEEP_RELAX
+                           : s->measure ? CPU_SWEEP_PLAIN_MEASURE
                                      : CPU_SWEEP_PLAIN,
                            primal);
         sadmm_barrier_wait(&c->barrier, threads);
-        CPU(sweep_bodies_fast)(c, thread, threads, step1_done, relax_velocity(i, count, step1_done) ? relaxation : 1,
-                               relaxes ? relaxation : 1);
+        CPU(sweep_bodies_fast)(c, thread, threads, step1_done, relax_velocity(i, batch, step1_done) ? relaxation : 1,
+                               relaxes ? relaxation : 1, warm);
         sadmm_barrier_wait(&c->barrier, threads);
     }
 }
@@ -140,7 +145,7 @@ static void iterate_share(void *argument, int thread, int threads)
         join_wrenches(c, thread, threads);
         sadmm_barrier_wait(&c->barrier, threads);
     }
-    if (c->fast) iterate_fast(c, thread, threads, s->count, s->measure, &primal);
+    if (c->fast) iterate_fast(s, thread, threads, &primal);
     for (int i = 0; i < s->count && !c->fast; ++i) {
         bool last = s->measure && i + 1 == s->count;
         CPU(sweep_bodies)(c, thread, threads, c->step1_done || i > 0);
@@ -152,11 +157,11 @@ static void iterate_share(void *argument, int thread, int threads)
     if (c->fast) cpu_flush_restore(mode);
 }
 
-sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
+sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool goes_on, bool measure, struct sadmm_error *error)
 {
     (void)error;
     clear_max(c);
-    cpu_parallel(c, iterate_share, &(struct batch){c, count, measure});
+    cpu_parallel(c, iterate_share, &(struct batch){c, count, goes_on, measure});
     c->step1_done = c->step1_done || count > 0;
     if (count > 0) c->exact_since = (c->exact_since + count - 1) % RELAX_RESIDUAL_PERIOD + 1;
     c->measured = measure && !c->fast;

@@ -72,5 +72,6 @@ void CPU(weigh_rows)(struct sadmm_context *c, size_t index)
 {
     struct row_block *block = &c->row_blocks[index];
     for (int l = 0; l < LANES; ++l)
-        if (block->constraint[l] >= 0) weigh(c, block, l);
+        if (block->constraint[l] >= 0 && cpu_is_weighed(c, cpu_island_of(c, block->body_a[l], block->body_b[l])))
+            weigh(c, block, l);
 }

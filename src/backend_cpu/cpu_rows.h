@@ -176,6 +176,22 @@ static inline struct cpu_island *cpu_island_of(const struct sadmm_context *c, in
     return &c->islands[c->label[body_a >= 0 && body_a < c->bodies ? body_a : body_b]];
 }
 
+/* How far multipliers of a block's constraints go where islands that start warm go `relaxation` times as far. */
+static inline lanes cpu_relaxation_if_warm(const struct sadmm_context *c, const int32_t *body_a, const int32_t *body_b)
+{
+    lanes out = fill(1);
+    for (int l = 0; l < LANES; ++l)
+        if ((body_a[l] < c->bodies || body_b[l] < c->bodies) && cpu_island_of(c, body_a[l], body_b[l])->warm)
+            out[l] = (real)c->settings.relaxation;
+    return out;
+}
+
+/* Are there new weights for its constraints: the first ones, or updates? */
+static inline bool cpu_is_weighed(const struct sadmm_context *c, const struct cpu_island *island)
+{
+    return c->weight_updates <= 0 || !island->warm;
+}
+
 static inline double cpu_body_mass(const struct sadmm_context *c, int32_t i)
 {
     const double *A = &c->A[(size_t)i * PACKED6];

@@ -104,13 +104,31 @@ static inline vec move_by(lanes v[3], vec step)
     return (vec){v[0] - before.x, v[1] - before.y, v[2] - before.z};
 }
 
-static void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end, bool step1_done, lanes velocity,
-                              lanes multipliers)
+/* How far what belongs to the bodies of a block goes. */
+struct body_factors {
+    lanes velocity, multipliers;
+};
+
+/* Of a block where islands that start cold go once. */
+static struct body_factors factors_if_warm(const struct sadmm_context *c, size_t index, struct body_factors all)
+{
+    for (int l = 0; l < LANES; ++l) {
+        const size_t i = index * (size_t)LANES + (size_t)l;
+        if (i < (size_t)c->bodies && c->islands[c->label[i]].warm) continue;
+        all.velocity[l] = all.multipliers[l] = 1;
+    }
+    return all;
+}
+
+static inline __attribute__((always_inline)) void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end,
+                                                                    bool step1_done, struct body_factors all, bool warm)
 {
     for (size_t index = begin; index < end; ++index) {
         if (c->general_lanes[index] == ALL_LANES) continue;
         if (step1_done && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
         struct body_block *block = &c->body_blocks[index];
+        const struct body_factors factors = warm ? factors_if_warm(c, index, all) : all;
+        const lanes velocity = factors.velocity, multipliers = factors.multipliers;
         const row8 *rows = (const row8 *)c->state + index * (size_t)LANES;
         lanes state[ROW], g[ROW];
         row8 sums[LANES];
@@ -166,11 +184,13 @@ static void update_general(struct sadmm_context *c, size_t begin, size_t end, bo
     }
 }
 
-static void update_general_fast(struct sadmm_context *c, size_t begin, size_t end, bool step1_done, real velocity,
-                                real multipliers)
+static void update_general_fast(struct sadmm_context *c, size_t begin, size_t end, bool step1_done, real all_velocity,
+                                real all_multipliers, bool warm)
 {
     for (size_t k = begin; k < end; ++k) {
         const size_t i = (size_t)c->general_bodies[k];
+        const bool once = warm && !c->islands[c->label[i]].warm;
+        const real velocity = once ? 1 : all_velocity, multipliers = once ? 1 : all_multipliers;
         if (step1_done && c->offsets[i] == c->offsets[i + 1]) continue;
         const row8 *A = (const row8 *)c->A_columns + 6 * k, *H = (const row8 *)c->H_columns + 6 * k;
         row8 *momentum_residual = (row8 *)c->momentum_residuals + k;
@@ -231,11 +251,13 @@ void CPU(sweep_bodies)(struct sadmm_context *c, int thread, int threads, bool st
 }
 
 void CPU(sweep_bodies_fast)(struct sadmm_context *c, int thread, int threads, bool step1_done, double velocity,
-                            double multipliers)
+                            double multipliers, bool warm)
 {
     const struct body_share s = share_of(c, thread, threads);
-    update_rigid_fast(c, s.begin, s.end, step1_done, fill((real)velocity), fill((real)multipliers));
-    update_general_fast(c, s.general_begin, s.general_end, step1_done, (real)velocity, (real)multipliers);
+    const struct body_factors all = {fill((real)velocity), fill((real)multipliers)};
+    if (warm) update_rigid_fast(c, s.begin, s.end, step1_done, all, true);
+    else update_rigid_fast(c, s.begin, s.end, step1_done, all, false);
+    update_general_fast(c, s.general_begin, s.general_end, step1_done, (real)velocity, (real)multipliers, warm);
 }
 
 double CPU(dual_residual)(const struct sadmm_context *c, int thread, int threads)

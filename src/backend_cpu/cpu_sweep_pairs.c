@@ -105,6 +105,8 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
                 lambda = pick_vec(law.moves, lambda, y);
             }
             if (sweep == CPU_SWEEP_RELAX) slot->lambda = add(old, scale(delta, relaxation));
+            else if (sweep == CPU_SWEEP_RELAX_WARM)
+                slot->lambda = pick_vec(relaxation > 1, add(old, scale(delta, relaxation)), lambda);
             else slot->lambda = lambda;
             if (cpu_sweep_measures(sweep)) change_max = larger(change_max, frame_max(delta, n));
             if (cpu_sweep_passes_changes(sweep)) {
@@ -130,6 +132,7 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
             lanes delta = lambda - old;
             if (cpu_sweep_passes_changes(sweep)) delta = pick(y > 0, -step, -old);
             if (sweep == CPU_SWEEP_RELAX) slot->lambda = old + relaxation * delta;
+            else if (sweep == CPU_SWEEP_RELAX_WARM) slot->lambda = pick(relaxation > 1, old + relaxation * delta, lambda);
             else slot->lambda = lambda;
             if (cpu_sweep_measures(sweep)) change_max = larger(change_max, magnitude(delta));
             if (cpu_sweep_passes_changes(sweep)) {
@@ -150,10 +153,16 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
 
 void CPU(sweep_pairs)(struct sadmm_context *c, size_t begin, size_t end, enum cpu_sweep sweep, double *primal)
 {
-    const lanes relaxation = fill((real)c->settings.relaxation); /* used by RELAX only */
+    const lanes all = fill((real)c->settings.relaxation);
 #define SWEEP(rows, kind)                                                                                \
     case kind:                                                                                           \
-        for (size_t k = begin; k < end; ++k) sweep_block(c, k, rows, kind, relaxation, primal);          \
+        for (size_t k = begin; k < end; ++k) {                                                           \
+            const struct pair_block *block = &c->pair_blocks[k];                                         \
+            const lanes relaxation = kind == CPU_SWEEP_RELAX_WARM                                        \
+                                         ? cpu_relaxation_if_warm(c, block->body_a, block->body_b)       \
+                                         : all;                                                          \
+            sweep_block(c, k, rows, kind, relaxation, primal);                                           \
+        }                                                                                                \
         break
 #define SWEEPS(rows)                                                                                        \
     switch (sweep) {                                                                                        \
@@ -162,6 +171,7 @@ void CPU(sweep_pairs)(struct sadmm_context *c, size_t begin, size_t end, enum cp
         SWEEP(rows, CPU_SWEEP_MEASURE);                                                                     \
         SWEEP(rows, CPU_SWEEP_RELAX);                                                                       \
         SWEEP(rows, CPU_SWEEP_PLAIN);                                                                       \
+        SWEEP(rows, CPU_SWEEP_RELAX_WARM);                                                                  \
         SWEEP(rows, CPU_SWEEP_PLAIN_MEASURE);                                                               \
     }
     if (c->plan.contact_rows == 3) SWEEPS(3)

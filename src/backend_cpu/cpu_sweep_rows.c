@@ -120,6 +120,8 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
             add_row(&next, slot, lambda[r] + delta[r]);
         }
         if (sweep == CPU_SWEEP_RELAX) slot->lambda += relaxation * delta[r];
+        else if (sweep == CPU_SWEEP_RELAX_WARM)
+            slot->lambda = pick(relaxation > 1, slot->lambda + relaxation * delta[r], lambda[r]);
         else slot->lambda = lambda[r];
     }
     write_wrenches(c, c->wrenches, index, &next);
@@ -129,12 +131,17 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
 
 void CPU(sweep_rows)(struct sadmm_context *c, size_t begin, size_t end, enum cpu_sweep sweep, double *primal)
 {
-    const lanes relaxation = fill((real)c->settings.relaxation); /* used by RELAX only */
+    const lanes all = fill((real)c->settings.relaxation);
 #define SWEEP(kind)                                                                                   \
     case kind:                                                                                        \
-        for (size_t k = begin; k < end; ++k)                                                          \
-            if (c->row_blocks[k].cone) sweep_block(c, k, true, kind, relaxation, primal);             \
+        for (size_t k = begin; k < end; ++k) {                                                        \
+            const struct row_block *block = &c->row_blocks[k];                                        \
+            const lanes relaxation = kind == CPU_SWEEP_RELAX_WARM                                     \
+                                         ? cpu_relaxation_if_warm(c, block->body_a, block->body_b)    \
+                                         : all;                                                       \
+            if (block->cone) sweep_block(c, k, true, kind, relaxation, primal);                       \
             else sweep_block(c, k, false, kind, relaxation, primal);                                  \
+        }                                                                                             \
         break
     switch (sweep) {
         SWEEP(CPU_SWEEP_START);
@@ -142,6 +149,7 @@ void CPU(sweep_rows)(struct sadmm_context *c, size_t begin, size_t end, enum cpu
         SWEEP(CPU_SWEEP_MEASURE);
         SWEEP(CPU_SWEEP_RELAX);
         SWEEP(CPU_SWEEP_PLAIN);
+        SWEEP(CPU_SWEEP_RELAX_WARM);
         SWEEP(CPU_SWEEP_PLAIN_MEASURE);
     }
 #undef SWEEP

@@ -51,7 +51,7 @@ void CPU(update_weight_scales)(struct sadmm_context *c)
     add_up_residuals(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct cpu_island *island = &c->islands[i];
-        if (c->label[i] == i && !island->rows)
+        if (c->label[i] == i && !island->rows && !island->warm)
             island->scale_weights = weight_update_scale(&island->weights, &island->sums);
     }
 }

@@ -78,39 +78,52 @@ static double pair_response(struct sadmm_context *c, size_t record)
 
 /* ---- weights ----------------------------------------------------------------------------------------------------- */
 
-/* V of every island, kept at its label. `wrenches` hold J^T lambda. */
+/* V of every island, kept at its label; at first whether it starts warm. `wrenches` hold J^T lambda. */
 static void add_up_loads(struct sadmm_context *c)
 {
-    const int iterations = weight_spring_iterations(c->plan.warm, c->plan.rigid, c->settings.iterations);
-    for (int32_t i = 0; i < c->bodies; ++i) c->islands[i].sums = (struct weight_sums){0};
+    const bool first = c->weight_updates == 0;
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        c->islands[i].sums = (struct weight_sums){0};
+        if (first) c->islands[i].balance = 0;
+    }
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct weight_sums *sums = &c->islands[c->label[i]].sums;
         sums->energy += c->body_sums[BODY_SUMS * i];
         sums->kinetic += c->body_sums[BODY_SUMS * i + 1];
         sums->push += c->body_sums[BODY_SUMS * i + 2];
         sums->mass += cpu_body_mass(c, i);
+        if (first) c->islands[c->label[i]].balance += c->body_sums[BODY_SUMS * i + 3];
     }
-    for (int32_t i = 0; i < c->bodies; ++i)
-        if (c->label[i] == i)
-            weight_update_speed(&c->islands[i].weights, &c->islands[i].sums, iterations);
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        struct cpu_island *island = &c->islands[i];
+        if (c->label[i] != i) continue;
+        if (first) island->warm = plan_may_start_warm(&c->plan, &c->settings) && weight_starts_warm(island->balance);
+        c->any_cold = c->any_cold || !island->warm;
+        c->any_warm = c->any_warm || island->warm;
+        weight_update_speed(&island->weights, &island->sums,
+                            weight_spring_iterations(island->warm, c->plan.rigid, c->settings.iterations));
+    }
 }
 
 /* A body's part of its island's sums. */
 static void add_up_body(const struct sadmm_context *c, size_t i, double sums[BODY_SUMS])
 {
-    double g[6], v[6], push = 0;
+    double g[6], v[6], push = 0, balance = 0;
     row8d sum = {0};
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
         const row8d wrench = cpu_wrench(c, c->incident[at]);
-        const double f[3] = {wrench[0], wrench[1], wrench[2]};
+        const double f[3] = {wrench[0], wrench[1], wrench[2]}, m[3] = {wrench[3], wrench[4], wrench[5]},
+                     force = length3(f);
         sum += wrench;
-        push += length3(f);
+        push += force;
+        balance += force > 0 || length3(m) > 0 ? 1 : -1;
     }
     for (int k = 0; k < 6; ++k) g[k] = sum[k];
     cpu_load_v(c, i, v);
     sums[0] = cpu_form(c, i, &c->A_inverse[i * PACKED6], g);
     sums[1] = cpu_form(c, i, &c->A[i * PACKED6], v);
     sums[2] = push;
+    sums[3] = balance;
 }
 
 /* Sums of the sizes of the impulses of a block's pairs. Where a pair has no point lambda is 0. */
@@ -172,6 +185,7 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index)
         if (block->pair[l] < 0) continue;
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
         const struct cpu_island *island = cpu_island_of(c, pair->body_a, pair->body_b);
+        if (!cpu_is_weighed(c, island)) continue;
         double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
         double load = sums[l] / pair->count;
         double response = c->pair_response[index * (size_t)LANES + (size_t)l];
@@ -232,7 +246,7 @@ static void update_share(void *context, int thread, int threads)
     struct sadmm_context *c = (struct sadmm_context *)context;
     const bool scales = c->weight_updates >= WEIGHT_FIRST_SCALE;
     /* world level: separations, a slop and a step */
-    const bool eases = c->weight_updates == 0 && c->plan.warm && c->plan.rigid;
+    const bool eases = c->weight_updates == 0 && plan_may_start_warm(&c->plan, &c->settings) && c->plan.rigid;
     size_t begin, end;
     cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) add_up_body(c, i, &c->body_sums[BODY_SUMS * i]);
@@ -248,15 +262,15 @@ static void update_share(void *context, int thread, int threads)
     for (size_t k = begin; k < end; ++k) CPU(weigh_rows)(c, k);
     sadmm_barrier_wait(&c->barrier, threads);
     cpu_share_bodies(c, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) assemble_C(c, i);
+    for (size_t i = begin; i < end; ++i)
+        if (cpu_is_weighed(c, &c->islands[c->label[i]])) assemble_C(c, i);
     CPU(recompute_residuals)(c, begin, end);
 }
 
 sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    ++c->weight_updates;
-    c->exact_since = 0;
+    if (++c->weight_updates > 0 && !c->any_cold) return SADMM_OK;
     CPU(sum_wrenches)(c);
     cpu_parallel(c, update_share, c);
     return SADMM_OK;
@@ -289,6 +303,7 @@ sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *erro
     for (size_t k = 0; k < sadmm_row_constraint_count(c->system); ++k)
         cpu_island_of(c, c->system->rows->constraints[k].body_a, c->system->rows->constraints[k].body_b)->rows = true;
     c->weight_updates = -1; /* the first weights are none */
-    c->step1_done = c->measured = false;
+    c->exact_since = 0;
+    c->step1_done = c->measured = c->any_cold = c->any_warm = false;
     return CPU(update_weights)(c, error);
 }

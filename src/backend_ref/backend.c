@@ -181,10 +181,10 @@ static sadmm_status init_penalty(struct sadmm_context *c, struct sadmm_error *er
     return is_fast(c) ? sadmm_ref_init_weights(c, error) : sadmm_ref_init_penalty(c, error);
 }
 
-static sadmm_status iterate(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
+static sadmm_status iterate(struct sadmm_context *c, int count, bool goes_on, bool measure, struct sadmm_error *error)
 {
     sadmm_status status = SADMM_OK;
-    if (is_fast(c)) return sadmm_ref_iterate_fast(c, count);
+    if (is_fast(c)) return sadmm_ref_iterate_fast(c, count, goes_on);
     for (int i = 0; i < count && status == SADMM_OK; ++i) {
         status = sadmm_ref_update_velocity(c, error);
         if (status == SADMM_OK) status = sadmm_ref_update_constraints(c, measure && i + 1 == count, error);

@@ -78,7 +78,6 @@ sadmm_status sadmm_ref_limit_energy(struct sadmm_context *c, int32_t *limited, s
 {
     (void)error;
     const bool fast = c->settings->method == SADMM_METHOD_FAST;
-    const bool rebounds = fast && energy_limit_tests_rebound(c->plan->warm, c->settings->iterations);
     *limited = 0;
     if (!fast) name_islands(c);
     sadmm_ref_find_motions(c);
@@ -86,6 +85,7 @@ sadmm_status sadmm_ref_limit_energy(struct sadmm_context *c, int32_t *limited, s
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
         if (island->label != i) continue;
+        const bool rebounds = fast && energy_limit_tests_rebound(island->warm, c->settings->iterations);
         const double factor = factor_of(island, rebounds);
         island->slow_down = fast ? factor : 1;
         *limited += factor < 1;

@@ -91,6 +91,7 @@ static void add_up_group(struct sadmm_context *c, size_t first, size_t count)
         for (size_t k = first; k < first + count; ++k) add_impulse(&c->constraints[k], s, impulse);
         for (int j = 0; j < 6; ++j) c->bodies[body].impulse[j] += impulse[j];
         c->bodies[c->bodies[body].label].sums.push += length3(impulse);
+        c->bodies[c->bodies[body].label].balance += dense6_dot(impulse, impulse) > 0 ? 1 : -1;
     }
 }
 
@@ -100,6 +101,7 @@ static void add_up_islands(struct sadmm_context *c)
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
         memset(&body->sums, 0, sizeof body->sums);
+        body->balance = 0;
         memset(body->impulse, 0, sizeof body->impulse);
     }
     for (size_t p = 0; p < contacts->pair_count; ++p)
@@ -114,10 +116,13 @@ static void add_up_islands(struct sadmm_context *c)
         sums->kinetic += dense6_dot(momentum, body->v);
         sums->mass += mass_of(body);
     }
-    for (int32_t i = 0; i < c->system->body_count; ++i)
-        if (c->bodies[i].label == i)
-            weight_update_speed(&c->bodies[i].weights, &c->bodies[i].sums,
-                                weight_spring_iterations(c->plan->warm, c->plan->rigid, c->settings->iterations));
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *island = &c->bodies[i];
+        if (island->label != i) continue;
+        if (c->weight_updates < 0) island->warm = plan_may_start_warm(c->plan, c->settings) && weight_starts_warm(island->balance);
+        weight_update_speed(&island->weights, &island->sums,
+                            weight_spring_iterations(island->warm, c->plan->rigid, c->settings->iterations));
+    }
 }
 
 void sadmm_ref_sum_impulses(struct sadmm_context *c)
@@ -198,7 +203,7 @@ static void update_weight_scales(struct sadmm_context *c)
             pair_violation(c, &contacts->pairs[p]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
-        if (island->label == i && !island->rows)
+        if (island->label == i && !island->rows && !island->warm)
             island->scale_weights = weight_update_scale(&island->weights, &island->sums);
     }
 }
@@ -284,20 +289,25 @@ static void add_to_C(struct sadmm_context *c, const struct ref_constraint *const
                     C[6 * i + j] += side->J[6 * r + i] * constraint->B[6 * r + q] * side->J[6 * q + j];
 }
 
+/* Weights and C of the islands that started cold; at first of all. */
 sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    size_t points = c->system->contacts->point_count;
+    const size_t points = c->system->contacts->point_count;
+    const bool first = c->weight_updates < 0;
     add_up_islands(c);
     if (++c->weight_updates >= WEIGHT_FIRST_SCALE) update_weight_scales(c);
-    for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p]);
-    if (c->weight_updates == 0 && c->plan->warm && c->plan->rigid)
-        for (size_t k = 0; k < points; ++k) {
-            struct ref_constraint *contact = &c->constraints[k];
-            contact->e[0] = weight_separation_error(contact->e[0], island_of(c, contact)->weights.separation_share,
-                                                    c->settings->slop / c->settings->dt);
-        }
-    for (size_t k = points; k < c->constraint_count; ++k) weigh_constraint(c, &c->constraints[k]);
+    for (size_t p = 0; p < c->system->contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[p];
+        if (first || !island_of(c, &c->constraints[pair->first])->warm) weigh_pair(c, pair);
+    }
+    for (size_t k = 0; k < points && first && c->plan->rigid; ++k) {
+        struct ref_constraint *contact = &c->constraints[k];
+        contact->e[0] = weight_separation_error(contact->e[0], island_of(c, contact)->weights.separation_share,
+                                                c->settings->slop / c->settings->dt);
+    }
+    for (size_t k = points; k < c->constraint_count; ++k)
+        if (first || !island_of(c, &c->constraints[k])->warm) weigh_constraint(c, &c->constraints[k]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         memset(c->bodies[i].C, 0, sizeof c->bodies[i].C);
         c->bodies[i].beta = 1;
@@ -326,15 +336,16 @@ sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error 
     return sadmm_ref_update_weights(c, error);
 }
 
-/* v^ = v + (A + C)^-1 (b - A v + sum J^T (2 lambda^ - lambda)) */
-static void step_velocity(struct sadmm_context *c, double relaxation)
+/* v^ = v + (A + C)^-1 (b - A v + sum J^T (2 lambda^ - lambda)). cold: of islands that start so, for `relaxation`. */
+static void step_velocity(struct sadmm_context *c, double relaxation, double cold)
 {
     momentum_residual(c, true);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
         double step[6];
         dense6_solve(body->factor, body->impulse, step);
-        for (int j = 0; j < 6; ++j) body->v[j] -= relaxation * step[j];
+        const double factor = c->bodies[body->label].warm ? relaxation : cold;
+        for (int j = 0; j < 6; ++j) body->v[j] -= factor * step[j];
     }
 }
 
@@ -372,30 +383,33 @@ static void solve_multiplier(const struct sadmm_context *c, const struct ref_con
     }
 }
 
-static void step_multipliers(struct sadmm_context *c, double relaxation)
+static void step_multipliers(struct sadmm_context *c, double relaxation, double cold)
 {
     c->primal = 0;
     for (size_t k = 0; k < c->constraint_count; ++k) {
         struct ref_constraint *constraint = &c->constraints[k];
+        const double factor = island_of(c, constraint)->warm ? relaxation : cold;
         double solved[6];
         solve_multiplier(c, constraint, solved);
         for (int r = 0; r < constraint->rows; ++r) {
             double change = solved[r] - constraint->lambda[r], B = constraint->B[7 * r];
             if (B > 0) c->primal = fmax(c->primal, fabs(change) / B);
             constraint->seen[r] = solved[r] + change;
-            constraint->lambda[r] += relaxation * change;
+            constraint->lambda[r] += factor * change;
             for (int s = 0; s < 2; ++s)
                 if (constraint->side[s].body >= 0) constraint->side[s].u[r] = -constraint->lambda[r];
         }
     }
 }
 
-sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *c, int count)
+sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *c, int count, bool goes_on)
 {
-    double relaxation = c->settings->relaxation;
+    const double relaxation = c->settings->relaxation;
+    const int batch = goes_on ? count + 1 : count;
     for (int i = 0; i < count; ++i) {
-        step_multipliers(c, relax_constraints(i, count) ? relaxation : 1);
-        step_velocity(c, relax_velocity(i, count, c->step1_done) ? relaxation : 1);
+        step_multipliers(c, relax_constraints(i, batch) ? relaxation : 1, relax_constraints(i, count) ? relaxation : 1);
+        step_velocity(c, relax_velocity(i, batch, c->step1_done) ? relaxation : 1,
+                      relax_velocity(i, count, c->step1_done) ? relaxation : 1);
         c->step1_done = true;
     }
     return SADMM_OK;

@@ -51,6 +51,8 @@ struct ref_body {
     struct weight_island weights;
     double scale_weights;            /* not 0: the weights of pairs stay, times this */
     bool rows;                       /* the island has constraints given by rows */
+    double balance;                  /* of its sides (weight_starts_warm), of which follows */
+    bool warm;                       /* that it has no weight updates */
     struct island_energies energies;
     double along; /* v . A v_f / 2 of the island */
     /* of the island that it names, in either method */
@@ -91,7 +93,7 @@ sadmm_status sadmm_ref_update_penalty(struct sadmm_context *, double ratio, stru
 /* fast.c */
 sadmm_status sadmm_ref_init_weights(struct sadmm_context *, struct sadmm_error *);
 sadmm_status sadmm_ref_update_weights(struct sadmm_context *, struct sadmm_error *);
-sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *, int count);
+sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *, int count, bool goes_on);
 sadmm_status sadmm_ref_measure_fast(struct sadmm_context *, struct sadmm_residual *);
 void sadmm_ref_label_islands(struct sadmm_context *);
 /* A v - b - sum J^T lambda, by body, into `impulse`; and sum J^T lambda alone. */

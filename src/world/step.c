@@ -288,8 +288,9 @@ static sadmm_status solve_ncp_again(struct host_step *step)
 static sadmm_status choose_pushes(struct host_step *step)
 {
     sadmm_world *world = step->world;
-    if (step->depth_now <= step->settings.slop || !push_is_apart(world->kernels->backend == SADMM_BACKEND_CUDA,
-                                                       step->system.body_count, step->system.kinematic_count))
+    const bool cuda = world->kernels->backend == SADMM_BACKEND_CUDA;
+    const int32_t bodies = world->copies > 0 ? step->system.body_count / world->copies : step->system.body_count;
+    if (step->depth_now <= step->settings.slop || !push_is_apart(cuda, bodies, step->system.kinematic_count))
         return SADMM_OK;
     if (!world->push) world->push = sadmm_push_create();
     if (!world->push) return sadmm_fail_memory(&world->error, "bodies that overlap");
@@ -323,6 +324,7 @@ static sadmm_status make_plan(struct host_step *step)
     if (world->spins_known) step->system.spins = world->spins;
     TRY(sadmm_world_enter_support_frame(world, &step->system));
     world->plan = sadmm_plan_make(&step->system, &step->settings);
+    if (world->copies > 0 && world->plan.points > 0) world->plan.contact_rows = PLAN_CONTACT_ROWS_OF_COPIES;
     step->report = sadmm_solve_report_empty(world->kernels);
     step->solve.ncp = NULL;
     step->solve.errors_known = step->solve.ncp_missed = false;

@@ -35,7 +35,7 @@ sadmm_status CUDA(update_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(factorize)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(update_velocity)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *);
-sadmm_status CUDA(iterate)(struct sadmm_context *, int count, bool measure, struct sadmm_error *);
+sadmm_status CUDA(iterate)(struct sadmm_context *, int count, bool goes_on, bool measure, struct sadmm_error *);
 sadmm_status CUDA(measure_residuals)(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *);
 sadmm_status CUDA(update_penalty)(struct sadmm_context *, double ratio, struct sadmm_error *);
 sadmm_status CUDA(limit_energy)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);

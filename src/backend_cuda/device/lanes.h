@@ -13,6 +13,13 @@ template <int COUNT> static __device__ __forceinline__ void sum_lanes(double x[C
         for (int k = 0; k < COUNT; ++k) x[k] += __shfl_xor_sync((unsigned)ALL_LANES, x[k], o);
 }
 
+/* Does any of the eight lanes say yes? Every lane of the warp comes here. */
+static __device__ __forceinline__ bool any_of_lanes(bool yes)
+{
+    const unsigned warp = __ballot_sync((unsigned)ALL_LANES, yes), first = threadIdx.x % WARP / LANES * LANES;
+    return (warp >> first & ((1U << LANES) - 1)) != 0;
+}
+
 /* A component of x in each lane: that of M x, by the lane's row of M; of three numbers where M is two blocks of 3 x 3.
  * Every lane of the warp comes here. */
 template <int SIZE> static __device__ __forceinline__ double product(double x, const double (&row)[SIZE])

@@ -49,6 +49,7 @@ struct cuda_graph_statistics {
     int32_t point_slots;     /* most points of a pair */
     int32_t rough;           /* pairs with friction > 0 */
     int32_t warm;            /* pairs with any impulse != 0 at the start; 0 where the start is cold anyway */
+    int32_t cold;            /* fast: not 0: some island starts cold; known once it is weighed */
     int32_t part_sides, part_bodies; /* largest part of the partition made last */
 };
 

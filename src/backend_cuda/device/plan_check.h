@@ -33,7 +33,9 @@ static __device__ __forceinline__ void stamp_solved(const cuda_step_view &step)
 static __device__ __forceinline__ bool contacts_as_planned(const model_view &model, const cuda_step_view &step)
 {
     const struct cuda_graph_statistics *statistics = model.statistics;
-    return plan_contact_rows(model.live->pairs, statistics->rough) == step.speculation.contact_rows &&
+    const int32_t rows = step.speculation.copies ? (int32_t)PLAN_CONTACT_ROWS_OF_COPIES
+                                                 : plan_contact_rows(model.live->pairs, statistics->rough);
+    return rows == step.speculation.contact_rows &&
            statistics->point_slots <= step.speculation.point_slots;
 }
 /* Is the step? Known once its joints are. */
@@ -47,6 +49,7 @@ static __device__ __forceinline__ bool as_planned(const model_view &model, const
     const int32_t warm =
         plan_mostly_warm(pairs + constraints, statistics->warm + (joints ? step.control->joints.warm : 0));
     return contacts_as_planned(model, step) && (speculation.warm < 0 || warm == speculation.warm) &&
+           (speculation.cold || !statistics->cold) &&
            (!joints || speculation.rows == (constraints > 0)) && !(speculation.apart && step.control->joints.together);
 }
 

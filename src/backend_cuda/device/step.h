@@ -34,8 +34,8 @@
  *
  * fast, small islands (c->prologue): `iterate` does penalties and limit too, and the last two check the plan.
  *
- * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, warm or
- * cold. All of it goes into a graph that is launched again and again, two of them in turn, because states and contact
+ * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, whether
+ * any island starts cold. All of it goes into a graph that is launched again and again, two of them in turn, because states and contact
  * sets change places at every step; where updates come often steps with them have two of their own. Where a plan does
  * not hold, the step sets cuda_live.abort_code (with c->prologue only its last kernel does: what runs until then keeps
  * to what was planned for), what was enqueued behind it does nothing, and the host, when it sees the report, reads the
@@ -61,6 +61,7 @@ struct cuda_step_totals {
     int32_t met;             /* sub-steps that met theirs */
     int32_t constrained;     /* sub-steps with contacts, or rows; */
     int32_t spared;          /* of which every island was solved before any iteration */
+    int32_t cold;            /* sub-steps in which some island starts cold */
     int32_t pushed;          /* sub-steps in which some island is pushed apart (step/push.h); -1: one did not fit */
     int32_t most_iterations; /* sums: of islands that stopped, the most; */
     double iterations_mean;  /* and of all */
@@ -112,8 +113,10 @@ struct cuda_step_control {
 /* What the step was planned for. */
 struct cuda_step_speculation {
     int32_t contact_rows; /* 0: no contacts */
+    int32_t copies;       /* of equal worlds (PLAN_CONTACT_ROWS_OF_COPIES) */
     int32_t point_slots;
     int32_t warm;         /* most pairs, and constraints of joints, carry an impulse; -1: does not matter */
+    int32_t cold;         /* fast: some islands may start cold: weights are updated */
     int32_t rows;         /* there are constraints of joints; -1: there are no joints */
     int32_t apart;        /* articulations do not iterate: their block direct solve runs beside what else the step
                              does */

@@ -91,6 +91,7 @@ struct cuda_island {
     int32_t rows;         /* there are constraints given by rows: the weight scale stays 1, energies have no limit; and,
                              once iterations have ended, a kinematic body pushes */
     int32_t stopped;      /* iterations after which a check found the tolerances met; 0: not yet */
+    int32_t warm;         /* it starts warm: no weight updates */
     int32_t anchored_outside; /* anchored, and not just by bodies of its own that roll on each other (sadmm_pair_rolls):
                                  what touches it is as step/move.h has it as a rule */
 };
@@ -475,11 +476,12 @@ struct cuda_args {
     int32_t in_order;   /* slots are raw indices */
     int32_t step1_done; /* fast: Step 1 ran before in this solve */
     int32_t goes_on;    /* fast: the batch does not end with these iterations */
-    int32_t spring_iterations; /* fast: weight_spring_iterations */
+    int32_t may_be_warm; /* fast: plan_may_start_warm */
+    int32_t spring_iterations; /* fast: weight_spring_iterations of an island that is */
     int32_t checks;      /* fast: of the stop rule, in this step so far */
     int32_t begin;      /* fast, BLOCK: weights, C and factors first */
     int32_t energy_limit; /* fast; enum cuda_energy_limit */
-    int32_t rebounds;   /* fast: islands are tested for a rebound, too (math/energy_limit.h) */
+    int32_t rebounds;   /* fast: islands that start warm are tested for a rebound, too (math/energy_limit.h) */
     int32_t paper;      /* the method: energies are compared, nothing is slowed down */
     int32_t left;       /* NCP: islands that small blocks have left are solved; or (LEAVES) may be left */
     size_t memory;      /* NCP: bytes of a block in ncp_view.memory */
@@ -493,8 +495,9 @@ struct cuda_args {
  * are solved. */
 enum cuda_ncp_pass { NCP_ALL, NCP_LEAVES, NCP_LEFT };
 
-/* fast: what goes as many times as far as the settings' relaxation says; else once. */
-enum cuda_relax { RELAX_VELOCITY = 1, RELAX_MULTIPLIERS = 2 };
+/* fast: what goes as many times as far as the settings' relaxation says; else once. RELAX_WARM: so of islands that
+ * start warm alone. */
+enum cuda_relax { RELAX_VELOCITY = 1, RELAX_MULTIPLIERS = 2, RELAX_WARM = 4 };
 
 typedef void (*cuda_kernel)(const cuda_view, const cuda_args);
 

@@ -169,6 +169,7 @@ static __device__ bool same_pairs(const layout_view &v, const layout_args &args,
     if (t == 0) {
         v.statistics->rough = statistics->rough;
         v.statistics->warm = statistics->warm;
+        v.statistics->cold = 0;
         v.statistics->point_slots = statistics->point_slots;
     }
     return true;

@@ -82,7 +82,7 @@ static __device__ __forceinline__ void limit_island(const island_view &islands, 
                                                     const double sum[TERMS], bool rebounds, bool slows)
 {
     const struct island_energies energies = energies_of(sum);
-    const double factor = factor_of(energies, sum[4], rebounds);
+    const double factor = factor_of(energies, sum[4], rebounds && island->warm);
     if (island->rows) return; /* the energies are those of contacts alone; slow_down stays 1 */
     island->slow_down = slows ? factor : 1;
     if (factor != 1) atomicAdd(islands.limited, 1);

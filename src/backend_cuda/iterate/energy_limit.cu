@@ -22,22 +22,23 @@
 #include "core/math/relax.h"
 
 template <bool RIGID>
-static __device__ __forceinline__ bool has_candidate(const body_view &bodies, const body_thread &t, bool rebounds)
+static __device__ __forceinline__ bool has_candidate(const cuda_view &v, const body_thread &t, bool rebounds)
 {
+    const body_view &bodies = v.bodies;
     const wide_row<RIGID> row = row_of_body<RIGID>(bodies, t);
-    const bool speaks = t.live && t.lane == 0;
+    const bool speaks = t.live && t.lane == 0,
+               warm = rebounds && speaks && v.islands.info[v.graph.label[t.body]].warm;
     const double free = speaks ? bodies.free_energy[t.body] : 0;
     pdl_wait(); /* of all that, iterations change velocities alone */
     const double velocity = t.live && t.lane < 6 ? (double)bodies.state[t.body * ROW + (size_t)t.lane] : 0;
-    return is_candidate(rebounds, speaks, free, velocity, row.b, row.a);
+    return is_candidate(rebounds, warm, speaks, free, velocity, row.b, row.a);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
     candidate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const body_thread t = body_of_thread(v.model, v.graph);
-    if (v.bodies.rigid ? has_candidate<true>(v.bodies, t, args.rebounds)
-                       : has_candidate<false>(v.bodies, t, args.rebounds))
+    if (v.bodies.rigid ? has_candidate<true>(v, t, args.rebounds) : has_candidate<false>(v, t, args.rebounds))
         *v.islands.candidates = 1;
 }
 
@@ -119,7 +120,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
 {
     cuda_args args = {};
     args.paper = !c->fast;
-    args.rebounds = c->fast && energy_limit_tests_rebound(c->plan.warm, c->settings.iterations);
+    args.rebounds = c->fast && energy_limit_tests_rebound(true, c->settings.iterations);
     return CUDA(launch_pdl)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 

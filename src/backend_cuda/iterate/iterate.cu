@@ -23,7 +23,7 @@ static sadmm_status persistent_iterations(struct sadmm_context *c, int count, en
     args.step1_done = c->step1_done;
     args.goes_on = goes_on;
     args.energy_limit = limit;
-    args.rebounds = energy_limit_tests_rebound(c->plan.warm, c->settings.iterations);
+    args.rebounds = energy_limit_tests_rebound(true, c->settings.iterations);
     args.checks = c->checks;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
@@ -55,18 +55,22 @@ static sadmm_status iterations_of_tier(struct sadmm_context *c, int count, bool 
     return measure ? measured_batch(c, count, error) : persistent_iterations(c, count, limit, goes_on, error);
 }
 
-sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool measure, enum cuda_energy_limit limit,
-                                      struct sadmm_error *error)
+sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool goes_on, bool measure,
+                                      enum cuda_energy_limit limit, struct sadmm_error *error)
 {
     TRY(CUDA(clear_primal)(c, measure, error));
+    const bool parts = c->fast && goes_on;
     while (count > 0) {
         if (c->fast && c->exact_since == RELAX_RESIDUAL_PERIOD) {
             TRY(CUDA(enqueue_momentum_residuals)(c, error));
             c->exact_since = 0;
         }
         const int left = c->fast ? RELAX_RESIDUAL_PERIOD - c->exact_since : count, now = count < left ? count : left;
-        const bool goes_on = now < count;
-        TRY(iterations_of_tier(c, now, measure && !goes_on, goes_on ? LIMIT_NONE : limit, goes_on, error));
+        const bool last = now == count;
+        const int whole = parts && last ? now - 1 : now;
+        if (whole > 0)
+            TRY(iterations_of_tier(c, whole, measure && last, last ? limit : LIMIT_NONE, parts || !last, error));
+        if (parts && last) TRY(CUDA(parting_iteration)(c, error));
         if (c->fast) c->exact_since += now;
         count -= now;
     }
@@ -75,11 +79,12 @@ sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool m
     return SADMM_OK;
 }
 
-extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
+extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool goes_on, bool measure,
+                                      struct sadmm_error *error)
 {
     if (count <= 0) return SADMM_OK;
     CUDA_ENTER(c);
-    return CUDA(enqueue_iterations)(c, count, measure, LIMIT_NONE, error);
+    return CUDA(enqueue_iterations)(c, count, goes_on, measure, LIMIT_NONE, error);
 }
 
 /* ---- residuals ------------------------------------------------------------------------------------------------ */

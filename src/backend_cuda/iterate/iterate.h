@@ -7,7 +7,7 @@
 /* ---- iterate.cu, residuals.cu, stop_rule.cu, energy_limit.cu ---- */
 
 /* Iterations, as the entry; limit: what is wanted for the energy limit after the last. */
-sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, enum cuda_energy_limit limit,
+sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool goes_on, bool measure, enum cuda_energy_limit limit,
                                       struct sadmm_error *error);
 /* (16) and (17) of the iteration that was measured, into view.iteration.residual. */
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
@@ -30,6 +30,8 @@ sadmm_status CUDA(enqueue_energy_limit)(struct sadmm_context *, bool candidates,
 /* STREAM. fast, goes_on: none of them is the batch's last. */
 sadmm_status CUDA(stream_iterations)(struct sadmm_context *, int count, bool measure, bool goes_on,
                                      struct sadmm_error *error);
+/* Before weight updates: the last iteration of a batch that goes on for islands that start warm. */
+sadmm_status CUDA(parting_iteration)(struct sadmm_context *, struct sadmm_error *error);
 /* Before a measured iteration: its primal residual. */
 sadmm_status CUDA(clear_primal)(struct sadmm_context *, bool measure, struct sadmm_error *error);
 

@@ -163,7 +163,7 @@ static __device__ __forceinline__ void restore_island(const island_view &islands
         struct island_energies energies = energies_of(term);
         double along = term[4];
         energy_limit_subtract_rigid(&energies, &along, &rigid);
-        factor = factor_of(energies, along, rebounds);
+        factor = factor_of(energies, along, rebounds && island->warm);
         if (factor != 1) atomicAdd(islands.limited, 1);
         if (!slows) factor = 1;
     }

@@ -156,7 +156,7 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
         block.flags[FLAG_FLOATING] = begins || args.energy_limit != LIMIT_WHOLE ? 0 : *v.islands.floating;
     }
     if constexpr (PROLOGUE)
-        if (begins) store_first_terms(v, block, part.found);
+        if (begins) store_first_terms(v, args, block, part.found);
     part.fetch_side(); /* on its way while islands are weighed */
     if constexpr (PROLOGUE)
         if (begins) {

@@ -157,7 +157,8 @@ PART __device__ __forceinline__ bool PART_RUN::has_candidate(int32_t odd) const
             else if (live && r < 6) a[k] = (double)line_a(m.lines + at * LINE_GENERAL, true, r, r / 3 * 3 + k);
         }
         const double velocity = live && r < 6 ? (double)state(odd)[i * ROW + r] : 0;
-        any = is_candidate(args.rebounds, speaks, free, velocity, b, a) || any;
+        const bool warm = args.rebounds && speaks && v.islands.info[v.graph.label[raw]].warm;
+        any = is_candidate(args.rebounds, warm, speaks, free, velocity, b, a) || any;
     }
     return any;
 }

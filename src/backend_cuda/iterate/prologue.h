@@ -50,10 +50,10 @@ static __device__ __forceinline__ void store_terms(const graph_view &graph, cons
 }
 
 /* What a solve begins with: terms of its bodies; then the weights, C and factors that follow. */
-static __device__ __forceinline__ void store_first_terms(const cuda_view &v, const block_part &part,
-                                                         const body_thread &own)
+static __device__ __forceinline__ void store_first_terms(const cuda_view &v, const cuda_args &args,
+                                                         const block_part &part, const body_thread &own)
 {
-    store_terms(v.graph, part, own, [&](const body_thread &t) { return terms_of_body<false, true, false>(v, t); });
+    store_terms(v.graph, part, own, [&](const body_thread &t) { return terms_of_body<false, true, false>(v, args, t); });
 }
 template <class Barrier>
 static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const cuda_args &args, const block_part &part,
@@ -66,7 +66,7 @@ static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const 
         const int32_t first = t.live ? part.range[i].first : 0;
         cuda_island island;
         double C[PACKED];
-        weigh_island<false>(&island, part.terms + first * TERMS, args);
+        const bool cold = weigh_island<false>(&island, part.terms + first * TERMS, args);
         const bool own_sides = i < (int32_t)blockDim.x / LANES;
         weighted_matrix<true>(v, t,
                               own_sides ? fetched : fetch_sides(v.model, v.graph, v.contacts, v.weights, t, t.begin),
@@ -74,6 +74,7 @@ static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const 
         if (!t.live) return;
         if (i == first && t.lane == 0) {
             v.islands.info[v.graph.label[t.body]] = island;
+            if (cold) v.model.statistics->cold = 1;
             part.flags[island.anchored] = 1; /* FLAG_FLOATING or FLAG_ANCHORED: a choice would take registers */
         }
         factor_rigid(v.bodies, t.body, t.lane, C);

@@ -7,17 +7,18 @@
 
 #include "core/math/energy_limit.h"
 
-/* Has a body more energy than its free motion, `free`, or, where `rebounds` is set, does it rebound? `velocity`, `b`
- * and `a`: the lane's components and row of A (three numbers of it for rigid bodies). `speaks`: one lane of each body,
- * the others say no. Every lane of the warp comes here. */
+/* Has a body more energy than its free motion, `free`, or, where `rebounds` is set (in every lane or none) and its
+ * island starts `warm`, does it rebound? `velocity`, `b` and `a`: the lane's components and row of A (three numbers of
+ * it for rigid bodies). `speaks`: one lane of each body, the others say no. Every lane of the warp comes here. */
 template <int SIZE>
-static __device__ __forceinline__ bool is_candidate(bool rebounds, bool speaks, double free, double velocity,
-                                                    double b, const double (&a)[SIZE])
+static __device__ __forceinline__ bool is_candidate(bool rebounds, bool warm, bool speaks, double free,
+                                                    double velocity, double b, const double (&a)[SIZE])
 {
     const double now = dot_lanes(velocity, product(velocity, a)) / 2,
                  along = rebounds ? dot_lanes(velocity, b) / 2 : 0;
     return speaks &&
-           (energy_limit_exceeded(now, free) || (rebounds && energy_limit_rebounds(now, free, along, SOLVER_EPSILON)));
+           (energy_limit_exceeded(now, free) ||
+            (rebounds && warm && energy_limit_rebounds(now, free, along, SOLVER_EPSILON)));
 }
 
 /* Where a body is from the one that names its island. */

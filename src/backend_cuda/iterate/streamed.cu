@@ -33,11 +33,18 @@ static __device__ __forceinline__ void load_numbers_once(real (&to)[4 * COUNT], 
     unpack(to, four);
 }
 
-/* How far a part of the iteration goes. */
+/* How far a part of the iteration goes in the island of a body. */
 template <bool FAST>
-static __device__ __forceinline__ real relaxed(const model_view &model, const cuda_args &args, enum cuda_relax what)
+static __device__ __forceinline__ real relaxed(const cuda_view &v, const cuda_args &args, enum cuda_relax what,
+                                               int32_t body)
 {
-    return FAST && args.relax & what ? (real)model.settings->relaxation : (real)1;
+    if (!FAST || !(args.relax & what)) return 1;
+    if (args.relax & RELAX_WARM && !v.islands.info[v.graph.label[body]].warm) return 1;
+    return (real)v.model.settings->relaxation;
+}
+static __device__ __forceinline__ int32_t first_dynamic(const model_view &model, int32_t a, int32_t b)
+{
+    return a < model.bodies ? a : b;
 }
 
 /* Step 1, two threads a body: components 0 to 2 by the one, 3 to 5 by the other. A record has force and torque in
@@ -103,7 +110,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const int32_t begin = live ? v.graph.offsets[i] : 0, end = live ? v.graph.offsets[i + 1] : 0;
     const real ratio = JOIN && args.rescaled ? (real)*v.iteration.ratio : (real)1,
                relaxation = FAST ? (real)v.model.settings->relaxation : (real)1,
-               multipliers = relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS);
+               multipliers = relaxed<FAST>(v, args, RELAX_MULTIPLIERS, (int32_t)at),
+               velocity = relaxed<FAST>(v, args, RELAX_VELOCITY, (int32_t)at);
     const solver_real *line = v.bodies.lines + at * LINE;
     solver_real *const b_row = (FAST ? v.bodies.momentum_residual : v.bodies.b) + at * ROW,
                 *const state_row = v.bodies.state + at * ROW;
@@ -153,7 +161,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const real before = own_of(half, state[q], state[q + HALF]),
                    whole = product_with_row(h_of(q, 0), h_of(q, 1), h_of(q, 2), h_of(q, 3), h_of(q, 4), h_of(q, 5),
                                             all);
-        after[q] = FAST ? fused(args.relax & RELAX_VELOCITY ? relaxation : (real)1, whole, before) : before + whole;
+        after[q] = FAST ? fused(velocity, whole, before) : before + whole;
         step[q] = after[q] - before;
         stays = stays && fused(real_max(1, relaxation), whole, before) == before;
     }
@@ -193,7 +201,6 @@ static __global__ void __launch_bounds__(THREADS)
     constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const pair_thread t = pair_of<LANES_A_PAIR>(v.model, thread_index(args));
-    const real relaxation_factor = relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS);
     swept_pair<COUNT> pair;
     double primal = 0;
     if (t.there) pair = fetch_pair<LANES_A_PAIR, COUNT, FAST>(v.contacts, t.p, t.lane);
@@ -202,8 +209,10 @@ static __global__ void __launch_bounds__(THREADS)
     if (FAST && all_stopped(v.islands, args.checks)) return;
     if (t.there) {
         const bool on = t.live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, pair.ends));
+        const real factor = relaxed<FAST>(v, args, RELAX_MULTIPLIERS,
+                                          first_dynamic(v.model, pair.ends.body_a, pair.ends.body_b));
         primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, pair,
-                                                                t.lane, on, relaxation_factor);
+                                                                t.lane, on, factor);
     }
     if (MEASURE) reduce_max(primal, v.iteration.residual);
 }
@@ -220,7 +229,9 @@ static __global__ void __launch_bounds__(THREADS)
     if (k < live_rows(v.model, v.rows) &&
         !(FAST && rows_stopped(v.model, v.graph, v.islands, args.checks, v.rows.constraints[k])))
         primal = sweep_rows<MEASURE, FAST>(v.model, v.bodies, v.rows, v.iteration, k,
-                                           relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS));
+                                           relaxed<FAST>(v, args, RELAX_MULTIPLIERS,
+                                                         first_dynamic(v.model, v.rows.constraints[k].body_a,
+                                                                       v.rows.constraints[k].body_b)));
     if (MEASURE) reduce_max(primal, v.iteration.residual);
 }
 
@@ -422,6 +433,15 @@ static sadmm_status make_graph(struct sadmm_context *c, struct sadmm_error *erro
         return CUDA(fail)(c, code, "cudaGraphInstantiate", error);
     }
     c->graph_valid = true;
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(parting_iteration)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    TRY(prepare_stepwise(c, error));
+    TRY(launch_constraints(c, false, RELAX_MULTIPLIERS | RELAX_WARM, false, error));
+    TRY(launch_bodies(c, false, RELAX_MULTIPLIERS | (c->step1_done ? RELAX_VELOCITY : 0) | RELAX_WARM, true, error));
+    c->step1_done = true;
     return SADMM_OK;
 }
 

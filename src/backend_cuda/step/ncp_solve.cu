@@ -132,7 +132,7 @@ static __global__ void begin_kernel(const __grid_constant__ cuda_view v, const _
         if (v.graph.island_bodies[i] <= NCP_BODIES) v.ncp.islands[atomicAdd(v.ncp.count, 1)] = i;
         else *v.ncp.unsolved = 1;
     }
-    if (v.islands.info && v.graph.label[i] == i) v.islands.info[i] = {weight_new_island(), 0, 1, 1, 0, 0, 0};
+    if (v.islands.info && v.graph.label[i] == i) v.islands.info[i] = {weight_new_island(), 0, 1, 1, 0, 0, 0, 0};
 }
 
 /* ---- where the step reads it ------------------------------------------------------------------------------------- */

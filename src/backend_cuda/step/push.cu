@@ -271,7 +271,7 @@ void CUDA(plan_second)(struct sadmm_context *c, bool warm)
     p->plan = c->plan;
     if (p->plan.points == 0) p->plan.points = 1; /* they come in a later sub-step */
     p->plan.row_constraints = 0;
-    sadmm_plan_complete(&p->plan, &settings, warm);
+    sadmm_plan_complete(&p->plan, &settings, warm, false);
     CUDA(plan_settings)(p, &settings);
     p->view.model.warm_start = p->plan.warm_start;
     p->view.model.contact_rows = c->view.model.contact_rows;
@@ -286,7 +286,7 @@ void CUDA(view_push)(struct sadmm_context *c)
     int32_t *due = buffer<int32_t>(c, BUFFER_PUSH);
     *push = none;
     if (!due) return; /* nothing is planned yet */
-    if (!push_is_apart(true, s->bodies, s->kinematic)) return;
+    if (!push_is_apart(true, s->copies > 0 ? s->bodies / s->copies : s->bodies, s->kinematic)) return;
     push->due = due;
     push->units = (unsigned long long *)(due + PUSH_NUMBERS);
     push->bits = (int32_t *)(push->units + n);

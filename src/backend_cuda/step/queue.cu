@@ -123,6 +123,16 @@ static void see_pushes(struct sadmm_context *c, const struct cuda_step_report *r
     s->pushes = s->planned = false;
 }
 
+/* A step was done that was planned to have islands that start cold. */
+static void see_cold(struct sadmm_context *c, const struct cuda_step_report *report)
+{
+    struct cuda_step *s = c->step;
+    if (!s->cold || !c->settings.warm_start) return;
+    s->warm = report->totals.cold > 0 ? 0 : s->warm + 1;
+    if (s->warm < WARM_STEPS) return;
+    s->cold = s->planned = false;
+}
+
 /* A step was done. */
 static void see_hits(struct sadmm_context *c, const struct cuda_step_report *report)
 {
@@ -178,6 +188,10 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         s->push_streams = s->push_streams || report->totals.pushed < 0;
         s->quiet = 0;
     }
+    if (report->totals.cold > 0) {
+        s->cold = true;
+        s->warm = 0;
+    }
     if (report->abort_code == ABORT_HITS) CUDA(plan_hits)(c);
     else if (report->abort_code == ABORT_REACH) s->conservative = CONSERVATIVE_STEPS;
     else if (together) s->learned.step = -1; /* nothing is known of it with its rows */
@@ -221,6 +235,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     if (s->conservative > 0 && --s->conservative == 0) s->planned = false;
     see_articulations(c, &report);
     see_pushes(c, &report);
+    see_cold(c, &report);
     see_hits(c, &report);
     /* A plan with far too large capacities wastes launches. */
     if (report.counts.pairs < c->view.contacts.pair_capacity / 4 - 256) s->planned = false;

@@ -96,6 +96,7 @@ static void view_substep(struct sadmm_context *c, int substep)
     c->plan = plan->plan;
     s->speculation.contact_rows = plan->contact_rows;
     s->speculation.warm = plan->warm;
+    s->speculation.cold = s->cold;
     s->speculation.rows = plan->rows;
     c->view.model.contact_rows = plan->contact_rows == 1 ? 1 : 3;
     CUDA(view_into)(c, s->into, substep);
@@ -346,7 +347,8 @@ static sadmm_status record_solving(struct sadmm_context *c, const struct sadmm_s
 {
     switch (stage->kind) {
     case SADMM_STAGE_ITERATE:
-        return CUDA(enqueue_iterations)(c, stage->count, stage->measure && (stage->last || !stop_rule_checked(c)),
+        return CUDA(enqueue_iterations)(c, stage->count, stage->goes_on,
+                                        stage->measure && (stage->last || !stop_rule_checked(c)),
                                         stage->last || stage->checked ? limit : LIMIT_NONE, error);
     case SADMM_STAGE_RESIDUALS: /* not reported where islands stop by themselves */
         *residuals = stage->last && !stop_rule_checked(c);

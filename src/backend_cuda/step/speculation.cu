@@ -81,14 +81,15 @@ struct substep_plan CUDA(plan_of)(const struct sadmm_context *c, int32_t pairs, 
     struct sadmm_plan plan = {};
     plan.bodies = s->bodies;
     plan.pairs = pairs;
-    plan.points = points;
+    plan.points = s->copies > 0 ? std::max(points, 1) : points;
     plan.row_constraints = joints->constraints;
-    plan.contact_rows = plan_contact_rows(plan.points, statistics->rough);
+    plan.contact_rows =
+        s->copies > 0 ? (int)PLAN_CONTACT_ROWS_OF_COPIES : plan_contact_rows(plan.points, statistics->rough);
     plan.rigid = true;
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
     plan.threads = 1;
     sadmm_plan_complete(&plan, &c->settings,
-                        plan_mostly_warm(plan.pairs + joints->constraints, statistics->warm + joints->warm));
+                        plan_mostly_warm(plan.pairs + joints->constraints, statistics->warm + joints->warm), !s->cold);
     const int32_t warm = sadmm_plan_depends_on_warmth(&c->settings) ? plan.warm : -1;
     const struct substep_plan out = {plan, plan.contact_rows, warm, s->joints > 0 ? joints->constraints > 0 : -1};
     return out;
@@ -102,6 +103,17 @@ void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_g
     a->island_sides = std::max(a->island_sides, b->island_sides);
     a->island_bodies = std::max(a->island_bodies, b->island_bodies);
     a->point_slots = std::max(a->point_slots, b->point_slots);
+}
+
+/* Where most constraints are cold some islands are; whether any is will be known once they are weighed. */
+static void see_start(struct sadmm_context *c, const struct speculated_step *seen)
+{
+    struct cuda_step *s = c->step;
+    if (c->settings.warm_start && plan_mostly_warm(seen->live.pairs + seen->joints.constraints,
+                                                   seen->statistics.warm + seen->joints.warm))
+        return;
+    s->cold = true;
+    s->warm = 0;
 }
 
 /* Plans of the sub-steps, and the most that any of them is known to need. */
@@ -156,15 +168,18 @@ sadmm_status CUDA(speculate)(struct sadmm_context *c, struct sadmm_error *error)
     struct speculated_step seen;
     for (s->apart = s->untouched >= s->backoff;; s->apart = false) {
         TRY(speculate_contacts(c, &seen, error));
+        see_start(c, &seen);
         plan_substeps(c, &seen);
         if (!s->apart || CUDA(may_be_apart)(c)) break; /* settings may be other than they were */
     }
     s->speculation.apart = s->apart;
     s->speculation.contact_rows = s->plans[0].contact_rows;
+    s->speculation.copies = s->copies > 0;
     s->speculation.point_slots = seen.statistics.point_slots <= 1   ? 1
                                  : seen.statistics.point_slots <= 4 ? 4
                                                                     : SADMM_MAX_POINTS;
     s->speculation.warm = s->plans[0].warm;
+    s->speculation.cold = s->cold;
     s->speculation.rows = s->plans[0].rows;
     CUDA(view_counts)(c, generous(seen.counts.pairs));
     c->view.model.points = 0; /* results are read elsewhere */

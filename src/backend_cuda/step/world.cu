@@ -126,6 +126,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     }
     struct cuda_step *s = c->step;
     s->bodies = (int32_t)n;
+    s->copies = world->copies;
     s->slots = (int32_t)slots;
     const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     s->last_settings = *settings;
@@ -138,8 +139,8 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->conservative = 0;
     s->updated_steps = 0;
     s->apart = false;
-    s->quiet = 0;
-    s->push_streams = false;
+    s->quiet = s->warm = 0;
+    s->cold = s->push_streams = false;
     s->hits_planned = s->last_hits = false;
     s->calm = 0;
     s->untouched = 0;

@@ -50,6 +50,8 @@ enum { LEAST_BACKOFF = 16, MOST_BACKOFF = 1 << 16 };
 /* Steps without a push until they are planned to have none: to plan takes what a second problem's empty kernels do in
  * as many. */
 enum { QUIET_STEPS = 32 };
+/* The same of islands that start cold: their weight updates part the iterations. */
+enum { WARM_STEPS = 32 };
 /* The same of hits, whose empty kernels take less. */
 enum { CALM_STEPS = 256 };
 
@@ -62,6 +64,7 @@ struct ncp_block_memory {
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
     int32_t bodies, slots, kinematic;
+    int32_t copies;             /* equal worlds that it is; 0: none of these */
     int32_t joints, joint_constraints, couplings, gears;
     bool tables;                /* some joint has one of a spring */
     int32_t articulations;      /* how many (articulation.cu); */
@@ -83,6 +86,9 @@ struct cuda_step {
     int32_t quiet;              /* but none has been for so many steps */
     struct sadmm_context *push; /* of that; made with the first one */
     unsigned long long some_pushed; /* the condition of that in the sub-step that is recorded (device/condition.h) */
+
+    bool cold;                  /* planned: some islands may start cold, and their weights are updated; */
+    int32_t warm;               /* but none has for so many steps */
 
     bool hits_planned;          /* hits are searched for, where the world has any (takes_hits), */
     int32_t calm;               /* but no pair has been fast for so many steps */

@@ -43,7 +43,8 @@ static __device__ __noinline__ double most_of(const body_view &bodies, const con
     return weight_most(constraints, mass, (int)contacts.difference[p].w);
 }
 
-/* B of the pair of the lane's side. Both of its sides work it out; the one at its first dynamic body keeps it. */
+/* B of the pair of the lane's side. Both of its sides work it out; the one at its first dynamic body keeps it, but in
+ * islands that keep their weights. */
 static __device__ __forceinline__ double weigh_side(const model_view &model, const body_view &bodies,
                                                     const contact_view &contacts, const weight_view &weights,
                                                     const eight_sides &sides, const cuda_island &island, bool first)
@@ -56,7 +57,7 @@ static __device__ __forceinline__ double weigh_side(const model_view &model, con
                  taken = scale > 0 ? weights.weight[p]
                                    : weight_of_pair(&island.weights, load, most, response),
                  B = scale > 0 ? taken * scale : taken;
-    if (sides.code & 1 && a) return B;
+    if ((sides.code & 1 && a) || (!first && island.warm)) return B;
     contacts.inv_s[p] = (solver_real)(both ? B / 2 : B);
     if (!(scale > 0)) weights.weight[p] = taken;
     if (first && bodies.rigid)

@@ -2,6 +2,7 @@
  * a step, and H only preconditions (the fixed point of Step 1 does not depend on it). */
 #include "backend_cuda/device/double.h"
 #include "factor.h"
+#include "weigh.h"
 #include "weight.h"
 #include "backend_cuda/device/plan_check.h"
 #include "backend_cuda/device/wide.h"
@@ -117,12 +118,17 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const body_thread t = body_of_thread(v.model, v.graph);
     const cuda_island none = {};
     double C[PACKED], beta = 1;
+    bool live = t.live;
     if (PENALTY) {
-        if (FORM == PLAIN) penalty_matrix(v, t, C);
-        else
+        if (FORM == PLAIN) {
+            penalty_matrix(v, t, C);
+        } else {
+            const cuda_island island = t.live ? v.islands.info[v.graph.label[t.body]] : none;
             weighted_matrix<FORM == CLOSED>(v, t, fetch_sides(v.model, v.graph, v.contacts, v.weights, t, t.begin),
-                                            t.live ? v.islands.info[v.graph.label[t.body]] : none, args.start, C);
-        if (t.live) {
+                                            island, args.start, C);
+            live = t.live && is_weighed(&island, args);
+        }
+        if (live) {
             if (FORM == PLAIN) beta = penalty_of(v.model, v.bodies, v.bodies.lines + t.body * (size_t)v.bodies.line, C);
             if (t.lane == 0) v.bodies.beta[t.body] = beta;
 #pragma unroll
@@ -133,11 +139,11 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         beta = v.bodies.beta[t.body];
         for (int k = 0; k < PACKED; ++k) C[k] = v.bodies.C[t.body * PACKED + (size_t)k];
     }
-    if (FACTOR && t.live && FORM == PLAIN && inertia_drowns(v.bodies, t.body, beta, C))
+    if (FACTOR && live && FORM == PLAIN && inertia_drowns(v.bodies, t.body, beta, C))
         packed_round_up(C, SOLVER_EPSILON); /* `fast`: its C is */
-    if (FACTOR && t.live && (FORM == CLOSED || (FORM == WEIGHTED && body_has_closed_form(v, t))))
+    if (FACTOR && live && (FORM == CLOSED || (FORM == WEIGHTED && body_has_closed_form(v, t))))
         factor_rigid(v.bodies, t.body, t.lane, C);
-    else if (FACTOR && t.live) factor_body(v.bodies, t.body, t.lane, beta, C);
+    else if (FACTOR && live) factor_body(v.bodies, t.body, t.lane, beta, C);
     if (args.planned) check_plan(v.model, v.iteration, v.step);
 }
 

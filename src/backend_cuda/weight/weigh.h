@@ -29,24 +29,33 @@ static inline __device__ double violation_of(const body_view &bodies, const cont
     return sum;
 }
 
-/* Of the terms of a body before there are weight scales: what anchors its island. */
-enum { TERM_ANCHORED = 4 };
+/* Of the terms of a body before there are weight scales: what anchors its island; the balance of weight_starts_warm. */
+enum { TERM_ANCHORED = 4, TERM_BALANCE };
 
-/* What follows from the sums over an island. */
+/* Are there new weights for constraints of an island: the first ones, or updates? */
+static __device__ __forceinline__ bool is_weighed(const cuda_island *island, const cuda_args &args)
+{
+    return args.start || !island->warm;
+}
+
+/* What follows from the sums over an island. Returns whether it starts cold. */
 template <bool SCALES>
-static __device__ __forceinline__ void weigh_island(cuda_island *island, const double sum[TERMS], const cuda_args &args)
+static __device__ __forceinline__ bool weigh_island(cuda_island *island, const double sum[TERMS], const cuda_args &args)
 {
     static_assert(sizeof(struct weight_sums) == TERMS * sizeof(double), "a term for each");
     const struct weight_sums sums = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5]};
     /* while there are no scales, the terms of these are others */
     const cuda_island fresh = {weight_new_island(), 0, 1, !SCALES && sum[TERM_ANCHORED] > 0, 0, 0,
+                               !SCALES && args.may_be_warm && weight_starts_warm(sum[TERM_BALANCE]),
                                !SCALES && sum[TERM_ANCHORED] >= 1};
     if (args.start) *island = fresh;
-    weight_update_speed(&island->weights, &sums, args.spring_iterations);
-    if (!SCALES || island->rows) return;
+    if (!is_weighed(island, args)) return false;
+    weight_update_speed(&island->weights, &sums, island->warm ? args.spring_iterations : 0);
+    if (!SCALES || island->rows) return !island->warm;
     /* those that stagnate keep their weights, times what the weight scale has risen by since they were taken */
     const double rise = weight_update_scale(&island->weights, &sums);
     island->scale_weights = (island->scale_weights > 0 ? island->scale_weights : 1) * rise;
+    return true;
 }
 
 /* Component `lane`, below 6, of J^T lambda on side `code` of a row block; of its place for rows that it does not have,
@@ -63,15 +72,17 @@ static inline __device__ double row_side_number(const contact_view &contacts, co
     return sum;
 }
 
-/* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes, in lane SIDE_ANCHORS how
- * many sides anchor it. ROWS: there may be row blocks; then every lane of the warp comes here. */
+/* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes, and in *balance sides that
+ * carry an impulse, less those that do not; in lane SIDE_ANCHORS how many sides anchor it. ROWS: there may be row
+ * blocks; then every lane of the warp comes here. */
 template <bool ROWS>
 static __device__ __forceinline__ double sum_sides(const graph_view &graph, const contact_view &contacts,
                                                    const row_view &rows, const weight_view &weights,
-                                                   const body_thread &t)
+                                                   const body_thread &t, int32_t *balance)
 {
     enum { AT_ONCE = 4 };
     double sum = 0;
+    *balance = 0;
     for (int32_t first = t.begin; ROWS ? __ballot_sync((unsigned)ALL_LANES, first < t.end) != 0 : first < t.end;
          first += AT_ONCE) {
         double number[AT_ONCE];
@@ -89,20 +100,27 @@ static __device__ __forceinline__ double sum_sides(const graph_view &graph, cons
             const double x = __shfl_sync((unsigned)ALL_LANES, number[j], 0, LANES),
                          y = __shfl_sync((unsigned)ALL_LANES, number[j], 1, LANES),
                          z = __shfl_sync((unsigned)ALL_LANES, number[j], 2, LANES);
-            if (t.lane == SIDE_PUSH && code[j] / 2 >= contacts.pair_capacity) number[j] = sqrt(x * x + y * y + z * z);
+            const bool turns = any_of_lanes(t.lane >= 3 && t.lane < 6 && number[j] != 0);
+            if (t.lane != SIDE_PUSH || code[j] / 2 < contacts.pair_capacity) continue;
+            number[j] = sqrt(x * x + y * y + z * z);
+            *balance += turns && !(number[j] > 0) ? 2 : 0; /* a couple pushes nothing */
         }
 #pragma unroll
-        for (int32_t j = 0; j < AT_ONCE; ++j) sum += number[j];
+        for (int32_t j = 0; j < AT_ONCE; ++j) {
+            sum += number[j];
+            *balance += code[j] < 0 ? 0 : number[j] > 0 ? 1 : -1;
+        }
     }
     return sum;
 }
 
-/* Terms of a body (struct weight_sums; the last two: SCALES), one a lane, and its momentum residual r = b + g - A v,
- * g = J^T lambda. A pair counts at its first dynamic body. Every lane of the warp comes here. */
+/* Terms of a body (struct weight_sums; the last two: SCALES), one a lane, and, where its weights are new, its momentum residual
+ * r = b + g - A v, g = J^T lambda. A pair counts at its first dynamic body. Every lane of the warp comes here. */
 template <bool SCALES, bool RIGID, bool ROWS>
-static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const body_thread &t)
+static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const cuda_args &args, const body_thread &t)
 {
     double violation = 0, term[TERMS] = {};
+    int32_t balance;
     for (int32_t at = t.begin + t.lane; SCALES && at < t.end; at += LANES) {
         const int32_t code = v.graph.incident[at], p = code / 2;
         if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.bodies[p].body_a)))
@@ -110,18 +128,20 @@ static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const
         violation += violation_of(v.bodies, v.contacts, v.weights, p);
     }
     const wide_row<RIGID> row = row_of_body<RIGID>(v.bodies, t);
-    const double sum = sum_sides<ROWS>(v.graph, v.contacts, v.rows, v.weights, t), g = t.lane < 6 ? sum : 0,
+    const double sum = sum_sides<ROWS>(v.graph, v.contacts, v.rows, v.weights, t, &balance), g = t.lane < 6 ? sum : 0,
                  momentum = product(row.velocity, row.a);
     term[0] = dot_lanes(g, product(g, row.a_inverse));
     term[1] = t.live ? mass_of(v.bodies, t.body) : 0;
     term[2] = dot_lanes(row.velocity, momentum);
     term[3] = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_PUSH, LANES);
     const double r = row.b + g - momentum;
-    if (t.live) v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)(t.lane < 6 ? r : 0);
+    if (t.live && (args.start || !v.islands.info[v.graph.label[t.body]].warm))
+        v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)(t.lane < 6 ? r : 0);
     if (!SCALES) {
         /* a body that nothing touches moves as it should */
         const double anchors = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_ANCHORS, LANES);
         term[TERM_ANCHORED] = t.live && t.begin == t.end ? 1 : anchors;
+        term[TERM_BALANCE] = __shfl_sync((unsigned)ALL_LANES, balance, SIDE_PUSH, LANES);
     } else {
         sum_lanes<1>(&violation);
         term[4] = dot_lanes(r, product(r, row.a_inverse));

@@ -54,10 +54,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const body_thread t = body_of_thread(v.model, v.graph);
     double total[TERMS];
     const double term =
-        v.bodies.rigid ? terms_of_body<SCALES, true, ROWS>(v, t) : terms_of_body<SCALES, false, ROWS>(v, t);
+        v.bodies.rigid ? terms_of_body<SCALES, true, ROWS>(v, args, t) : terms_of_body<SCALES, false, ROWS>(v, args, t);
     if (add_up_island<add_terms>(v.graph, v.islands, t, t.live, term, total) && t.lane == 0) {
         cuda_island *island = &v.islands.info[v.graph.label[t.body]];
-        weigh_island<SCALES>(island, total, args);
+        if (weigh_island<SCALES>(island, total, args)) v.model.statistics->cold = 1;
         if (!SCALES && args.start && !island->anchored) *v.islands.floating = 1;
     }
 }
@@ -103,6 +103,7 @@ static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, co
     pdl_trigger(v.model.bodies);
     if (about.rows == 0) return; /* a joint may have fewer than there is room for */
     cuda_island *island = &v.islands.info[label];
+    if (!is_weighed(island, args)) return;
     if (args.start) island->rows = island->anchored = island->anchored_outside = 1; /* left alone */
     if (args.start && v.push.bits) v.push.bits[label] = PUSH_ROWS;
     const double share = weight_share(&island->weights, sums.load2);
@@ -128,7 +129,8 @@ cuda_args CUDA(weight_args)(const struct sadmm_context *c)
 {
     cuda_args args = {};
     args.start = c->weight_updates == 0;
-    args.spring_iterations = weight_spring_iterations(c->plan.warm, c->plan.rigid, c->settings.iterations);
+    args.may_be_warm = plan_may_start_warm(&c->plan, &c->settings);
+    args.spring_iterations = weight_spring_iterations(true, c->plan.rigid, c->settings.iterations);
     args.row_floor = weight_row_floor(c->plan.rigid, c->settings.iterations);
     return args;
 }
@@ -158,7 +160,6 @@ sadmm_status CUDA(enqueue_loads)(struct sadmm_context *c, struct sadmm_error *er
     const int64_t blocks =
         ((int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes + BODY_THREADS - 1) / BODY_THREADS;
     ++c->weight_updates;
-    c->exact_since = 0;
     TRY(CUDA(launch_of)(c, pairs_kernel, "loads of pairs", blocks, BODY_THREADS, &args, error));
     return CUDA(enqueue_islands)(c, error);
 }

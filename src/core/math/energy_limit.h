@@ -15,7 +15,7 @@
  *
  *     v . A (v - v_f) <= W
  *
- * so that v ends on or in the sphere that has 0 and v_f at opposite ends, but for W. Few iterations in a step that
+ * so that v ends on or in the sphere that has 0 and v_f at opposite ends, but for W. Few iterations in an island that
  * starts warm are held to that, too, with all of W: what too large a W allows is limited by the above.
  *
  * What contacts cannot change is left alone. Of a floating island, which may move in ways no static contact feels

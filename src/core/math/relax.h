@@ -1,7 +1,8 @@
 /* What the method `fast` relaxes in a batch of `count` iterations, i = 0 .. count - 1.
  *
  * Steps 2-4 give lambda^ from (lambda, v), then Step 1 gives v^ from (v, 2 lambda^ - lambda); relaxed, lambda and v go
- * rho times as far. The last iteration is plain: the result is (lambda^, v^). The first Step 1 of a solve is plain too:
+ * rho times as far. The last iteration is plain: the result is (lambda^, v^). So is the one before a weight update, in
+ * islands that have one. The first Step 1 of a solve is plain too:
  * bodies without constraints are at A^-1 b then and stay there. */
 #ifndef SADMM_MATH_RELAX_H
 #define SADMM_MATH_RELAX_H

@@ -13,7 +13,7 @@
 
 #include "max.h"
 
-/* Iterations after which a step that started cold recomputes its weights, from the loads it has found by then: 5, 10,
+/* Iterations after which an island that started cold gets new weights, from the loads it has found by then: 5, 10,
  * 20, 40, and from there half as many again each time. Changes as late as that are small, and a change disturbs. */
 enum { WEIGHT_FIRST_UPDATE = 5, WEIGHT_DOUBLE_BELOW = 40 }; /* measured: bench/constants.py, cold */
 
@@ -128,7 +128,7 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
 
 /* ---- contacts as springs -----------------------------------------------------------------------------------------
  *
- * A step that starts warm goes on from the impulses of the last one, and its K iterations change them by B K x, x the
+ * An island that starts warm goes on from the impulses of the last step, and its K iterations change them by B K x, x the
  * velocity at the contact: from step to step a contact is a spring of stiffness B K / dt^2. At rest B is the load over
  * g dt. A column of n bodies on such springs buckles under its own weight (Euler) where
  *
@@ -148,7 +148,11 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
 #define WEIGHT_SEPARATION_NEED 3.3333333333333335 /* measured: bench/constants.py, heaps standing */
 #define WEIGHT_SEPARATION_LEAST 0.001 /* measured: bench/constants.py, heaps standing */
 
-/* K of a step whose contacts are springs, 0: they are none. A problem that is solved in short batches is no row of
+/* Does an island start warm: do at least half of its constraints? `balance`: of their sides on dynamic bodies those that
+ * start with an impulse, less those that start without. */
+SADMM_INLINE int weight_starts_warm(double balance) { return balance >= 0; }
+
+/* K of an island whose contacts are springs, 0: they are none. A problem that is solved in short batches is no row of
  * steps: this is for worlds (`rigid`). */
 SADMM_INLINE int weight_spring_iterations(int warm, int rigid, int iterations)
 {

@@ -16,7 +16,8 @@
 
 /* On `cuda` iterations of larger worlds, and of those with kinematic bodies, are launched one by one, where a second
  * problem takes as long as the first: they have their pushes in v. By the world's size alone, so that no partition, no
- * device and no way to drive a step changes a result. */
+ * device and no way to drive a step changes a result; bodies: of one of equal worlds, which does not depend on how many
+ * there are. */
 enum { PUSH_CUDA_MOST_BODIES = 8192 };
 
 SADMM_INLINE bool push_is_apart(bool cuda, int32_t bodies, int32_t kinematic)

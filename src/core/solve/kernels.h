@@ -6,13 +6,13 @@
  * State of the iteration (docs/internals/algorithm.md): v per body, lambda per constraint, and what the next Step 1
  * needs. Between init_penalty and read_solution the schedule is
  *
- *     repeat: update_velocity; update_constraints(measure)      or, fused: iterate(count, measure)
+ *     repeat: update_velocity; update_constraints(measure)      or, fused: iterate(count, goes_on, measure)
  *     after a measured iteration: measure_residuals; then update_penalty(ratio); factorize
  *
  * The method FAST is iterated by `iterate` alone (update_velocity and update_constraints refuse it): an iteration is
  * Steps 2-4, then Step 1, and what is relaxed depends on how far a batch still goes (math/relax.h). update_weights and
- * factorize may follow a batch in the place of update_penalty, and limit_energy ends the step's iterations,
- * of either method.
+ * factorize may follow a batch in the place of update_penalty: such a batch `goes_on`: of islands whose weights stay
+ * its last iteration is none, so that they are solved as if there were no update. limit_energy ends the step's iterations, of either method.
  *
  * `measure` asks the iteration (for `iterate`: its last one) to keep what the residuals and a penalty update need; only
  * allowed when the plan's `residuals` is set.
@@ -45,13 +45,14 @@ struct sadmm_kernels {
 
     sadmm_status (*init_penalty)(struct sadmm_context *,
                                  struct sadmm_error *); /* E-G: C_i (14), beta_i (13); FAST: weights */
-    /* FAST, after iterations: weights from the multipliers found by now (math/weight.h). Then factorize. */
+    /* FAST, after iterations: weights from the multipliers found by now, of islands that started cold (math/weight.h).
+     * Then factorize. */
     sadmm_status (*update_weights)(struct sadmm_context *, struct sadmm_error *);
     sadmm_status (*factorize)(struct sadmm_context *, struct sadmm_error *);    /* H: of A_i + beta_i C_i */
 
     sadmm_status (*update_velocity)(struct sadmm_context *, struct sadmm_error *); /* I-K: Step 1 (6) */
     sadmm_status (*update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *); /* L-O: Steps 2-4 */
-    sadmm_status (*iterate)(struct sadmm_context *, int count, bool measure,
+    sadmm_status (*iterate)(struct sadmm_context *, int count, bool goes_on, bool measure,
                             struct sadmm_error *); /* (optional) fused */
 
     sadmm_status (*measure_residuals)(struct sadmm_context *, struct sadmm_residual *,

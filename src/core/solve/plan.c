@@ -45,15 +45,6 @@ static bool constraint_is_warm(const struct sadmm_rows *rows, const struct sadmm
     return any_nonzero(rows->lambda + constraint->first, constraint->count);
 }
 
-static bool any_is_warm(const struct sadmm_system *system)
-{
-    for (size_t p = 0; p < system->contacts->pair_count; ++p)
-        if (pair_is_warm(system->contacts, &system->contacts->pairs[p])) return true;
-    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k)
-        if (constraint_is_warm(system->rows, &system->rows->constraints[k])) return true;
-    return false;
-}
-
 struct warm_count {
     const struct sadmm_contact_set *contacts;
     size_t warm[SADMM_MOST_THREADS]; /* by each member */
@@ -68,19 +59,19 @@ static void count_warm(void *argument, int thread, int threads)
     count->warm[thread] = warm;
 }
 
-/* Does at least half of the constraints start with an impulse? Contacts count by pairs: the points of a pair that are
- * a little apart (the far edge of a leaning card) carry nothing, and do not make a settled scene a cold one. */
-static bool starts_warm(const struct sadmm_system *system, int plan_threads)
+/* Constraints, and those that start with an impulse. Contacts count by pairs: the points of a pair that are a little
+ * apart (the far edge of a leaning card) carry nothing, and do not make a settled scene a cold one. */
+static void count_constraints(const struct sadmm_system *system, int plan_threads, size_t *total, size_t *warm)
 {
     struct warm_count count;
-    size_t total = system->contacts->pair_count + sadmm_row_constraint_count(system), warm = 0;
+    *total = system->contacts->pair_count + sadmm_row_constraint_count(system);
+    *warm = 0;
     count.contacts = system->contacts;
     const int ran = sadmm_parallel(system->team, sadmm_pass_threads(plan_threads, system->contacts->pair_count),
                                    count_warm, &count);
-    for (int t = 0; t < ran; ++t) warm += count.warm[t];
+    for (int t = 0; t < ran; ++t) *warm += count.warm[t];
     for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k)
-        warm += constraint_is_warm(system->rows, &system->rows->constraints[k]);
-    return plan_mostly_warm((int64_t)total, (int64_t)warm);
+        *warm += constraint_is_warm(system->rows, &system->rows->constraints[k]);
 }
 
 bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count)
@@ -100,12 +91,11 @@ bool sadmm_plan_is_constrained(const struct sadmm_plan *plan) { return plan->poi
 
 bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings)
 {
-    bool when_cold =
-        settings->method == SADMM_METHOD_FAST || (may_update_penalty(settings) && !settings->penalty_update_warm);
-    return settings->warm_start && when_cold;
+    return settings->warm_start && may_update_penalty(settings) && !settings->penalty_update_warm;
 }
 
-void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm)
+void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm,
+                         bool all_warm)
 {
     bool constrained = sadmm_plan_is_constrained(plan);
     plan->warm_start = settings->warm_start;
@@ -113,7 +103,7 @@ void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *s
     plan->penalty_updates =
         constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
     bool fast = constrained && settings->method == SADMM_METHOD_FAST;
-    plan->weight_updates = fast && !plan->warm;
+    plan->weight_updates = fast && !(settings->warm_start && all_warm);
     plan->momentum = plan->rigid && plan->points > 0;
     plan->energy_limit = fast && plan->momentum;
     plan->certificate = settings->certify;
@@ -134,9 +124,10 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     plan.threads =
         sadmm_plan_threads(system->team, settings->threads, (size_t)plan.points + 4 * (size_t)plan.row_constraints);
     plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
-    sadmm_plan_complete(&plan, settings, settings->warm_start && starts_warm(system, plan.threads));
-    plan.initialise = settings->method == SADMM_METHOD_FAST && plan.points > 0 && system->first &&
-                      !(settings->warm_start && any_is_warm(system));
+    size_t constraints = 0, warm = 0;
+    if (settings->warm_start) count_constraints(system, plan.threads, &constraints, &warm);
+    sadmm_plan_complete(&plan, settings, plan_mostly_warm((int64_t)constraints, (int64_t)warm), warm == constraints);
+    plan.initialise = settings->method == SADMM_METHOD_FAST && plan.points > 0 && system->first && warm == 0;
     if (plan.initialise) plan.warm_start = true; /* initialised impulses are the system's start values then */
     return plan;
 }

@@ -21,11 +21,11 @@ struct sadmm_plan {
     bool rigid;             /* world level: bodies are given by their state, A is (m I, world inertia) */
     bool gyroscopic;        /* some body has unequal principal moments (world level) */
     bool warm_start;        /* take the system's start values */
-    bool warm;              /* ... and most constraints have one */
+    bool warm;              /* PAPER: ... and most constraints have one */
     bool penalty_updates;   /* eq. (15) will run at least once */
     bool initialise;        /* FAST: impulses are initialised (impulse_initialisation.h); never in steps that a backend
                                makes alone */
-    bool weight_updates;    /* FAST: weights are recomputed during the step */
+    bool weight_updates;    /* FAST: weights are recomputed during the step, of islands that start cold, if any does */
     bool energy_limit;      /* FAST: energies of islands under contacts alone are limited after the last iteration */
     bool momentum;          /* islands of rigid bodies under contacts keep what momentum no static contact may change */
     bool residuals;         /* some iteration is measured */
@@ -39,6 +39,10 @@ struct sadmm_plan {
 /* Rows of a geometric contact. contacts: how many there are; rough: how many of them, or of their pairs, have
  * friction. */
 SADMM_INLINE int plan_contact_rows(int64_t contacts, int64_t rough) { return contacts == 0 ? 0 : rough > 0 ? 3 : 1; }
+
+/* The same of equal worlds, of which no one's depend on another's; these are solved as if they had contacts, so that
+ * bodies in the air make as many iterations whether others have some or not. */
+enum { PLAN_CONTACT_ROWS_OF_COPIES = 3 };
 
 /* Do at least half of the constraints carry an impulse? */
 SADMM_INLINE bool plan_mostly_warm(int64_t constraints, int64_t warm)
@@ -56,11 +60,19 @@ int sadmm_plan_threads(const struct sadmm_team *team, int wanted, size_t points)
  * do. */
 int sadmm_pass_threads(int threads, size_t count);
 
-/* What follows from the settings once the counts and `contact_rows` are in; `mostly_warm`: at least half of the
- * constraints (contacts counted by pairs) carry an impulse. `threads` is left alone. */
-void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm);
+/* FAST: may islands start warm (math/weight.h)? Impulses that are initialised are cold ones. */
+SADMM_INLINE bool plan_may_start_warm(const struct sadmm_plan *plan, const struct sadmm_settings *settings)
+{
+    return settings->warm_start && !plan->initialise;
+}
 
-/* Does the number of warm constraints decide anything in a plan with contacts? */
+/* What follows from the settings once the counts and `contact_rows` are in. mostly_warm: at least half of the
+ * constraints (contacts counted by pairs) carry an impulse; all_warm: no island starts cold if any may start warm.
+ * `threads` is left alone. */
+void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm,
+                         bool all_warm);
+
+/* Does it decide anything in a plan with contacts whether most constraints are warm? */
 bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings);
 
 /* Does one of the bodies have unequal principal moments? */

@@ -27,7 +27,8 @@ struct sadmm_resident_gear;   /* core/model/gear_law.h */
 /* A world, from the host. */
 struct sadmm_resident_world {
     const struct sadmm_collision_input *input;       /* shapes, bodies by slot, overrides */
-    int32_t body_count;                              /* dynamic bodies */
+    int32_t body_count;                              /* dynamic bodies, */
+    int32_t copies;                                  /* of so many equal worlds; 0: it is none of these */
     const struct sadmm_rigid *rigid;                 /* (body_count) */
     const struct sadmm_extrapolation *extrapolation; /* (body_count) */
     const int32_t *slot_of;                          /* (body_count) body slot */

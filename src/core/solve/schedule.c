@@ -19,10 +19,10 @@ static sadmm_status init_penalty(struct sadmm_solve *s)
     return s->kernels->factorize(s->context, s->error);
 }
 
-static sadmm_status iterate(struct sadmm_solve *s, int count, bool measure)
+static sadmm_status iterate(struct sadmm_solve *s, int count, bool goes_on, bool measure)
 {
     const struct sadmm_kernels *k = s->kernels;
-    if (k->iterate) return k->iterate(s->context, count, measure, s->error);
+    if (k->iterate) return k->iterate(s->context, count, goes_on, measure, s->error);
     for (int i = 0; i < count; ++i) {
         TRY(k->update_velocity(s->context, s->error));
         TRY(k->update_constraints(s->context, measure && i + 1 == count, s->error));
@@ -167,7 +167,7 @@ sadmm_status sadmm_solve_stage(struct sadmm_solve *s, struct sadmm_stages *stage
     case SADMM_STAGE_ITERATE:
         s->report->iterations = stage->done;
         s->errors_known = false;
-        return iterate(s, stage->count, stage->measure);
+        return iterate(s, stage->count, stage->goes_on, stage->measure);
     case SADMM_STAGE_RESIDUALS: return measure(s, stages->batch.balance);
     case SADMM_STAGE_CHECK: return check_convergence(s, stage->last, &s->report->converged, &stages->stopped);
     case SADMM_STAGE_WEIGHTS: return update_weights(s);

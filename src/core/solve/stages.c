@@ -56,6 +56,7 @@ static int begin_batch(struct sadmm_stages *s)
     s->batch.balance = plan->penalty_updates && !s->batch.last && after % settings->penalty_period == 0;
     /* Asked for, they are those of the last iteration, and any check may end the iterations. */
     const bool may_end = s->batch.last || s->batch.check;
+    s->batch.goes_on = s->batch.weights && !s->batch.check && !s->batch.balance;
     s->batch.measure =
         plan->residuals && (s->batch.balance || (may_end && settings->measure_residuals) || s->batch.check);
     return count;
@@ -138,6 +139,7 @@ bool sadmm_stages_next(struct sadmm_stages *s, struct sadmm_stage *stage)
         stage->count = count;
         stage->measure = s->batch.measure;
         stage->done = s->batch.done;
+        stage->goes_on = s->batch.goes_on;
         stage->last = s->batch.last;
         stage->checked = s->batch.check;
         return true;

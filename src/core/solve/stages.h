@@ -37,7 +37,7 @@ enum sadmm_stage_kind {
     SADMM_STAGE_ITERATE,           /* I-O  Steps 1-4, `count` times */
     SADMM_STAGE_RESIDUALS,         /* N    eqs. (16), (17) of the last iteration */
     SADMM_STAGE_CHECK,             /* -    convergence: where the stop rule is met, no iteration follows */
-    SADMM_STAGE_WEIGHTS,           /* -    FAST: weights from the multipliers found so far; factors */
+    SADMM_STAGE_WEIGHTS,           /* -    FAST: weights from the multipliers found so far, where cold; factors */
     SADMM_STAGE_BALANCE,           /* P    eq. (15), and where it changes the penalty factors */
     SADMM_STAGE_ENERGY_LIMIT,      /* - momentum that no contact may change (math/momentum.h); FAST: energy
                                        (math/energy_limit.h) */
@@ -63,6 +63,7 @@ struct sadmm_stage {
     int count;    /* ITERATE: iterations */
     bool measure; /* ITERATE: the last of them keeps what RESIDUALS and BALANCE need */
     int done;     /* iterations that are done after this stage */
+    bool goes_on; /* ITERATE: nothing but WEIGHTS comes before the next iteration */
     bool last;    /* ITERATE to BALANCE: the budget is spent, no iteration follows */
     bool checked; /* ITERATE: a CHECK follows before any other iteration */
 };
@@ -78,7 +79,7 @@ struct sadmm_stages {
     int next;                              /* enum sadmm_stage_kind */
     struct {                               /* the iterations up to the next stage that needs their result */
         int done;
-        bool last, measure, check, weights, balance;
+        bool goes_on, last, measure, check, weights, balance;
     } batch;
 };
 

@@ -66,6 +66,7 @@ sadmm_status sadmm_environments_open_backend(struct sadmm_environments *environm
     struct sadmm_merged_world *merged = &environments->merged;
     const sadmm_world *from = environments->worker[0].world;
     TRY(pass(environments, sadmm_world_choose_backend(merged->world)));
+    merged->world->copies = environments->count;
     if (!kernels_of(environments)->allocate) return SADMM_OK;
     merged->copies = (struct sadmm_resident_copies){.count = environments->count,
                                                     .bodies = from->dynamic_count,

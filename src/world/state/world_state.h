@@ -44,6 +44,8 @@ struct sadmm_world {
     struct sadmm_world_coupling *couplings;
 
     int32_t dynamic_count, kinematic_count;
+    int32_t copies;           /* it is so many equal worlds (environments), each of which is solved as if it were
+                                 alone; 0: a world like any other */
     int32_t *kinematic_slots; /* of these, ascending, as of the last step */
     bool kinematic_listed;    /* none has come or gone since */
     struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */
