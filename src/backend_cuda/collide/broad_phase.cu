@@ -383,13 +383,20 @@ static __device__ __forceinline__ double leaf_plane_reach(const struct collision
     return shape_reach(step.margin, leaf.thin, 0, fall_of(step.gravity, step.dt));
 }
 
+/* By itself: worlds that are no environments should not pay in registers. */
+static __device__ __noinline__ double own_plane_reach(const collision_view &v, const struct collision_step &step,
+                                                      const struct collision_leaf &leaf)
+{
+    return leaf_plane_reach(leaf, step_of_shape(v, step, (uint32_t)leaf.slot));
+}
+
 /* The planes that a mover meets: those of every group, and those of its own. */
 static __device__ void add_planes(const collision_view &v, const struct collision_step &step, struct batch *out,
                                   const struct collision_leaf &leaf)
 {
     const uint32_t slot = (uint32_t)leaf.slot;
     if (v.plane_count == 0 || !(leaf.filter.kind & FILTER_MOVES)) return;
-    const double reach = leaf_plane_reach(leaf, step_of_shape(v, step, slot));
+    const double reach = v.gravities.of ? own_plane_reach(v, step, leaf) : leaf_plane_reach(leaf, step);
     const bool grouped = v.shared_planes < v.plane_count && leaf.group_low == leaf.group_high;
     for (int pass = 0; pass < (grouped ? 2 : 1); ++pass) {
         const uint64_t group = pass == 0 ? 0 : (uint64_t)leaf.group_low + 1;
