@@ -423,9 +423,9 @@ START_TEST(host_and_device_give_the_same)
     sadmm_world *origin = template_of("grippers:1", _i);
     sadmm_environments *all = replicate(origin, 2);
     const struct view stiffness = view_of(all, SADMM_ARRAY_JOINT_DRIVE_STIFFNESS),
-                      upper = view_of(all, SADMM_ARRAY_JOINT_UPPER);
+                      size = view_of(all, SADMM_ARRAY_SHAPE_SIZE);
     double *held = calloc(stiffness.numbers, sizeof *held);
-    (void)look(all, &upper);
+    (void)look(all, &size);
     MUST_ALL(all, sadmm_environments_step(all, 1));
     const int32_t first = 0;
     (void)look(all, &stiffness);
@@ -434,8 +434,8 @@ START_TEST(host_and_device_give_the_same)
     MUST_ALL(all, sadmm_environments_step(all, 1));
     for (size_t k = 0; k < 2 * stiffness.numbers; ++k) stiffness.host[k] *= 0.9;
     give(all, &stiffness);
-    for (size_t k = 0; k < 2 * upper.numbers; ++k) upper.host[k] *= 1.25;
-    give(all, &upper);
+    for (size_t k = 0; k < 2 * size.numbers; ++k) size.host[k] *= 0.999;
+    give(all, &size);
     MUST_ALL(all, sadmm_environments_step(all, 1));
     double most = 0;
     for (size_t k = 0; k < stiffness.numbers; ++k) most = fmax(most, stiffness.host[k]);
@@ -447,8 +447,292 @@ START_TEST(host_and_device_give_the_same)
     expect_same(held, stiffness.host, stiffness.numbers, "stiffness", 0, 3);
     free(held);
     free(stiffness.host);
-    free(upper.host);
+    free(size.host);
     sadmm_environments_destroy(all);
+    sadmm_world_destroy(origin);
+}
+END_TEST
+
+enum { LOWER, UPPER, INERTIA, MATERIAL, FRAME, KINDS };
+static const sadmm_array kinds[KINDS] = {SADMM_ARRAY_JOINT_LOWER, SADMM_ARRAY_JOINT_UPPER, SADMM_ARRAY_BODY_INERTIA,
+                                         SADMM_ARRAY_SHAPE_MATERIAL, SADMM_ARRAY_JOINT_FRAME};
+
+/* Other numbers of environment e. Limits, which are `width` or 0, swing to where none of those before fits beside. */
+static void vary(const struct view views[KINDS], const double *width, int32_t e, int step, bool bounces, bool frames)
+{
+    double *own[KINDS];
+    for (int k = 0; k < KINDS; ++k) own[k] = views[k].host + views[k].numbers * (size_t)e;
+    for (size_t i = 0; i < views[LOWER].numbers; ++i) {
+        const double half = width[i] * (1 + 0.2 * noise((uint32_t)(e + 7 * step), (uint32_t)i)),
+                     centre = (step % 2 ? 3 : -3) * width[i];
+        if (width[i] > 0) own[LOWER][i] = centre - half, own[UPPER][i] = centre + half;
+    }
+    for (size_t i = 0; i < views[INERTIA].numbers; ++i) /* a row alike: moments fit each other */
+        own[INERTIA][i] *= 1 + 0.02 * noise((uint32_t)(e + 7 * step), (uint32_t)(i / 4));
+    for (size_t i = 0; i < views[MATERIAL].numbers; i += 2) {
+        own[MATERIAL][i] = 0.6 + 0.3 * noise((uint32_t)(e + 7 * step), (uint32_t)i);
+        own[MATERIAL][i + 1] = bounces && e == 1 ? 0.3 : 0;
+    }
+    for (size_t i = 0; frames && i < views[FRAME].numbers; i += 7)
+        own[FRAME][i] += 1e-3 * noise((uint32_t)(e + 7 * step), (uint32_t)i);
+}
+
+/* Limits, masses, materials: the device takes them from arrays, and the world stays there; those of each are those of
+ * single ones. Frames of joints, and restitution where there was none, go by way of the host, with the same outcome. */
+START_TEST(inputs_stay_on_the_device)
+{
+    enum { STEPS = EMULATED ? 8 : 40, BOUNCES = STEPS / 2, FRAMES = STEPS - 2 };
+    sadmm_world *origin = template_of("grippers:1", _i);
+    step_world(origin, 2);
+    sadmm_environments *all = replicate(origin, FEW), *own[FEW];
+    const struct view states = view_of(all, SADMM_ARRAY_BODY_STATE);
+    struct view views[KINDS], given[FEW][KINDS], mine[FEW];
+    for (int k = 0; k < KINDS; ++k) {
+        views[k] = view_of(all, kinds[k]);
+        (void)look(all, &views[k]);
+    }
+    for (int32_t e = 0; e < FEW; ++e) {
+        own[e] = replicate(origin, 1);
+        mine[e] = view_of(own[e], SADMM_ARRAY_BODY_STATE);
+        for (int k = 0; k < KINDS; ++k) given[e][k] = view_of(own[e], kinds[k]);
+    }
+    double *width = calloc(views[LOWER].numbers, sizeof *width), widest = 0;
+    for (size_t i = 0; i < views[LOWER].numbers; ++i) {
+        width[i] = fmax(fabs(views[LOWER].host[i]), fabs(views[UPPER].host[i]));
+        if (!isfinite(width[i])) width[i] = 0;
+        widest = fmax(widest, width[i]);
+    }
+    ck_assert_double_gt(widest, 0);
+    int64_t done = 0; /* since the device took the world over */
+    for (int step = 0; step < STEPS; ++step) {
+        for (int32_t e = 0; e < FEW; ++e) {
+            vary(views, width, e, step, step >= BOUNCES, step == FRAMES);
+            for (int k = 0; k < KINDS; ++k) {
+                memcpy(given[e][k].host, views[k].host + views[k].numbers * (size_t)e,
+                       views[k].numbers * sizeof(double));
+                give(own[e], &given[e][k]);
+            }
+        }
+        for (int k = 0; k < KINDS; ++k) give(all, &views[k]);
+        MUST_ALL(all, sadmm_environments_step(all, 1));
+        done = step == BOUNCES || step == FRAMES ? 1 : done + 1;
+        ck_assert_int_eq(all->merged.world->resident.done, done);
+        for (int32_t e = 0; e < FEW; ++e) {
+            ck_assert_str_eq(sadmm_environments_mark(all, e), "");
+            MUST_ALL(own[e], sadmm_environments_step(own[e], 1));
+            expect_same(look(all, &states) + states.numbers * (size_t)e, look(own[e], &mine[e]), states.numbers,
+                        "inputs", e, step);
+        }
+    }
+    free(width);
+    free(states.host);
+    for (int k = 0; k < KINDS; ++k) free(views[k].host);
+    for (int32_t e = 0; e < FEW; ++e) {
+        for (int k = 0; k < KINDS; ++k) free(given[e][k].host);
+        free(mine[e].host);
+        sadmm_environments_destroy(own[e]);
+    }
+    sadmm_environments_destroy(all);
+    sadmm_world_destroy(origin);
+}
+END_TEST
+
+/* What the device takes of an input it checks as the host does: the environment is marked, with what the host says. */
+START_TEST(inputs_are_checked_on_the_device)
+{
+    static const struct {
+        sadmm_array array;
+        size_t column;
+        double bad;
+        const char *says;
+    } wrong[] = {{SADMM_ARRAY_BODY_INERTIA, 0, -1, "body_inertia"},
+                 {SADMM_ARRAY_BODY_INERTIA, 2, 1e9, "at most the sum"},
+                 {SADMM_ARRAY_BODY_INERTIA, 1, NAN, "body_inertia"},
+                 {SADMM_ARRAY_SHAPE_MATERIAL, 0, -0.1, "column 0 = -0.1"},
+                 {SADMM_ARRAY_SHAPE_MATERIAL, 1, 1.5, "column 1 = 1.5"},
+                 {SADMM_ARRAY_JOINT_LOWER, 0, INFINITY, "lower"},
+                 {SADMM_ARRAY_JOINT_UPPER, 0, -INFINITY, "upper"},
+                 {SADMM_ARRAY_GRAVITY, 1, 2e6, "gravity"}};
+    enum { WRONG = sizeof wrong / sizeof *wrong };
+    sadmm_world *origin = template_of("grippers:1", _i);
+    sadmm_environments *all = replicate(origin, 3);
+    MUST_ALL(all, sadmm_environments_step(all, 1));
+    for (int k = 0; k < WRONG; ++k) {
+        struct view view = view_of(all, wrong[k].array);
+        (void)look(all, &view);
+        MUST_ALL(all, sadmm_environments_step(all, 1)); /* with it as it is */
+        size_t row = 0;
+        const size_t columns = (size_t)view.in.columns, rows = (size_t)view.in.rows;
+        /* a body that moves, a coordinate that is free */
+        while (wrong[k].array != SADMM_ARRAY_GRAVITY && row + 1 < rows && view.host[row * columns] == 0) ++row;
+        const size_t at = view.numbers + row * columns + wrong[k].column; /* of environment 1 */
+        const double before = view.host[at];
+        view.host[at] = wrong[k].bad;
+        give(all, &view);
+        MUST_ALL(all, sadmm_environments_step(all, 1));
+        for (int32_t e = 0; e < 3; ++e) ck_assert_int_eq(sadmm_environments_marked(all)[e], e == 1);
+        ck_assert_msg(strstr(sadmm_environments_mark(all, 1), wrong[k].says) != NULL, "\"%s\"",
+                      sadmm_environments_mark(all, 1));
+        view.host[at] = before;
+        give(all, &view);
+        const int32_t one = 1;
+        MUST_ALL(all, sadmm_environments_reset(all, &one, 1, NULL));
+        MUST_ALL(all, sadmm_environments_step(all, 1));
+        ck_assert_int_eq(sadmm_environments_marked(all)[1], 0);
+        free(view.host);
+    }
+    sadmm_environments_destroy(all);
+    sadmm_world_destroy(origin);
+}
+END_TEST
+
+/* Gravity of environments: of the first the settings', of the others more, less, and to another side. */
+static const double gravities[FEW][3] = {{0, 0, -9.81}, {0.5, -0.3, -3.7}, {0, 0, -25}, {-2, 1, -9}};
+
+/* Half of the bodies that move fall by another scale, beyond which gravity counts as a force. */
+static void scale_gravity(sadmm_world *world)
+{
+    for (int32_t i = 0; i < sadmm_world_body_count(world); i += 2)
+        if (body_def(world, body_at(world, i)).type == SADMM_BODY_DYNAMIC)
+            MUST(world, sadmm_world_set_body_gravity_scale(world, body_at(world, i), 1.5));
+}
+
+static void set_gravity(sadmm_environments *environments, const double gravity[3])
+{
+    sadmm_settings settings = sadmm_environments_settings(environments);
+    memcpy(settings.gravity, gravity, sizeof settings.gravity);
+    MUST_ALL(environments, sadmm_environments_set_settings(environments, &settings));
+}
+
+static void expect_near(const double *a, const double *b, size_t count, const char *what, int32_t environment, int step)
+{
+    for (size_t k = 0; k < count; ++k)
+        ck_assert_msg(fabs(a[k] - b[k]) <= 1e-9 * (1 + fabs(b[k])),
+                      "%s, environment %d, step %d, number %zu: %.17g, %.17g", what, environment, step, k, a[k], b[k]);
+}
+
+/* Each is as one alone whose settings have its gravity, bit for bit, what is said of the step included; the gravity of
+ * some changes while they go on. */
+START_TEST(each_has_its_own_gravity)
+{
+    static const struct {
+        const char *name;
+        int warm, steps, substeps;
+        double dt; /* 0: the scene's */
+        bool scaled, loose; /* without joints others show in the last digits, and more with warm starts, tolerances */
+    } falls[] = {{"ragdolls:1", 0, EMULATED ? 30 : 100, 1, 0, false, false},
+                 {"grippers:1", 2, EMULATED ? 6 : 60, 1, 0, true, false},
+                 {"pile:12", EMULATED ? 20 : 40, 8, 1, 0, true, true},
+                 {"bounce", 0, 40, 2, 0.02, false, true}};
+    const int scene = _i / 2, changed_at = falls[scene].steps / 2;
+    const char *name = falls[scene].name;
+    sadmm_world *origin = template_of(name, _i % 2);
+    if (falls[scene].scaled) scale_gravity(origin);
+    sadmm_settings settings = sadmm_world_settings(origin);
+    settings.substeps = falls[scene].substeps;
+    if (falls[scene].dt > 0) settings.dt = falls[scene].dt;
+    if (falls[scene].loose) settings.warm_start = false, settings.tolerance = 0;
+    MUST(origin, sadmm_world_set_settings(origin, &settings));
+    step_world(origin, falls[scene].warm);
+    sadmm_environments *all = replicate(origin, FEW), *own[FEW];
+    struct view views[OUTPUTS], mine[FEW][OUTPUTS], gravity = view_of(all, SADMM_ARRAY_GRAVITY);
+    ck_assert_int_eq(gravity.in.rows, 1);
+    ck_assert_int_eq(gravity.in.columns, 3);
+    for (int32_t e = 0; e < FEW; ++e) {
+        expect_same(look(all, &gravity) + 3 * e, settings.gravity, 3, "the template's", e, 0);
+        own[e] = replicate(origin, 1);
+        set_gravity(own[e], gravities[e]);
+    }
+    memcpy(gravity.host, gravities, sizeof gravities);
+    give(all, &gravity);
+    for (int k = 0; k < OUTPUTS; ++k) {
+        views[k] = view_of(all, outputs[k]);
+        for (int32_t e = 0; e < FEW; ++e) mine[e][k] = view_of(own[e], outputs[k]);
+    }
+    for (int step = 0; step < falls[scene].steps; step += 2) {
+        if (step == changed_at || step == changed_at + 1) {
+            for (int32_t e = 0; e < FEW; ++e) {
+                double *to = gravity.host + 3 * e;
+                if (e % 2) to[0] += 1, to[2] *= -0.5;
+                set_gravity(own[e], to);
+            }
+            give(all, &gravity);
+        }
+        MUST_ALL(all, sadmm_environments_step(all, 2));
+        for (int32_t e = 0; e < FEW; ++e) {
+            ck_assert_str_eq(sadmm_environments_mark(all, e), "");
+            MUST_ALL(own[e], sadmm_environments_step(own[e], 2));
+            for (int k = 0; k < OUTPUTS; ++k) {
+                const size_t count = numbers_of(all, outputs[k]);
+                const double *values = look(all, &views[k]) + count * (size_t)e;
+                (falls[scene].loose ? expect_near : expect_same)(values, look(own[e], &mine[e][k]), count,
+                                                                 sadmm_array_name(outputs[k]), e, step);
+            }
+        }
+        ck_assert(all->merged.world->resident.loaded); /* without the host */
+    }
+    free(gravity.host);
+    for (int k = 0; k < OUTPUTS; ++k) {
+        free(views[k].host);
+        for (int32_t e = 0; e < FEW; ++e) free(mine[e][k].host);
+    }
+    for (int32_t e = 0; e < FEW; ++e) sadmm_environments_destroy(own[e]);
+    sadmm_environments_destroy(all);
+    sadmm_world_destroy(origin);
+}
+END_TEST
+
+/* Gravity out of range marks the environment that has it; by the host it is set, read and refused as on the CPU, and
+ * goes along with what the host sets of states. Where the host drives the steps there is one. */
+START_TEST(gravity_is_checked)
+{
+    sadmm_world *origin = template_of("grippers:1", _i);
+    sadmm_environments *all = replicate(origin, FEW), *one = replicate(origin, 1);
+    const struct view states = view_of(all, SADMM_ARRAY_BODY_STATE), state = view_of(one, SADMM_ARRAY_BODY_STATE);
+    const size_t n = states.numbers;
+    const int32_t second = 1, third = 2;
+    double read[3], *start = calloc(n, sizeof *start);
+    memcpy(start, look(all, &states), n * sizeof *start);
+    MUST_ALL(all, sadmm_environments_set(all, SADMM_ARRAY_GRAVITY, &second, 1, gravities[1]));
+    MUST_ALL(all, sadmm_environments_get(all, SADMM_ARRAY_GRAVITY, &second, 1, read));
+    expect_same(read, gravities[1], 3, "read", 1, 0);
+    const double huge[3] = {0, 8e5, -8e5};
+    ck_assert_int_eq(sadmm_environments_set(all, SADMM_ARRAY_GRAVITY, &second, 1, huge),
+                     SADMM_ERROR_INVALID_ARGUMENT);
+    const char *message = sadmm_environments_message(all);
+    ck_assert_msg(strstr(message, "gravity") && strstr(message, "must be <= 1e6 m/s^2"), "\"%s\"", message);
+    set_gravity(one, gravities[1]);
+    for (int step = 0; step < 4; ++step) {
+        struct view gravity = view_of(all, SADMM_ARRAY_GRAVITY);
+        (void)look(all, &gravity);
+        if (step == 1) gravity.host[3 * third + 1] = NAN, give(all, &gravity);
+        if (step == 2) MUST_ALL(all, sadmm_environments_set(all, SADMM_ARRAY_BODY_STATE, &third, 1, start));
+        if (step == 3) {
+            gravity.host[3 * third + 1] = 0, give(all, &gravity);
+            MUST_ALL(all, sadmm_environments_reset(all, &third, 1, NULL));
+        }
+        MUST_ALL(all, sadmm_environments_step(all, 1));
+        MUST_ALL(one, sadmm_environments_step(one, 1));
+        ck_assert_int_eq(sadmm_environments_marked(all)[2], step == 1 || step == 2);
+        if (step == 1)
+            ck_assert_msg(strstr(sadmm_environments_mark(all, 2), "gravity") != NULL, "\"%s\"",
+                          sadmm_environments_mark(all, 2));
+        expect_same(look(all, &states) + n, look(one, &state), n, "by the host", 1, step);
+        free(gravity.host);
+    }
+    sadmm_settings settings = sadmm_environments_settings(all);
+    settings.residual_tolerance = 1e-6;
+    ck_assert_int_eq(sadmm_environments_set_settings(all, &settings), SADMM_ERROR_INVALID_ARGUMENT);
+    message = sadmm_environments_message(all);
+    ck_assert_msg(strstr(message, "residual_tolerance = 1e-06") != NULL, "\"%s\"", message);
+    MUST_ALL(one, sadmm_environments_set_settings(one, &settings));
+    sadmm_environments_array none;
+    ck_assert_int_eq(sadmm_environments_bind(one, SADMM_ARRAY_GRAVITY, SADMM_F64, &none), SADMM_ERROR_UNAVAILABLE);
+    free(start);
+    free(states.host);
+    free(state.host);
+    sadmm_environments_destroy(all);
+    sadmm_environments_destroy(one);
     sadmm_world_destroy(origin);
 }
 END_TEST
@@ -463,5 +747,9 @@ int main(void)
     ADD_CASE(suite, what_is_set_is_seen, 0, tested_precisions());
     ADD_CASE(suite, host_and_device_give_the_same, 0, tested_precisions());
     ADD_CASE(suite, inputs_and_contacts_are_an_environments_own, 0, tested_precisions());
+    ADD_CASE(suite, inputs_stay_on_the_device, 0, tested_precisions());
+    ADD_CASE(suite, inputs_are_checked_on_the_device, 0, tested_precisions());
+    ADD_CASE(suite, each_has_its_own_gravity, 0, 4 * tested_precisions());
+    ADD_CASE(suite, gravity_is_checked, 0, tested_precisions());
     return run_cuda_suite(suite);
 }

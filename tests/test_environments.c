@@ -666,6 +666,95 @@ START_TEST(sizes_outlast_resets)
 }
 END_TEST
 
+/* Frames of joints: steps, positions of joints as they are read and set, and resets go by each one's own, whichever the
+ * worker had before. */
+START_TEST(frames_of_joints_are_an_environments_own)
+{
+    enum { MANY = 6, STEPS = 40 };
+    const int threads = _i ? 2 : 1;
+    sadmm_test_force_threads(threads > 1);
+    struct machine m = build_machine();
+    sadmm_settings settings = sadmm_world_settings(m.world);
+    settings.threads = threads;
+    MUST(m.world, sadmm_world_set_settings(m.world, &settings));
+    sadmm_environments *environments = replicate(m.world, MANY);
+    const size_t n = numbers_of(m.world, SADMM_ARRAY_JOINT_FRAME), bodies = numbers_of(m.world, SADMM_ARRAY_BODY_STATE),
+                 joints = numbers_of(m.world, SADMM_ARRAY_JOINT_POSITION);
+    ck_assert(sadmm_environments_is_input(SADMM_ARRAY_JOINT_FRAME));
+    double *frames = array_of(environments, SADMM_ARRAY_JOINT_FRAME);
+    const double *state = array_of(environments, SADMM_ARRAY_BODY_STATE),
+                 *position = array_of(environments, SADMM_ARRAY_JOINT_POSITION);
+    sadmm_joint_id id;
+    sadmm_joint_def def;
+    MUST(m.world, sadmm_world_joint_at(m.world, 1, &id));
+    MUST(m.world, sadmm_world_joint_def(m.world, id, &def));
+    ck_assert_mem_eq(frames + 14, def.position_a, sizeof def.position_a);
+    ck_assert_mem_eq(frames + 14 + 10, def.orientation_b, sizeof def.orientation_b);
+    sadmm_world *worlds[MANY];
+    double *turned[MANY];
+    for (int32_t e = 0; e < MANY; ++e) {
+        double *frame = frames + n * (size_t)e, shift = 0.004 * e;
+        for (size_t k = 0; k < n; k += 14) {
+            frame[k + 1] += shift, frame[k + 9] -= shift; /* of a along y, of b along z */
+            if (e > 0) frame[k + 10] = 0.96, frame[k + 13] = 0.28; /* b's turned about z */
+        }
+        worlds[e] = alone(m.world);
+        write_array(worlds[e], SADMM_ARRAY_JOINT_FRAME, frame);
+    }
+    MUST_ALL(environments, sadmm_environments_step(environments, 1));
+    for (int32_t e = 0; e < MANY; ++e) { /* a hinge is turned */
+        step_world(worlds[e], 1);
+        turned[e] = read_array(worlds[e], SADMM_ARRAY_JOINT_POSITION);
+        turned[e][5] += 0.1;
+        write_array(worlds[e], SADMM_ARRAY_JOINT_POSITION, turned[e]);
+        MUST_ALL(environments, sadmm_environments_set(environments, SADMM_ARRAY_JOINT_POSITION, &e, 1, turned[e]));
+        free(turned[e]);
+    }
+    for (int step = 0; step < STEPS; ++step) {
+        for (int32_t e = 0; e < MANY; ++e) {
+            double *own = read_array(worlds[e], SADMM_ARRAY_BODY_STATE),
+                   *turns = read_array(worlds[e], SADMM_ARRAY_JOINT_POSITION), *read = calloc(joints, sizeof *read);
+            expect_same(state + bodies * (size_t)e, own, bodies, "frames", e, step);
+            expect_same(position + joints * (size_t)e, turns, joints, "positions", e, step);
+            MUST_ALL(environments,
+                     sadmm_environments_get(environments, SADMM_ARRAY_JOINT_POSITION, &e, 1, read));
+            expect_same(read, turns, joints, "positions as read", e, step);
+            free(own), free(turns), free(read);
+            step_world(worlds[e], 1);
+        }
+        MUST_ALL(environments, sadmm_environments_step(environments, 1));
+    }
+    ck_assert(memcmp(state, state + bodies * (MANY - 1), bodies * sizeof *state) != 0);
+    MUST_ALL(environments, sadmm_environments_reset(environments, NULL, 0, NULL));
+    for (int32_t e = 0; e < MANY; ++e) {
+        sadmm_world *fresh = alone(m.world);
+        write_array(fresh, SADMM_ARRAY_JOINT_FRAME, frames + n * (size_t)e);
+        double *turns = read_array(fresh, SADMM_ARRAY_JOINT_POSITION);
+        expect_same(position + joints * (size_t)e, turns, joints, "positions after a reset", e, 0);
+        free(turns);
+        sadmm_world_destroy(fresh);
+    }
+    const int32_t last = MANY - 1;
+    double *bad = calloc(n, sizeof *bad);
+    memcpy(bad, frames, n * sizeof *bad);
+    bad[14 + 3] = 2;
+    ck_assert_int_eq(sadmm_environments_set(environments, SADMM_ARRAY_JOINT_FRAME, &last, 1, bad),
+                     SADMM_ERROR_INVALID_ARGUMENT);
+    const char *message = sadmm_environments_message(environments);
+    ck_assert_msg(strstr(message, "row 1: orientation_a = (2, 0, 0, 0)") != NULL, "\"%s\"", message);
+    frames[n * (size_t)last + 7] = 2e9;
+    MUST_ALL(environments, sadmm_environments_step(environments, 1));
+    message = sadmm_environments_mark(environments, last);
+    ck_assert_msg(strstr(message, "joint_frame: values, row 0: position_b[0] = 2e+09") != NULL, "\"%s\"", message);
+    ck_assert_str_eq(sadmm_environments_mark(environments, 0), "");
+    free(bad);
+    for (int32_t e = 0; e < MANY; ++e) sadmm_world_destroy(worlds[e]);
+    sadmm_environments_destroy(environments);
+    sadmm_world_destroy(m.world);
+    sadmm_test_force_threads(false);
+}
+END_TEST
+
 /* Limits of each, which no other one's bounds fit, whoever was stepped before by the same worker. */
 START_TEST(limits_are_an_environments_own)
 {
@@ -985,6 +1074,7 @@ int main(void)
     tcase_add_test(cases, contacts_and_rays_are_an_environments_own);
     tcase_add_loop_test(cases, ground_is_an_environments_own, 0, 2);
     tcase_add_test(cases, sizes_outlast_resets);
+    tcase_add_loop_test(cases, frames_of_joints_are_an_environments_own, 0, 2);
     tcase_add_test(cases, limits_are_an_environments_own);
     tcase_add_test(cases, any_worker_reads_any_environment);
     tcase_add_test(cases, saves_and_settings_are_of_one_and_of_all);

@@ -67,6 +67,11 @@ typedef enum sadmm_array {
                                 hulls and meshes have none. Set: as sadmm_world_set_shape_size */
     SADMM_ARRAY_SHAPE_FRAME, /* 7: position (m), orientation (w x y z) of the shape's frame in the body's. Set: as
                                 sadmm_world_set_shape_frame */
+    /* A row a joint. */
+    SADMM_ARRAY_JOINT_FRAME, /* 14: its frame in a, position (m, |x| <= 1e9) and orientation (w x y z, of unit length),
+                                then its frame in b: position_a, orientation_a, position_b, orientation_b of
+                                sadmm_joint_def. Set: bodies stay where they are, and are drawn to where the joint has
+                                them from then on, at up to settings.correction_speed */
     SADMM_ARRAY_COUNT
 } sadmm_array;
 

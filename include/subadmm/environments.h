@@ -14,9 +14,8 @@
  * Where the template's steps are made on the CPU, environments are shared out over settings.threads of the template's
  * (0: all cores), or its `tasks`. On CUDA all are on the template's device and make each step together; bound arrays
  * are in its memory. There a first step begins without impulses, as every later one does with new contacts, where a
- * world's first step on CUDA has some initialised; gravity is that of the settings, in all; contacts, rays and saves go
- * by way of the host; and errors that every call has besides its own are OUT_OF_MEMORY and DEVICE (after which all
- * environments are to be made anew).
+ * world's first step on CUDA has some initialised; contacts, rays and saves go by way of the host; and errors that
+ * every call has besides its own are OUT_OF_MEMORY and DEVICE (after which all environments are to be made anew).
  * AUTO: on what has made the template's steps; the CPU where there were none.
  *
  * Threads: use environments from one thread at a time. Errors that every call has besides its own: INVALID_ARGUMENT
@@ -57,7 +56,8 @@ SADMM_API size_t sadmm_environments_memory(const sadmm_environments *environment
 SADMM_API sadmm_status sadmm_environments_step(sadmm_environments *environments, int32_t steps);
 
 /* The settings of all; gravity is that of an input array where there is one, and no more threads than the template's
- * settings asked for. Errors: INVALID_ARGUMENT (nothing changes). */
+ * settings asked for. Errors: INVALID_ARGUMENT (nothing changes; on CUDA also where gravity is such an array and the
+ * host would drive the steps, as bind says). */
 SADMM_API sadmm_status sadmm_environments_set_settings(sadmm_environments *environments,
                                                        const sadmm_settings *settings);
 SADMM_API void sadmm_environments_settings_sized(const sadmm_environments *environments, sadmm_settings *settings,
@@ -119,9 +119,11 @@ typedef struct sadmm_environments_array {
 /* *out stays valid until the environments are destroyed, at the same place. Output and state: the numbers after each
  * call that steps, resets or sets, once it has returned; do not write to it. Input: write to it between calls;
  * environments have it from the next step on. It begins with what they have now. An input array has one precision, that
- * of the first call. On CUDA most arrays are read and written by the device alone; limits, inertia, materials, sizes
- * and places of shapes, and report, go by way of the host. Errors: INVALID_ARGUMENT (array, precision; an input array
- * that has the other precision), OUT_OF_MEMORY; UNAVAILABLE (gravity, on CUDA). */
+ * of the first call. On CUDA most arrays are read and written by the device alone; sizes and places of shapes, frames
+ * of joints, and report, go by way of the host, and so does the first restitution that is not 0. Errors:
+ * INVALID_ARGUMENT (array, precision; an input array that has the other precision), OUT_OF_MEMORY; UNAVAILABLE (on
+ * CUDA: gravity where the host drives the steps, by settings.residual_tolerance, or by tolerance in the method PAPER
+ * or with more than 64 checks a step). */
 SADMM_API sadmm_status sadmm_environments_bind(sadmm_environments *environments, sadmm_array array,
                                                sadmm_precision precision, sadmm_environments_array *out);
 

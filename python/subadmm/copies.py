@@ -12,8 +12,7 @@ def replicate(template, count):
     The template does not change. Of a robot (MJCF or URDF) a Robots, else an Environments.
 
     They are where the template's backend has it. On CUDA (World(backend="cuda"), load(..., backend="cuda")) all are in
-    the memory of the device and make a step together; arrays are tensors of torch there, which share that memory, and
-    all have the settings' gravity.
+    the memory of the device and make a step together; arrays are tensors of torch there, which share that memory.
 
     A motor whose control is 0 is a drive in a Robots, and none in the loaded robot: their steps are equal to rounding.
     The script of a scene's world is not copied: turn it off first (World.script)."""

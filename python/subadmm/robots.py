@@ -90,7 +90,7 @@ class Robots(Environments):
 
     def set(self, name, values, which=None):
         super().set(name, values, which)
-        if self.device >= 0 and name in self._inputs and not self._bound_of(name):
+        if self.device >= 0 and (name in self._inputs or name == "gravity") and not self._bound_of(name):
             self.array(name)
 
     set.__doc__ = Environments.set.__doc__
@@ -267,6 +267,8 @@ class Robots(Environments):
         """n x 3, or the three that all have."""
         if self.device < 0:
             return self.xp.array(self._core.get("gravity", rows))[:, 0]
+        for bound in self._bound_of("gravity"):
+            return self.xp.asarray(bound[self._pick(rows)], dtype=self.xp.float64)[:, 0]
         now = tuple(self._library.settings.gravity)
         if now != self._pull[0]:
             self._pull = now, self.xp.array(now)

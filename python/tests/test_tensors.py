@@ -125,6 +125,12 @@ def test_dynamics_have_the_inputs_of_each(make):
         many.settings = settings
     expect_equal(tensors.bias(), robots.bias(), 1e-14)
     expect_equal(tensors.imu("foot")[1], robots.imu("foot")[1])
+    for many in (robots, tensors):
+        many.set("gravity", scale * np.array([0.3, 0, -3.7]))
+    assert np.ptp(robots.bias(), axis=0).max() > 1
+    expect_equal(tensors.bias(), robots.bias(), 1e-14)
+    expect_equal(tensors.bias([4, 2]), robots.bias([4, 2]), 1e-14)
+    expect_equal(tensors.imu("foot")[1], robots.imu("foot")[1])
 
 
 def test_tensors_share_the_memory(make):

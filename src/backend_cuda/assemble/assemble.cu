@@ -30,7 +30,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
     const bool stiffened = JOINTS && stiffen_body(v, i, false);
     double A[36], b[6];
-    const struct sadmm_settings settings = *v.model.settings;
+    const struct sadmm_settings settings = settings_of(v.model, i);
     if (v.raw.system.rigid) {
         const struct sadmm_rigid *state = wide_at(v.raw.system.rigid, (size_t)i);
         const struct spin_system spin = spin_of_system(state, settings.dt);

@@ -87,7 +87,7 @@ static __device__ __forceinline__ void take_articulation_body(const struct cuda_
 /* A and b of body i with what joints stiffen it by. */
 static __device__ __noinline__ struct cuda_articulation_body stiffened_body(const cuda_view &v, int32_t i)
 {
-    const struct sadmm_settings settings = *v.model.settings;
+    const struct sadmm_settings settings = settings_of(v.model, i);
     const struct sadmm_rigid body = stiffened_rigid(v, i);
     const struct spin_system spin = spin_of_system(&body, settings.dt);
     double A[36], b[6];

@@ -151,9 +151,10 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     placed_pieces *const shared = MANY ? &memory : nullptr;
     const int64_t i = collision_thread(PLACE_THREADS);
     const bool stops = aborted(v), is_there = i < v.leaf_count + v.plane_count, is_leaf = i < v.leaf_count;
-    const struct collision_step step = step_of(v);
+    const struct collision_step all = step_of(v);
     const uint32_t slot = is_there ? v.present[i] : 0; /* at once, not after what comes next */
     if (stops) return;
+    const struct collision_step step = step_of_shape(v, all, slot);
     if (i == 0 && FOR != PLACE_AGAIN) v.candidate_count[COUNT_FOUND] = v.candidate_count[COUNT_MESH_PAIRS] = 0;
     if (i == 0) v.candidate_count[COUNT_LISTED] = v.candidate_count[COUNT_GENERAL] = v.candidate_count[COUNT_FAST] = 0;
     struct sadmm_proxy proxy;
@@ -382,13 +383,20 @@ static __device__ __forceinline__ double leaf_plane_reach(const struct collision
     return shape_reach(step.margin, leaf.thin, 0, fall_of(step.gravity, step.dt));
 }
 
+/* By itself: worlds that are no environments should not pay in registers. */
+static __device__ __noinline__ double own_plane_reach(const collision_view &v, const struct collision_step &step,
+                                                      const struct collision_leaf &leaf)
+{
+    return leaf_plane_reach(leaf, step_of_shape(v, step, (uint32_t)leaf.slot));
+}
+
 /* The planes that a mover meets: those of every group, and those of its own. */
 static __device__ void add_planes(const collision_view &v, const struct collision_step &step, struct batch *out,
                                   const struct collision_leaf &leaf)
 {
     const uint32_t slot = (uint32_t)leaf.slot;
     if (v.plane_count == 0 || !(leaf.filter.kind & FILTER_MOVES)) return;
-    const double reach = leaf_plane_reach(leaf, step);
+    const double reach = v.gravities.of ? own_plane_reach(v, step, leaf) : leaf_plane_reach(leaf, step);
     const bool grouped = v.shared_planes < v.plane_count && leaf.group_low == leaf.group_high;
     for (int pass = 0; pass < (grouped ? 2 : 1); ++pass) {
         const uint64_t group = pass == 0 ? 0 : (uint64_t)leaf.group_low + 1;

@@ -1,4 +1,6 @@
 /* The entries of contact finding on the device, in C: COLLISION(name) is set by the includer. */
+struct cuda_gravities; /* device/gravity.h */
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -39,6 +41,10 @@ sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *collision, void *str
                                const struct sadmm_collision_input *input, const struct sadmm_collision_body *bodies,
                                int32_t *abort_code, const double *dt, const double *gravity,
                                struct sadmm_error *error);
+/* Gravity of environments, each its own: in the place of that. After attach, which takes it away. */
+void COLLISION(use_gravities)(struct sadmm_cuda_collision *collision, const struct cuda_gravities *gravities);
+/* The shapes on the device, by slot, to set materials there; the next input is taken whole. */
+struct sadmm_shape *COLLISION(shapes_to_set)(struct sadmm_cuda_collision *collision);
 /* Capacity for so many candidates and points in both sets, or all three where a step has sub-steps; they keep what they
  * hold. 0: what a scene of this size is likely to need. Everything enqueued must be done. *candidates and *points: the
  * capacities now, at least as much. */

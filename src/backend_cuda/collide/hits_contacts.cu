@@ -15,13 +15,14 @@
 static __device__ __forceinline__ void replace_leaf(const hits_view &v, const struct collision_step &step, int32_t i)
 {
     const uint32_t slot = v.c.present[i];
+    const double gravity = step_of_shape(v.c, step, slot).gravity;
     const struct sadmm_shape &shape = v.c.shapes[slot];
     if (v.swept_bodies[shape.body].hits == 0) return;
     const struct sadmm_collision_body body = load_wide(&v.c.bodies[shape.body]);
     const struct proxy_turn turn = proxy_turn_since(&shape, &body, v.since[shape.body], step.dt);
     struct collision_leaf leaf = v.c.placed[i];
     struct sadmm_proxy proxy;
-    proxy_place(&shape, &v.c.geometries[shape.geometry], &body, &turn, step.dt, step.margin, step.gravity, &proxy,
+    proxy_place(&shape, &v.c.geometries[shape.geometry], &body, &turn, step.dt, step.margin, gravity, &proxy,
                 &leaf.box);
     for (int k = 0; k < 3; ++k) leaf.velocity[k] = proxy.velocity[k];
     v.c.proxies[slot] = proxy;
@@ -127,7 +128,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) later_kernel(const __gr
         const struct candidate own = candidate_of(v.c, v.c.candidates[i]);
         const struct sadmm_proxy *a = &v.c.proxies[own.a], *b = &v.c.proxies[own.b];
         const double since = since_of(v, a, b), left = step.dt - since,
-                     gravity = gravity_later(step.gravity, step.dt, left);
+                     gravity = gravity_later(step_of_shape(v.c, step, own.a).gravity, step.dt, left);
         struct sadmm_proxy later_a, later_b;
         struct manifold m;
         if (!(since > 0)) continue;

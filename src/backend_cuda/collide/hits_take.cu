@@ -40,7 +40,7 @@ static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_c
         progress->foreseen = progress->followed = 0;
         progress->records = 0;
     }
-    const struct collision_step step = step_of(v.c);
+    const struct collision_step all = step_of(v.c);
     const double threshold = v.step.settings->restitution_threshold;
     const uint64_t epoch = v.state->epoch + 1;
     const int64_t candidates = usable_candidates(v.c), pairs = v.c.before.counts->pairs;
@@ -50,6 +50,7 @@ static __global__ void __launch_bounds__(HIT_THREADS) list_kernel(const __grid_c
     for (int64_t i = thread; i < pieces; i += stride) ((wide_piece *)v.step.start)[i] = from[i];
     for (int64_t i = thread; i < candidates; i += stride) {
         const struct candidate own = candidate_of(v.c, v.c.candidates[i]);
+        const struct collision_step step = step_of_shape(v.c, all, own.a);
         const struct sadmm_proxy &a = v.c.proxies[own.a], &b = v.c.proxies[own.b];
         if (own.subshape > 0 || b.geometry.type == SADMM_SHAPE_MESH ||
             !pair_is_fast(&a, &b, threshold, step.gravity, step.dt))
@@ -82,6 +83,16 @@ static __device__ __forceinline__ bool kinds_hit(unsigned char a, unsigned char 
     return a != SADMM_SWEPT_NONE && b != SADMM_SWEPT_NONE && (a == SADMM_SWEPT_DYNAMIC || b == SADMM_SWEPT_DYNAMIC);
 }
 
+/* The settings of a body that is swept: gravity may be its world's own; `own` has room for these. */
+static __device__ __forceinline__ const struct sadmm_settings *settings_for(const hits_view &v, int32_t dynamic,
+                                                                            struct sadmm_settings *own)
+{
+    if (!v.c.gravities.of || dynamic < 0) return v.step.settings;
+    *own = *v.step.settings;
+    for (int k = 0; k < 3; ++k) own->gravity[k] = own_gravity(v.c.gravities, dynamic)[k];
+    return own;
+}
+
 static __device__ __noinline__ void load_swept_body(const hits_view &v, int32_t slot, struct swept_body *f)
 {
     const struct sadmm_collision_body &body = v.c.bodies[slot];
@@ -96,7 +107,8 @@ static __device__ __noinline__ void load_swept_body(const hits_view &v, int32_t 
         memcpy(f->start.orientation, body.orientation, sizeof body.orientation);
         memcpy(f->start.velocity, body.velocity, sizeof body.velocity);
     }
-    swept_body_begin(f, v.step.settings);
+    struct sadmm_settings own;
+    swept_body_begin(f, settings_for(v, f->dynamic, &own));
 }
 
 static __device__ __forceinline__ struct sadmm_swept_shape swept_shape(const hits_view &v, uint32_t slot,
@@ -163,10 +175,11 @@ static __device__ __forceinline__ void follow_on_meshes(const hits_view &v, int6
                                                         uint64_t mark, const Kind &kind)
 {
     if (v.c.mesh_count == 0) return;
-    const struct collision_step step = step_of(v.c);
+    const struct collision_step all = step_of(v.c);
     const int64_t count = usable_candidates(v.c) > 0 ? (int64_t)v.c.candidate_count[COUNT_MESH_PAIRS] : 0;
     for (int64_t j = thread; j < count; j += stride) {
         const struct candidate own = candidate_of(v.c, v.c.mesh_pairs[j]);
+        const struct collision_step step = step_of_shape(v.c, all, own.a);
         const struct sadmm_proxy &a = v.c.proxies[own.a], &b = v.c.proxies[own.b];
         if (kinds_hit(kind(a.body), kind(b.body)) &&
             pair_is_fast(&a, &b, v.step.settings->restitution_threshold, step.gravity, step.dt))
@@ -198,7 +211,7 @@ static __device__ __forceinline__ void foresee_all(const hits_view &v)
         load_swept_body(v, b, &swept_bodies[1]);
         v.state->followed = 1;
         v.progress[group_of(v, a, b)].followed = mark;
-        follow(v, step, v.c.proxies[own.a], v.c.proxies[own.b], mark);
+        follow(v, step_of_shape(v.c, step, own.a), v.c.proxies[own.a], v.c.proxies[own.b], mark);
         if (!foresee(v, group_of(v, a, b), ordered_key(own.a, own.b), &swept_bodies[0], &swept_bodies[1], 0, mark))
             v.listed[j] = ~v.listed[j];
     }
@@ -253,7 +266,7 @@ static __device__ void follow_listed(const hits_view &v, int32_t group, uint64_t
         const struct candidate own = listed_pair(v, j);
         const struct sadmm_proxy &a = v.c.proxies[own.a], &b = v.c.proxies[own.b];
         if (group_of(v, a.body, b.body) != group || !kinds_hit(v.kinds[a.body], v.kinds[b.body])) continue;
-        follow(v, step, a, b, mark);
+        follow(v, step_of_shape(v.c, step, own.a), a, b, mark);
         if (v.listed[j] < 0) v.marks[a.body].lost = v.marks[b.body].lost = mark;
     }
     follow_on_meshes(v, (int64_t)threadIdx.x, TAKE_THREADS, mark, [&v, group](int32_t body) {
@@ -362,7 +375,9 @@ static __device__ __noinline__ void take_hit(const hits_view &v, uint64_t mark, 
         shared->fails = true;
         return;
     }
-    swept_bodies_part(f, v.step.settings, item.touch.time, pose, &hit);
+    struct sadmm_settings own;
+    const int32_t dynamic = f[0]->dynamic >= 0 ? f[0]->dynamic : f[1]->dynamic;
+    swept_bodies_part(f, settings_for(v, dynamic, &own), item.touch.time, pose, &hit);
     shared->taken = 1;
     ++shared->hit_count;
 }
@@ -545,7 +560,8 @@ static __device__ __forceinline__ void write_back(const hits_view &v, int32_t sl
     double *velocity = v.step.velocity + 6 * (size_t)f.dynamic;
     struct sadmm_flight_pose pose;
     v.step.start[f.dynamic] = f.start;
-    swept_body_end_velocity(&f, v.step.settings, velocity);
+    struct sadmm_settings own;
+    swept_body_end_velocity(&f, settings_for(v, f.dynamic, &own), velocity);
     flight_at(&f.flight, f.flight.since, &pose);
     memcpy(out->position, f.start.position, sizeof out->position);
     memcpy(out->velocity, f.start.velocity, sizeof out->velocity);

@@ -213,6 +213,7 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
     v->group_bits = group_bits(input);
     v->abort_code = nullptr;
     v->dt = v->gravity = nullptr;
+    v->gravities = {};
     v->present = in<uint32_t>(c, PRESENT);
     v->planes = in<uint64_t>(c, PLANES);
     v->disabled_pairs = in<uint64_t>(c, DISABLED_PAIRS);

@@ -61,7 +61,8 @@ static __global__ void __launch_bounds__(MESH_THREADS) expand_kernel(const __gri
     }
     out.count = 0;
     for (int64_t i = blockIdx.x; i < (int64_t)listed; i += gridDim.x)
-        expand<SUBSTEPS>(v, step, v.mesh_pairs[i], &waiting, &out);
+        expand<SUBSTEPS>(v, step_of_shape(v, step, candidate_of(v, v.mesh_pairs[i]).a), v.mesh_pairs[i], &waiting,
+                         &out);
     finish_batches(v, out);
 }
 

@@ -274,13 +274,14 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     const int64_t readable = i < v.candidate_capacity ? i : 0;
     const struct candidate own = candidate_of(v, v.candidates[readable]);
     const int64_t hint = v.pair_of[readable], count = v.before.counts->pairs;
-    const struct collision_step step = step_of(v);
+    const struct collision_step all = step_of(v);
     const int find = narrow_find<FOR>(v);
     const bool had_points = find == NARROW_AGAIN && v.sizes[i] > 0;
     if (i >= usable_candidates(v)) {
         v.sizes[i] = 0;
         return true;
     }
+    const struct collision_step step = step_of_shape(v, all, own.a);
     const int64_t likely = hint >= 0 && hint < count ? hint : 0;
     const struct sadmm_proxy *pa = wide_at(v.proxies, own.a), *pb = wide_at(v.proxies, own.b);
     const struct near_keys near = near_keys_of(v.before.keys, find == NARROW_AGAIN ? 0 : count, hint);

@@ -315,6 +315,17 @@ extern "C" sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *c, void *
     return reserve_shape(c, input->shape_count, c->view.leaf_count >= c->tree_from, error);
 }
 
+extern "C" void COLLISION(use_gravities)(struct sadmm_cuda_collision *c, const struct cuda_gravities *gravities)
+{
+    c->view.gravities = *gravities;
+}
+
+extern "C" struct sadmm_shape *COLLISION(shapes_to_set)(struct sadmm_cuda_collision *c)
+{
+    c->input_bytes[0] = SIZE_MAX;
+    return in<struct sadmm_shape>(c, SHAPES);
+}
+
 /* Grow a buffer and keep what it holds. */
 static sadmm_status keep_capacity(struct sadmm_cuda_collision *c, int name, size_t count, size_t size,
                               struct sadmm_error *error)

@@ -12,7 +12,7 @@ static __global__ void __launch_bounds__(MESH_THREADS) touch_kernel(const __grid
     const int64_t i = collision_thread(MESH_THREADS);
     if (i >= usable_candidates(v)) return;
     const struct candidate own = candidate_of(v, v.candidates[i]);
-    const struct collision_step step = step_of(v);
+    const struct collision_step step = step_of_shape(v, step_of(v), own.a);
     const struct sadmm_proxy &a = *wide_at(v.proxies, own.a), &b = *wide_at(v.proxies, own.b);
     if (b.geometry.type != SADMM_SHAPE_MESH) return;
     const struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);

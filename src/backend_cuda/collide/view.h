@@ -46,6 +46,7 @@
 
 #include <cuda_runtime.h>
 
+#include "backend_cuda/device/gravity.h"
 #include "backend_cuda/device/layout.h"
 #include "backend_cuda/device/pdl.h"
 #include "backend_cuda/device/wide.h"
@@ -189,6 +190,7 @@ struct collision_view {
     struct collision_grid *grid;                   /* of this step */
     int32_t *abort_code;                           /* not NULL and not 0: do nothing */
     const double *dt, *gravity;                    /* not NULL: of the step, in the place of step's (step_of) */
+    struct cuda_gravities gravities;               /* in the place of these (step_of_shape) */
     const double *threshold;                       /* of restitution, m/s; not NULL: is any pair fast (COUNT_FAST)? */
 
     struct sadmm_proxy *proxies;                   /* by slot */
@@ -236,6 +238,15 @@ static __device__ __forceinline__ collision_step step_of(const collision_view &v
     if (!v.dt) return step;
     step.dt = *v.dt;
     step.gravity = *v.gravity;
+    return step;
+}
+
+/* For a shape, or a pair of it, gravity is that of the world which it is in. step: step_of, fetched before it is known
+ * which shape that is. */
+static __device__ __forceinline__ collision_step step_of_shape(const collision_view &v, collision_step step,
+                                                               uint32_t slot)
+{
+    if (v.gravities.of) step.gravity = own_gravity_size(v.gravities, slot);
     return step;
 }
 

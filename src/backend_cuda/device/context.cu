@@ -52,6 +52,7 @@ static const char *const buffer_names[] = {
     "numbers",
     "scalars",
     "settings",
+    "gravity",
     "weights",
     "records of sides",
     "momentum of islands",

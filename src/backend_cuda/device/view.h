@@ -49,6 +49,7 @@
 
 #include "core/math/weight.h"
 #include "core/solve/kernels.h"
+#include "gravity.h"
 #include "layout.h"
 #include "line.h"
 #include "pdl.h"
@@ -143,7 +144,29 @@ struct model_view {
     int32_t contact_rows; /* of C, B and the response: 1 where no contact has friction (the iteration always has 3) */
     int32_t warm_start;
     int32_t fast, wrenches; /* of the settings that are no numbers: the method; recover_wrenches */
+    struct cuda_gravities gravities; /* in the place of the settings' gravity (gravity_of) */
 };
+
+/* m/s^2, of the world that a dynamic body is in. */
+static __device__ __forceinline__ const double *gravity_of(const model_view &model, int32_t body)
+{
+    if (!model.gravities.of) return model.settings->gravity;
+    return own_gravity(model.gravities, body);
+}
+
+/* The settings' numbers with that; a body that is not dynamic says nothing. */
+static __device__ __forceinline__ struct sadmm_settings settings_with(const struct sadmm_settings &all,
+                                                                      const cuda_gravities &gravities, int32_t body)
+{
+    struct sadmm_settings settings = all;
+    if (!gravities.of || body < 0) return settings;
+    for (int k = 0; k < 3; ++k) settings.gravity[k] = own_gravity(gravities, body)[k];
+    return settings;
+}
+static __device__ __forceinline__ struct sadmm_settings settings_of(const model_view &model, int32_t body)
+{
+    return settings_with(*model.settings, model.gravities, body);
+}
 
 enum { HALFWAY = 8, HALFWAY_ANGULAR = 4 }; /* orientation, angular velocity, 0 */
 

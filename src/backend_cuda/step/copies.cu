@@ -7,11 +7,13 @@
 #include "backend_cuda/device/double.h"
 
 #include "backend_cuda/device/kept_state.h"
+#include "collision/base/bounds.h"
 #include "core/base/memory.h"
 #include "core/model/coupling_law.h"
 #include "core/model/forces.h"
 #include "core/model/joint_law.h"
 #include "core/model/kinematic.h"
+#include "core/model/moments.h"
 #include "subadmm/array_kinds.h"
 #include "world.h"
 
@@ -69,11 +71,13 @@ struct copies_args {
     const uint8_t *left;
     uint8_t *refused;
     const double *wrench, *kinematic_wrench; /* of the last step; NULL: it recovered none */
+    struct sadmm_shape *shapes;              /* by slot, where materials are set */
+    bool bounces;                            /* steps expect restitution */
 };
 
-static __device__ __forceinline__ double number_of(const sadmm_resident_array &array, int64_t k)
+static __device__ __forceinline__ double number_of(const void *values, bool single, int64_t k)
 {
-    return array.single ? (double)((const float *)array.values)[k] : ((const double *)array.values)[k];
+    return single ? (double)((const float *)values)[k] : ((const double *)values)[k];
 }
 
 static __device__ __forceinline__ void put_numbers(const sadmm_resident_array &array, int64_t row,
@@ -214,8 +218,7 @@ static __global__ void __launch_bounds__(COPIES_THREADS)
 
 /* ---- in ---------------------------------------------------------------------------------------------------------- */
 
-/* What an array sets of a joint's coordinate; NULL: it is none of these. Limits are the host's affair: they are checked
- * against each other. */
+/* What an array sets of a joint's coordinate; NULL: it is none of these. */
 static __host__ __device__ inline double *member_of(sadmm_joint_coordinate *c, int32_t array)
 {
     switch (array) {
@@ -241,34 +244,100 @@ static __host__ __device__ inline bool is_input_of_joints(int32_t array)
 
 static __host__ __device__ inline bool is_input(int32_t array)
 {
-    return array == SADMM_ARRAY_BODY_WRENCH || array == SADMM_ARRAY_BODY_GRAVITY_SCALE ||
-           array == SADMM_ARRAY_BODY_DAMPING || is_input_of_joints(array);
+    return array == SADMM_ARRAY_GRAVITY || array == SADMM_ARRAY_BODY_INERTIA || array == SADMM_ARRAY_SHAPE_MATERIAL ||
+           array == SADMM_ARRAY_JOINT_LOWER || array == SADMM_ARRAY_JOINT_UPPER || array == SADMM_ARRAY_BODY_WRENCH ||
+           array == SADMM_ARRAY_BODY_GRAVITY_SCALE || array == SADMM_ARRAY_BODY_DAMPING || is_input_of_joints(array);
 }
 
 /* A number that is not finite is in no range. */
-static __device__ __forceinline__ bool is_taken(const sadmm_resident_array &array, double x)
+static __device__ __forceinline__ bool is_taken(const sadmm_resident_array &array, int column, double x)
 {
-    return x >= array.lo && x <= array.hi;
+    return x >= array.lo[column > 0] && x <= array.hi[column > 0];
+}
+static __device__ __forceinline__ bool are_taken(const sadmm_resident_array &array, const double *x)
+{
+    for (int k = 0; k < array.columns; ++k)
+        if (!is_taken(array, k, x[k])) return false;
+    return true;
+}
+
+/* The largest moment is what contacts know of a body's inertia. */
+static __device__ __forceinline__ bool take_inertia(const cuda_view &v, int32_t body, const double *x)
+{
+    struct sadmm_rigid *rigid = const_cast<struct sadmm_rigid *>(&v.step.before[body]);
+    for (int k = 0; k < 3; ++k)
+        if (!moments_sum_fits(x + 1, k)) return false;
+    if (!moments_ratio_fits(x + 1, sizeof(solver_real) == sizeof(float))) return false;
+    rigid->mass = x[0];
+    for (int k = 0; k < 3; ++k) rigid->inertia[k] = x[1 + k];
+    v.step.bodies[v.step.slot_of_body[body]].inertia = v3_max_abs(v3_load(x + 1));
+    return true;
 }
 
 static __device__ __forceinline__ bool take_body(const cuda_view &v, const copies_args &a, int32_t body,
-                                                 const double *x)
+                                                 double *x)
 {
     struct sadmm_rigid *rigid = const_cast<struct sadmm_rigid *>(&v.step.before[body < 0 ? 0 : body]);
     const int columns = a.array.columns;
+    const bool inertia = a.array.array == SADMM_ARRAY_BODY_INERTIA,
+               wrench = a.array.array == SADMM_ARRAY_BODY_WRENCH,
+               scale = a.array.array == SADMM_ARRAY_BODY_GRAVITY_SCALE;
     if (body < 0) { /* as it is read */
         for (int k = 0; k < columns; ++k)
             if (!(x[k] == 0)) return false;
         return true;
     }
-    const bool wrench = a.array.array == SADMM_ARRAY_BODY_WRENCH,
-               scale = a.array.array == SADMM_ARRAY_BODY_GRAVITY_SCALE;
-    for (int k = 0; k < columns; ++k)
-        if (!is_taken(a.array, x[k])) return false;
+    if (inertia && a.array.single) moments_mend(x);
+    if (!are_taken(a.array, x)) return false;
+    if (inertia) return take_inertia(v, body, x);
     for (int k = 0; k < columns; ++k) {
         if (wrench) rigid->wrench[k] = x[k];
         else if (scale) rigid->gravity_scale = x[k];
         else rigid->damping[k] = x[k];
+    }
+    return true;
+}
+
+/* As sadmm_settings_validate. */
+static __device__ __forceinline__ bool take_gravity(const cuda_view &v, const copies_args &a, int32_t e,
+                                                    const double *x)
+{
+    double *to = const_cast<double *>(v.model.gravities.of) + GRAVITY_NUMBERS * (size_t)e;
+    if (!(hypot(hypot(x[0], x[1]), x[2]) <= a.array.hi[0])) return false;
+    for (int k = 0; k < 3; ++k) to[k] = x[k];
+    to[GRAVITY_SIZE] = gravity_size(x);
+    return true;
+}
+
+/* Where none had restitution steps do not look for it: the host begins others. */
+static __device__ __forceinline__ bool take_material(const copies_args &a, int32_t slot, const double *x)
+{
+    struct sadmm_shape *shape = &a.shapes[slot];
+    if (!are_taken(a.array, x) || (x[1] > 0 && x[1] != shape->restitution && !a.bounces)) return false;
+    shape->friction = x[0];
+    shape->restitution = x[1];
+    return true;
+}
+
+/* Lower limits, or upper ones, or both. */
+static __device__ __forceinline__ bool take_limits(const cuda_view &v, const copies_args &a, int32_t j, int64_t row,
+                                                   const double *x)
+{
+    sadmm_joint_def *def = &v.joints.joints[j].def;
+    const bool is_upper = a.array.array == SADMM_ARRAY_JOINT_UPPER;
+    double lower[JOINT_COORDINATES], upper[JOINT_COORDINATES];
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        const sadmm_joint_coordinate *c = &def->coordinates[k];
+        lower[k] = is_upper ? c->lower : x[k];
+        upper[k] = is_upper         ? x[k]
+                   : a.array.upper ? number_of(a.array.upper, a.array.upper_single, row * JOINT_COORDINATES + k)
+                                   : c->upper;
+        if (lower[k] == c->lower && upper[k] == c->upper) continue;
+        if (def->locks >> k & 1 || !joint_has_coordinate(def, k) || !joint_limits_fit(lower[k], upper[k])) return false;
+    }
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        def->coordinates[k].lower = lower[k];
+        def->coordinates[k].upper = upper[k];
     }
     return true;
 }
@@ -292,12 +361,25 @@ static __device__ __forceinline__ bool take_joint(const cuda_view &v, const copi
     for (int k = 0; k < JOINT_COORDINATES; ++k) {
         before[k] = *member_of(&def->coordinates[k], a.array.array);
         if (x[k] == before[k]) continue;
-        if (!is_taken(a.array, x[k]) || def->locks >> k & 1 || !joint_has_coordinate(def, k)) return false;
+        if (!is_taken(a.array, k, x[k]) || def->locks >> k & 1 || !joint_has_coordinate(def, k)) return false;
     }
     for (int k = 0; k < JOINT_COORDINATES; ++k) *member_of(&def->coordinates[k], a.array.array) = x[k];
     if (constraints_of(joint) <= joint->constraints) return true;
     for (int k = 0; k < JOINT_COORDINATES; ++k) *member_of(&def->coordinates[k], a.array.array) = before[k];
     return false; /* the host makes room for more */
+}
+
+static __device__ __forceinline__ bool take_row(const cuda_view &v, const copies_args &a, int32_t e, int64_t row,
+                                                double *x)
+{
+    const int32_t array = a.array.array;
+    if (array == SADMM_ARRAY_GRAVITY) return take_gravity(v, a, e, x);
+    const int32_t object = a.array.objects[row % a.array.rows];
+    if (array == SADMM_ARRAY_SHAPE_MATERIAL) return take_material(a, e * a.copies.shapes + object, x);
+    if (array == SADMM_ARRAY_JOINT_LOWER || array == SADMM_ARRAY_JOINT_UPPER)
+        return take_limits(v, a, e * a.copies.joints + object, row, x);
+    return is_input_of_joints(array) ? take_joint(v, a, e * a.copies.joints + object, x)
+                                     : take_body(v, a, body_in(a.copies, e, object), x);
 }
 
 static __global__ void __launch_bounds__(COPIES_THREADS)
@@ -306,12 +388,10 @@ static __global__ void __launch_bounds__(COPIES_THREADS)
     const int64_t row = (int64_t)blockIdx.x * COPIES_THREADS + threadIdx.x;
     const int32_t e = (int32_t)(row / a.array.rows);
     if (e >= a.copies.count || (a.left && a.left[e])) return;
-    const int32_t object = a.array.objects[row % a.array.rows];
     double x[MOST_COLUMNS];
-    for (int k = 0; k < a.array.columns; ++k) x[k] = number_of(a.array, row * a.array.columns + k);
-    const bool taken = is_input_of_joints(a.array.array) ? take_joint(v, a, e * a.copies.joints + object, x)
-                             : take_body(v, a, body_in(a.copies, e, object), x);
-    if (!taken) a.refused[e] = 1; /* whoever says so says the same */
+    for (int k = 0; k < a.array.columns; ++k)
+        x[k] = number_of(a.array.values, a.array.single, row * a.array.columns + k);
+    if (!take_row(v, a, e, row, x)) a.refused[e] = 1; /* whoever says so says the same */
 }
 
 /* ---- states ------------------------------------------------------------------------------------------------------ */
@@ -417,8 +497,9 @@ extern "C" sadmm_status CUDA(exchange)(struct sadmm_context *c, const struct sad
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->fork, 0), "cudaStreamWaitEvent");
     view_now(c, &wrench, &kinematic_wrench);
     const bool wrenches = c->plan.wrenches;
-    const copies_args args = {*copies, *array, left, refused, wrenches ? wrench : nullptr,
-                              wrenches ? kinematic_wrench : nullptr};
+    copies_args args = {*copies, *array,  left,      refused, wrenches ? wrench : nullptr,
+                        wrenches ? kinematic_wrench : nullptr, nullptr, c->bounces};
+    if (in && array->array == SADMM_ARRAY_SHAPE_MATERIAL) args.shapes = COLLISION(shapes_to_set)(c->step->collision);
     return in ? run(c, in_kernel, "inputs of environments", rows, args, error)
               : run(c, out_kernel, "arrays of environments", rows, args, error);
 }

@@ -24,7 +24,10 @@ static __device__ __noinline__ bool act(const cuda_view &v, const struct sadmm_r
     for (int i = 0; i < GEAR_JOINTS; ++i) {
         const struct sadmm_resident_joint *joint = &v.joints.joints[gear->joint[i]];
         const struct joint_body bodies[2] = {body_a_of(v, joint), body_of(v, joint->body[1])};
-        acting->joint[i] = joint_act(&joint->def, joint->frame, bodies, settings);
+        const int32_t dynamic = bodies[0].system_body > bodies[1].system_body ? bodies[0].system_body
+                                                                              : bodies[1].system_body;
+        const struct sadmm_settings own = settings_with(*settings, v.model.gravities, dynamic);
+        acting->joint[i] = joint_act(&joint->def, joint->frame, bodies, &own);
         joints[i].def = &joint->def;
         joints[i].memory = &v.joints.after[gear->joint[i]];
         joints[i].coordinate = gear->coordinate[i];

@@ -90,7 +90,7 @@ static __device__ __forceinline__ bool load_closing(const cuda_view &v, const ar
 /* Energy that the body of an entry has by its place: as its share of what closing costs begins, and ends. */
 static __device__ __noinline__ void add_energy(const cuda_view &v, int32_t i, bool ends)
 {
-    const struct sadmm_settings settings = *v.model.settings;
+    const struct sadmm_settings settings = settings_of(v.model, i);
     struct cuda_closed_body *own = &v.joints.closed[i];
     const double energy =
         joint_energy2(&v.step.before[i], own->place, own->place + 3, own->place + 7, &settings);

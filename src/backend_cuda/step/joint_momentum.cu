@@ -86,7 +86,7 @@ static __device__ __noinline__ void store_body(const cuda_view &v, const struct 
         body = &stiffened;
     }
     const double *origin = v.step.before[island.label].position;
-    const struct sadmm_settings settings = *v.model.settings;
+    const struct sadmm_settings settings = settings_of(v.model, i);
     struct joint_momentum sums = {};
     double place[PLACE];
     if (island.part) add_part_rows(v, island.part, i, body, origin, settings.dt, &sums);

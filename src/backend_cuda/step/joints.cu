@@ -146,7 +146,8 @@ static __device__ __forceinline__ void act_all(const cuda_view &v, const struct 
     if (t < 2 * ROWS_JOINTS && is_enabled(v, of_side)) {
         const struct sadmm_resident_joint *joint = &v.joints.joints[of_side];
         const struct joint_body body = t % 2 ? body_of(v, joint->body[1]) : body_a_of(v, joint);
-        acting[t / 2].side[t % 2] = joint_side_of(body, &settings);
+        const struct sadmm_settings own = settings_with(settings, v.model.gravities, body.system_body);
+        acting[t / 2].side[t % 2] = joint_side_of(body, &own);
     }
     __syncthreads();
     if (t < ROWS_JOINTS && is_enabled(v, of_joint)) {
@@ -297,7 +298,7 @@ static __device__ __forceinline__ void inspect_pair(const cuda_view &v, int32_t 
     const struct sadmm_contact_pair *pair = &v.raw.pairs[live ? p : 0];
     const int32_t a = live ? pair->body_a : -1, b = live ? pair->body_b : -1, body = a >= 0 ? a : b;
     const bool inspects = body >= 0 && v.islands.info[v.graph.label[body]].rows;
-    const struct sadmm_settings settings = *v.model.settings;
+    const struct sadmm_settings settings = settings_of(v.model, body);
     struct joint_trapezoid bodies[2] = {};
     struct trapezoid_touch touch = {0, {0, 0}};
     if (inspects) {

@@ -143,7 +143,7 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
     if (lane == LANE_FORCE)
         out->acceleration[0] = v3_max_abs(force) == 0 && scale == 1 && damping[0] == 0
                                    ? 0
-                                   : forces_acceleration(body, v.model.settings->gravity, dt);
+                                   : forces_acceleration(body, gravity_of(v.model, (int32_t)i), dt);
     if (lane == LANE_TORQUE)
         out->acceleration[1] =
             v3_max_abs(torque) == 0 && damping[1] == 0 ? 0 : forces_angular_acceleration(body, dt);
@@ -208,7 +208,7 @@ static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
     const double dt = v.model.settings->dt;
     double velocity[6], place[PLACE];
     load_end_velocity(v, i, velocity);
-    move_body(&before.body, halfway_of(v, i), velocity, dt, v.model.settings->gravity, kind, place);
+    move_body(&before.body, halfway_of(v, i), velocity, dt, gravity_of(v.model, i), kind, place);
     store_moved(v, i, before, place, false, dt); /* finite, since both places were that it had to choose from */
 }
 

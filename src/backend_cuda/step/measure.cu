@@ -51,7 +51,7 @@ static __global__ void __launch_bounds__(MEASURE_THREADS)
     const bool joints = v.joints.count > 0 && (!v.joints.apart || v.joints.is_articulated[i]);
     for (size_t k = 0; k < 6; ++k)
         velocity[k] = joints ? v.joints.velocity[6 * (size_t)i + k] : v.step.after[i].velocity[k];
-    const struct sadmm_settings settings = *v.model.settings;
+    const struct sadmm_settings settings = settings_of(v.model, i);
     struct sadmm_rigid body = v.raw.system.rigid[i];
     if (v.joints.count > 0 && v.joints.stiffening[i].any) {
         const struct sadmm_rigid own = body;

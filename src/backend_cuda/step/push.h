@@ -41,8 +41,9 @@ static __device__ __noinline__ void report_push(const cuda_view &v, int32_t p, d
     if (p >= 0) {
         const struct sadmm_settings *s = v.model.settings;
         const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
+        const double *gravity = gravity_of(v.model, pair->body_a >= 0 ? pair->body_a : pair->body_b);
         const double speed = push_speed(s, separation),
-                     pull = speed > 0 ? push_pull(v.raw.system.rigid, pair, size3(s->gravity), !v.model.fast) : 0;
+                     pull = speed > 0 ? push_pull(v.raw.system.rigid, pair, size3(gravity), !v.model.fast) : 0;
         share = push_share_of(pair, speed, s->correction_factor, pull * s->dt);
         if (share.bits) label = label_of(v.graph, pair);
         if (label >= 0 && v.push.bits[label] & PUSH_ROWS) label = -1;

@@ -49,7 +49,7 @@ static __device__ __forceinline__ trapezoid_speeds load_trapezoid_speeds(const c
     const trapezoid_body own = load_trapezoid_body<WHOLE>(v, body);
     const trapezoid_speeds out = {
         {trapezoid_speed_part(own.before, own.velocity, 0), trapezoid_speed_part(own.before, own.velocity, 1)},
-        trapezoid_rest_speed(v.model.settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
+        trapezoid_rest_speed(gravity_of(v.model, body), rigid->gravity_scale, rigid->wrench, rigid->mass,
                              v.model.settings->dt),
         forces_touch(rigid)};
     return out;

@@ -1,7 +1,10 @@
 /* Whole steps on the device: take over a world, let it go; where its arrays are (step/world.h). */
 #include <string.h>
 
+#include "backend_cuda/device/double.h"
+
 #include "backend_cuda/graph/graph.h"
+#include "collision/base/bounds.h"
 #include "collision/collision.h"
 #include "core/base/memory.h"
 #include "world.h"
@@ -109,6 +112,28 @@ static sadmm_status step_create(struct sadmm_context *c, struct sadmm_error *err
     return SADMM_OK;
 }
 
+/* Where each of many equal worlds has its own. */
+static sadmm_status load_gravities(struct sadmm_context *c, const struct sadmm_resident_world *world,
+                                   struct sadmm_error *error)
+{
+    struct cuda_gravities *view = &c->view.model.gravities;
+    *view = {};
+    if (!world->copies) return SADMM_OK;
+    const size_t count = (size_t)world->copies->count;
+    double *numbers = (double *)sadmm_alloc(count, GRAVITY_NUMBERS * sizeof *numbers);
+    if (!numbers) return sadmm_fail_memory(error, "gravity of environments");
+    for (size_t k = 0; k < count; ++k) {
+        memcpy(numbers + GRAVITY_NUMBERS * k, world->gravities + 3 * k, 3 * sizeof *numbers);
+        numbers[GRAVITY_NUMBERS * k + GRAVITY_SIZE] = gravity_size(world->gravities + 3 * k);
+    }
+    const size_t bytes = count * GRAVITY_NUMBERS * sizeof *numbers;
+    sadmm_status status = CUDA(reserve)(c, BUFFER_GRAVITY, bytes, error);
+    if (status == SADMM_OK) status = CUDA(put)(c, buffer<void>(c, BUFFER_GRAVITY), numbers, bytes, error);
+    sadmm_free(numbers);
+    if (status == SADMM_OK) *view = {buffer<double>(c, BUFFER_GRAVITY), world->copies->bodies, world->copies->shapes};
+    return status;
+}
+
 extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct sadmm_resident_world *world,
                                          const struct sadmm_settings *settings, struct sadmm_error *error)
 {
@@ -196,6 +221,8 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                           buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),
                           &c->view.model.live->abort_code, &kept->settings.dt, &kept->gravity, error));
+    TRY(load_gravities(c, world, error));
+    COLLISION(use_gravities)(s->collision, &c->view.model.gravities);
     TRY(COLLISION(load_hits)(s->collision, world->input, world->held, error));
     CUDA(view_into)(c, s->into, 0);
     return CUDA(wait)(c, error);

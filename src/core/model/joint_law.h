@@ -533,6 +533,12 @@ SADMM_INLINE bool joint_has_coordinate(const sadmm_joint_def *def, int k)
     return k == 0 || def->locks >> k & 1 || !joint_is_radial(def->kind);
 }
 
+/* May a coordinate have these limits? */
+SADMM_INLINE bool joint_limits_fit(double lower, double upper)
+{
+    return lower <= upper && lower < INFINITY && upper > -INFINITY;
+}
+
 /* Most laws that the joint may have in a step. */
 SADMM_INLINE int joint_most_laws(const sadmm_joint_def *def)
 {

@@ -37,7 +37,7 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.gravity[%d] = %g: must be finite", i,
                               g[i]);
     double norm = hypot(hypot(g[0], g[1]), g[2]);
-    if (!(norm <= 1e6))
+    if (!(norm <= SADMM_GRAVITY_LIMIT))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.gravity: norm = %g: must be <= 1e6 m/s^2",
                           norm);
     return SADMM_OK;

@@ -13,6 +13,8 @@
 extern "C" {
 #endif
 
+#define SADMM_GRAVITY_LIMIT 1e6 /* m/s^2, of its size */
+
 /* The first version's end with `threads`. */
 #define SADMM_SETTINGS_LEAST SADMM_SIZE_TO(sadmm_settings, threads)
 extern const struct sadmm_growing sadmm_growing_settings;

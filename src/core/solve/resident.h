@@ -24,6 +24,14 @@ struct sadmm_coupling_memory; /* core/model/coupling_law.h */
 struct sadmm_kinematic_body;  /* core/model/kinematic.h */
 struct sadmm_resident_gear;   /* core/model/gear_law.h */
 
+/* A world of many equal ones (environments): bodies, shapes and joints one world after the other. So many of each: */
+struct sadmm_resident_copies {
+    int32_t count;             /* worlds */
+    int32_t bodies, kinematic; /* dynamic bodies, and kinematic ones; */
+    int32_t shapes;            /* slots */
+    int32_t joints, couplings, gears; /* joints: without those that couplings are */
+};
+
 /* A world, from the host. */
 struct sadmm_resident_world {
     const struct sadmm_collision_input *input;       /* shapes, bodies by slot, overrides */
@@ -48,6 +56,8 @@ struct sadmm_resident_world {
     const unsigned char *held;                 /* by body slot: joints hold it, and it is not hit at its moment
                                                   (world/hits.c) */
     double time;                               /* simulated until now, s */
+    const struct sadmm_resident_copies *copies; /* not NULL: each of many equal worlds has its own gravity */
+    const double *gravities;                    /* (copies->count x 3) m/s^2, in the place of the settings' */
 };
 
 enum sadmm_update_kind {
@@ -103,22 +113,16 @@ struct sadmm_resident_view {
     void *stream;                    /* what steps run on: cudaStream_t */
 };
 
-/* A world of many equal ones (environments): bodies, shapes and joints one world after the other. So many of each: */
-struct sadmm_resident_copies {
-    int32_t count;             /* worlds */
-    int32_t bodies, kinematic; /* dynamic bodies, and kinematic ones; */
-    int32_t shapes;            /* slots */
-    int32_t joints, couplings, gears; /* joints: without those that couplings are */
-};
-
-/* An array (subadmm/arrays.h) of all of them. */
+/* An array (subadmm/arrays.h) of all worlds of such a one. */
 struct sadmm_resident_array {
     int32_t array;          /* sadmm_array */
     int32_t rows, columns;  /* of each */
     bool single;            /* numbers are floats, else doubles */
     void *values;           /* (worlds x rows x columns) in the backend's memory, as is: */
-    double lo, hi;          /* in: numbers that the world takes are in this range */
-    const int32_t *objects; /* (rows) what a row is of: a body of the step (contact_set.h), a joint, a coupling */
+    double lo[2], hi[2];    /* in: ranges of numbers that the world takes: the first column's, the others' */
+    const int32_t *objects; /* (rows) what a row is of: a body of the step (contact_set.h); a shape, joint, coupling */
+    const void *upper;      /* in, JOINT_LOWER: numbers of JOINT_UPPER, which are taken along; NULL: these stay */
+    bool upper_single;      /* they are floats */
 };
 
 /* What steps change of one of them. */

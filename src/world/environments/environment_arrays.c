@@ -8,10 +8,12 @@
 #include "core/base/memory.h"
 #include "core/base/names.h"
 #include "core/model/joint_law.h"
+#include "core/model/settings.h"
 #include "environment_backend.h"
 #include "environment_checks.h"
 #include "environment_contacts.h"
 #include "environment_merge.h"
+#include "environment_numbers.h"
 #include "environment_work.h"
 #include "world/objects/joint.h"
 #include "world/state/report.h"
@@ -27,83 +29,6 @@ static sadmm_status check_array(struct sadmm_environments *environments, sadmm_a
     if ((unsigned)array < SADMM_ARRAY_COUNT) return SADMM_OK;
     return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT, "array = %d: must be in [0, %d)", (int)array,
                       SADMM_ARRAY_COUNT);
-}
-
-/* The first that is bound of an array, in any precision where it is -1; NULL: none. */
-static struct sadmm_bound_array *bound_of(const struct sadmm_environments *environments, sadmm_array array,
-                                          int precision)
-{
-    for (size_t k = 0; k < environments->bound_count; ++k) {
-        struct sadmm_bound_array *bound = &environments->bound[k];
-        if (bound->array == array && (precision < 0 || (int)bound->precision == precision)) return bound;
-    }
-    return NULL;
-}
-
-/* Single precision may take numbers out of their range by rounding: the least mass, a moment that is the sum of the
- * others, the least size. They become what they were meant to be. */
-static const double rounding = 1 + 1e-6; /* of single precision */
-
-static void mend_inertia(double *row)
-{
-    static const double least = 1e-9; /* kg */
-    if (row[0] < least && row[0] * rounding >= least) row[0] = least;
-    for (int k = 1; k < 4; ++k) {
-        const double most = row[1 + k % 3] + row[1 + (k + 1) % 3];
-        if (row[k] > most && row[k] <= rounding * most) row[k] = most;
-    }
-}
-
-static void mend_size(double *size)
-{
-    static const double least = 1e-6; /* m */
-    if (*size < least && *size * rounding >= least) *size = least;
-}
-
-static void mend(const struct sadmm_bound_array *bound, double *numbers)
-{
-    if (bound->precision != SADMM_F32) return;
-    if (bound->array == SADMM_ARRAY_BODY_INERTIA)
-        for (size_t k = 0; k < bound->numbers; k += 4) mend_inertia(numbers + k);
-    if (bound->array == SADMM_ARRAY_SHAPE_SIZE)
-        for (size_t k = 0; k < bound->numbers; ++k) mend_size(numbers + k);
-}
-
-static void load_numbers(const struct sadmm_bound_array *bound, int32_t environment, double *out)
-{
-    const size_t n = bound->numbers, first = n * (size_t)environment;
-    if (bound->precision == SADMM_F64) {
-        memcpy(out, (const double *)bound->host + first, n * sizeof *out);
-        return;
-    }
-    for (size_t k = 0; k < n; ++k) out[k] = (double)((const float *)bound->host)[first + k];
-    mend(bound, out);
-}
-
-static void store_numbers(const struct sadmm_bound_array *bound, int32_t environment, const double *numbers)
-{
-    const size_t n = bound->numbers, first = n * (size_t)environment;
-    if (bound->precision == SADMM_F64) memcpy((double *)bound->host + first, numbers, n * sizeof *numbers);
-    else
-        for (size_t k = 0; k < n; ++k) ((float *)bound->host)[first + k] = (float)numbers[k];
-}
-
-/* What a world without the numbers has none of is 0. */
-static sadmm_status get_all(sadmm_world *world, sadmm_array array, double *values)
-{
-    const int32_t rows = sadmm_world_array_rows(world, array);
-    const sadmm_status status = sadmm_world_get_array(world, array, 0, rows, values);
-    if (status != SADMM_ERROR_UNAVAILABLE) return status;
-    memset(values, 0, (size_t)rows * (size_t)sadmm_array_columns(array) * sizeof *values);
-    return SADMM_OK;
-}
-
-static sadmm_status set_all(sadmm_world *world, sadmm_array array, const double *values)
-{
-    const sadmm_status status = sadmm_world_set_array(world, array, 0, sadmm_world_array_rows(world, array), values);
-    if (status == SADMM_OK) return SADMM_OK;
-    const struct sadmm_error cause = world->error;
-    return sadmm_fail(&world->error, status, "%s: %s", sadmm_array_name(array), cause.message);
 }
 
 /* ---- in steps ---------------------------------------------------------------------------------------------------- */
@@ -123,20 +48,11 @@ static sadmm_status open_joint(sadmm_world *world, struct sadmm_world_joint *joi
 /* Limits are checked against each other: where both are an environment's own, none is left of another one's. */
 static sadmm_status open_limits(const struct sadmm_environments *environments, sadmm_world *world)
 {
-    if (!bound_of(environments, SADMM_ARRAY_JOINT_LOWER, -1) || !bound_of(environments, SADMM_ARRAY_JOINT_UPPER, -1))
+    if (!sadmm_environments_bound(environments, SADMM_ARRAY_JOINT_LOWER, -1) ||
+        !sadmm_environments_bound(environments, SADMM_ARRAY_JOINT_UPPER, -1))
         return SADMM_OK;
     for (SADMM_OBJECTS(slot, &world->joint_ids)) TRY(open_joint(world, &world->joints[slot]));
     return SADMM_OK;
-}
-
-/* good: one that is refused is the template's. */
-static sadmm_status read_input(struct sadmm_environment_worker *worker, const struct sadmm_bound_array *bound,
-                               int32_t environment, bool good)
-{
-    load_numbers(bound, environment, worker->numbers);
-    const sadmm_status status = set_all(worker->world, bound->array, worker->numbers);
-    if (status != SADMM_ERROR_INVALID_ARGUMENT || !good) return status;
-    return set_all(worker->world, bound->array, bound->start);
 }
 
 /* All but those of one array. */
@@ -147,7 +63,7 @@ static sadmm_status read_inputs(struct sadmm_environments *environments, struct 
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
         if (!sadmm_environments_is_input(bound->array) || (int)bound->array == but) continue;
-        TRY(read_input(worker, bound, environment, good));
+        TRY(sadmm_bound_read(worker, bound, environment, good));
     }
     return SADMM_OK;
 }
@@ -170,8 +86,21 @@ sadmm_status sadmm_environments_read_good_forms(struct sadmm_environments *envir
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
         if (bound->array == SADMM_ARRAY_SHAPE_SIZE || bound->array == SADMM_ARRAY_SHAPE_FRAME)
-            TRY(read_input(worker, bound, environment, true));
+            TRY(sadmm_bound_read(worker, bound, environment, true));
     }
+    return SADMM_OK;
+}
+
+/* Gravity is the settings' of a world, of which the merged one has others only where its backend takes it over. What
+ * that has of it by now is the same: it has taken the array by itself. */
+static sadmm_status set_merged_gravity(struct sadmm_environments *environments, int32_t environment,
+                                       const double *numbers)
+{
+    sadmm_world *world = environments->merged.world;
+    sadmm_settings settings = world->def.settings;
+    memcpy(settings.gravity, numbers, sizeof settings.gravity);
+    TRY(sadmm_settings_validate(&settings, &world->error));
+    memcpy(environments->merged.gravities + 3 * (size_t)environment, numbers, sizeof settings.gravity);
     return SADMM_OK;
 }
 
@@ -183,7 +112,10 @@ static sadmm_status give_merged(struct sadmm_environments *environments, struct 
     double *given = bound->given + bound->numbers * (size_t)environment;
     const int32_t rows = sadmm_environments_rows(environments, bound->array);
     if (!bound->given_unknown && memcmp(given, numbers, bound->numbers * sizeof *numbers) == 0) return SADMM_OK;
-    const sadmm_status status = sadmm_world_set_array(world, bound->array, rows * environment, rows, numbers);
+    const sadmm_status status =
+        bound->array == SADMM_ARRAY_GRAVITY
+            ? set_merged_gravity(environments, environment, numbers)
+            : sadmm_world_set_array(world, bound->array, rows * environment, rows, numbers);
     if (status == SADMM_OK) memcpy(given, numbers, bound->numbers * sizeof *numbers);
     else {
         const struct sadmm_error cause = world->error;
@@ -200,9 +132,9 @@ static sadmm_status open_merged_limits(struct sadmm_environments *environments, 
     sadmm_world *world = environments->merged.world;
     bool differ = false;
     for (int k = 0; k < 2; ++k) {
-        bound[k] = bound_of(environments, limits[k], -1);
+        bound[k] = sadmm_environments_bound(environments, limits[k], -1);
         if (!bound[k]) return SADMM_OK;
-        load_numbers(bound[k], environment, environments->worker[0].numbers);
+        sadmm_bound_load(bound[k], environment, environments->worker[0].numbers);
         differ = differ || bound[k]->given_unknown || memcmp(bound[k]->given + bound[k]->numbers * (size_t)environment,
                                   environments->worker[0].numbers, bound[k]->numbers * sizeof(double)) != 0;
     }
@@ -223,7 +155,7 @@ sadmm_status sadmm_environments_read_merged_inputs(struct sadmm_environments *en
     for (size_t k = 0; k < environments->bound_count; ++k) {
         struct sadmm_bound_array *bound = &environments->bound[k];
         if (!bound->given) continue;
-        load_numbers(bound, environment, worker->numbers);
+        sadmm_bound_load(bound, environment, worker->numbers);
         TRY(give_merged(environments, bound, environment, worker->numbers));
     }
     return SADMM_OK;
@@ -247,8 +179,8 @@ sadmm_status sadmm_environments_write_outputs(struct sadmm_environments *environ
     for (size_t k = 0; k < environments->bound_count; ++k) {
         const struct sadmm_bound_array *bound = &environments->bound[k];
         if (sadmm_environments_is_input(bound->array) || (environments->merged.world && !bound->by_host)) continue;
-        TRY(get_all(worker->world, bound->array, worker->numbers));
-        store_numbers(bound, environment, worker->numbers);
+        TRY(sadmm_bound_get_all(worker->world, bound->array, worker->numbers));
+        sadmm_bound_store(bound, environment, worker->numbers);
     }
     return environments->merged.world ? SADMM_OK : sadmm_environments_keep_contacts(environments, worker, environment);
 }
@@ -259,7 +191,7 @@ bool sadmm_environments_inputs_differ(const struct sadmm_environments *environme
         const struct sadmm_bound_array *bound = &environments->bound[k];
         double *now = environments->worker[0].numbers;
         if (!bound->given || sadmm_environments_may_exchange(environments, bound)) continue;
-        load_numbers(bound, environment, now);
+        sadmm_bound_load(bound, environment, now);
         if (memcmp(bound->given + bound->numbers * (size_t)environment, now, bound->numbers * sizeof *now) != 0)
             return true;
     }
@@ -287,7 +219,7 @@ static sadmm_status write_reports(struct sadmm_environments *environments, struc
         double row[8];
         if (environments->marked[e] || !sadmm_environments_report(environments, e, &report)) continue;
         sadmm_report_numbers(&report, row);
-        store_numbers(bound, e, row);
+        sadmm_bound_store(bound, e, row);
     }
     return sadmm_environments_push_array(environments, bound);
 }
@@ -324,11 +256,11 @@ static sadmm_status write_marked(struct sadmm_environments *environments)
         if (is_output(output)) TRY(sadmm_environments_pull_array(environments, output));
     for (int32_t e = 0; e < environments->count; ++e) {
         if (!merged->unwritten[e] || !environments->marked[e]) continue;
-        sadmm_status status = sadmm_environment_state_load(worker->world, &environments->states[e]);
+        sadmm_status status = sadmm_environments_load(environments, worker, e);
         for (output = bound; output < end && status == SADMM_OK; ++output) {
             if (!is_output(output)) continue;
-            status = get_all(worker->world, output->array, worker->numbers);
-            if (status == SADMM_OK) store_numbers(output, e, worker->numbers);
+            status = sadmm_bound_get_all(worker->world, output->array, worker->numbers);
+            if (status == SADMM_OK) sadmm_bound_store(output, e, worker->numbers);
         }
         if (status != SADMM_OK)
             return sadmm_fail(&environments->error, status, "environment %d: %s", e, worker->world->error.message);
@@ -368,8 +300,8 @@ sadmm_status sadmm_environments_write_merged_outputs(struct sadmm_environments *
  * from which one environment is taken at the price of many. */
 static struct sadmm_bound_array *source_of(const struct sadmm_environments *environments, sadmm_array array)
 {
-    if (sadmm_environments_is_input(array)) return bound_of(environments, array, -1);
-    return environments->merged.world ? bound_of(environments, array, SADMM_F64) : NULL;
+    if (sadmm_environments_is_input(array)) return sadmm_environments_bound(environments, array, -1);
+    return environments->merged.world ? sadmm_environments_bound(environments, array, SADMM_F64) : NULL;
 }
 
 /* The report of an environment of a merged world, which it is not taken from there for. */
@@ -388,7 +320,7 @@ static sadmm_status read_environment(struct sadmm_environments *environments, st
 {
     const struct sadmm_bound_array *bound = source_of(environments, array);
     if (bound) {
-        load_numbers(bound, environment, values);
+        sadmm_bound_load(bound, environment, values);
         return SADMM_OK;
     }
     if (environments->merged.world && array == SADMM_ARRAY_REPORT && !environments->marked[environment]) {
@@ -398,7 +330,7 @@ static sadmm_status read_environment(struct sadmm_environments *environments, st
                    : sadmm_fail(&worker->world->error, status, "%s", environments->error.message);
     }
     TRY(sadmm_environments_load(environments, worker, environment));
-    return get_all(worker->world, array, values);
+    return sadmm_bound_get_all(worker->world, array, values);
 }
 
 static sadmm_status fill(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
@@ -407,7 +339,7 @@ static sadmm_status fill(struct sadmm_environments *environments, struct sadmm_e
     const struct sadmm_bound_array *bound = (const struct sadmm_bound_array *)argument;
     (void)place;
     TRY(read_environment(environments, worker, environment, bound->array, worker->numbers));
-    store_numbers(bound, environment, worker->numbers);
+    sadmm_bound_store(bound, environment, worker->numbers);
     return SADMM_OK;
 }
 
@@ -416,7 +348,7 @@ static sadmm_status read_template(struct sadmm_environments *environments, sadmm
 {
     sadmm_world *world = environments->worker[0].world;
     sadmm_status status = sadmm_environment_state_load(world, &environments->kept[0]);
-    if (status == SADMM_OK) status = get_all(world, array, values);
+    if (status == SADMM_OK) status = sadmm_bound_get_all(world, array, values);
     return status == SADMM_OK ? status : sadmm_fail(&environments->error, status, "%s", world->error.message);
 }
 
@@ -427,15 +359,18 @@ static sadmm_status bind(struct sadmm_environments *environments, sadmm_array ar
     struct sadmm_error *error = &environments->error;
     const size_t n = environments->bound_count;
     const bool input = sadmm_environments_is_input(array);
-    *out = bound_of(environments, array, input ? -1 : (int)precision);
+    *out = sadmm_environments_bound(environments, array, input ? -1 : (int)precision);
     if (*out && (*out)->precision != precision)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "precision = %s: must be %s, which the array %s has",
                           sadmm_precision_names[precision], sadmm_precision_names[(*out)->precision],
                           sadmm_array_name(array));
     if (*out) return SADMM_OK;
-    if (environments->merged.world && array == SADMM_ARRAY_GRAVITY)
+    const bool gravity = environments->merged.world && array == SADMM_ARRAY_GRAVITY;
+    if (gravity && !sadmm_environments_may_have_gravities(environments))
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
-                          "array = gravity: environments on CUDA have one gravity, that of the settings");
+                          "array = gravity: environments on CUDA have one where the host drives the steps "
+                          "(settings.residual_tolerance; settings.tolerance in the method 'paper', or with more than "
+                          "64 checks a step)");
     if (!SADMM_GROW(environments->bound, n, n + 1)) return sadmm_fail_memory(error, "an array of environments");
     struct sadmm_bound_array fresh = {
         .array = array, .precision = precision, .numbers = numbers_of(environments, array)};
@@ -454,6 +389,7 @@ static sadmm_status bind(struct sadmm_environments *environments, sadmm_array ar
     if (status == SADMM_OK && source) status = sadmm_environments_pull_array(environments, source);
     if (status == SADMM_OK) status = sadmm_environments_each(environments, NULL, environments->count, fill, &fresh);
     if (status == SADMM_OK) status = sadmm_environments_place_array(environments, &fresh);
+    if (status == SADMM_OK && gravity) status = sadmm_environments_open_gravities(environments);
     if (status != SADMM_OK) {
         sadmm_environments_release_array(environments, &fresh);
         return status;
@@ -524,12 +460,17 @@ static sadmm_status try_one(struct sadmm_environments *environments, struct sadm
     const struct rows_of *rows = (const struct rows_of *)argument;
     const double *given = rows->in + rows->numbers * (size_t)place;
     TRY(sadmm_environments_load(environments, worker, environment));
-    if (!rows->bound) return set_all(worker->world, rows->array, given);
+    if (!rows->bound) {
+        /* positions of joints are by frames to come */
+        const struct sadmm_bound_array *frames = sadmm_environments_bound(environments, SADMM_ARRAY_JOINT_FRAME, -1);
+        if (frames) TRY(sadmm_bound_read(worker, frames, environment, true));
+        return sadmm_bound_set_all(worker->world, rows->array, given);
+    }
     TRY(read_inputs(environments, worker, environment, (int)rows->array, true));
     const bool single = rows->bound->precision == SADMM_F32; /* as it will be stored */
     for (size_t k = 0; k < rows->numbers; ++k) worker->numbers[k] = single ? (double)(float)given[k] : given[k];
-    mend(rows->bound, worker->numbers);
-    return set_all(worker->world, rows->array, worker->numbers);
+    sadmm_bound_mend(rows->bound, worker->numbers);
+    return sadmm_bound_set_all(worker->world, rows->array, worker->numbers);
 }
 
 static sadmm_status set_one(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
@@ -537,7 +478,7 @@ static sadmm_status set_one(struct sadmm_environments *environments, struct sadm
 {
     const struct rows_of *rows = (const struct rows_of *)argument;
     if (rows->bound) {
-        store_numbers(rows->bound, environment, rows->in + rows->numbers * (size_t)place);
+        sadmm_bound_store(rows->bound, environment, rows->in + rows->numbers * (size_t)place);
         return SADMM_OK;
     }
     TRY(try_one(environments, worker, environment, place, argument));
@@ -561,7 +502,7 @@ sadmm_status sadmm_environments_set(sadmm_environments *environments, sadmm_arra
                           sadmm_array_name(array));
     /* From here on every environment has its own, so that what a worker tries is of no other one. */
     if (sadmm_environments_is_input(array)) {
-        const struct sadmm_bound_array *before = bound_of(environments, array, -1);
+        const struct sadmm_bound_array *before = sadmm_environments_bound(environments, array, -1);
         TRY(bind(environments, array, before ? before->precision : SADMM_F64, &rows.bound));
     }
     TRY(sadmm_environments_pull_inputs(environments, true));

@@ -5,7 +5,9 @@
 #include "core/base/definition_fields.h"
 #include "core/base/memory.h"
 #include "core/model/kinematic.h"
+#include "core/model/settings.h"
 #include "environment_checks.h"
+#include "environment_numbers.h"
 #include "world/objects/body_check.h"
 #include "world/resident/resident.h"
 #include "world/step.h"
@@ -45,7 +47,8 @@ static sadmm_status list_objects(struct sadmm_environments *environments)
     struct sadmm_merged_world *merged = &environments->merged;
     const sadmm_world *from = environments->worker[0].world;
     const size_t bodies = (size_t)merged->bodies.count, couplings = (size_t)from->coupling_ids.count,
-                 joints = (size_t)merged->joints.count, others = joints > couplings ? joints : couplings;
+                 joints = (size_t)merged->joints.count, shapes = (size_t)merged->shapes.count,
+                 most = joints > couplings ? joints : couplings, others = shapes > most ? shapes : most;
     int32_t *list = (int32_t *)sadmm_alloc(bodies + others, sizeof *list), dynamic = 0, kinematic = 0;
     if (!list) return sadmm_fail_memory(&environments->error, "environments");
     for (size_t i = 0; i < bodies; ++i) {
@@ -159,11 +162,19 @@ bool sadmm_environments_may_exchange(const struct sadmm_environments *environmen
            kernels_of(environments)->has_array((int32_t)bound->array, sadmm_environments_is_input(bound->array));
 }
 
-/* What is in range of an array that the backend takes in. */
-static void find_range(sadmm_array array, double *lo, double *hi)
+/* What is in range of an array that the backend takes in: of the first column, and of the others. */
+static void find_range(struct sadmm_resident_array *array)
 {
-    const struct sadmm_field *field = NULL;
-    switch (array) {
+    const struct sadmm_field *field = NULL, *others = NULL;
+    switch ((sadmm_array)array->array) {
+    case SADMM_ARRAY_BODY_INERTIA:
+        field = SADMM_BODY_FIELD(mass);
+        others = SADMM_BODY_FIELD(inertia);
+        break;
+    case SADMM_ARRAY_SHAPE_MATERIAL:
+        field = SADMM_SHAPE_FIELD(friction);
+        others = SADMM_SHAPE_FIELD(restitution);
+        break;
     case SADMM_ARRAY_BODY_GRAVITY_SCALE: field = SADMM_BODY_FIELD(gravity_scale); break;
     case SADMM_ARRAY_BODY_DAMPING: field = SADMM_BODY_FIELD(linear_damping); break;
     case SADMM_ARRAY_JOINT_TARGET_POSITION: field = SADMM_COORDINATE_FIELD(target_position); break;
@@ -178,15 +189,20 @@ static void find_range(sadmm_array array, double *lo, double *hi)
     case SADMM_ARRAY_JOINT_ARMATURE: field = SADMM_COORDINATE_FIELD(armature); break;
     default: break;
     }
-    *lo = field ? field->lo : -SADMM_WRENCH_LIMIT;
-    *hi = field ? field->hi : SADMM_WRENCH_LIMIT;
+    if (!others) others = field;
+    array->lo[0] = field ? field->lo : -SADMM_WRENCH_LIMIT;
+    array->hi[0] = field ? field->hi : SADMM_WRENCH_LIMIT;
+    array->lo[1] = others ? others->lo : -SADMM_WRENCH_LIMIT;
+    array->hi[1] = others ? others->hi : SADMM_WRENCH_LIMIT;
+    if (array->array == SADMM_ARRAY_GRAVITY) array->hi[0] = SADMM_GRAVITY_LIMIT; /* of its size */
 }
 
 static bool is_of_bodies(sadmm_array array)
 {
     return array == SADMM_ARRAY_BODY_STATE || array == SADMM_ARRAY_BODY_WRENCH ||
            array == SADMM_ARRAY_BODY_CONTACT_WRENCH || array == SADMM_ARRAY_BODY_ACCELERATION ||
-           array == SADMM_ARRAY_BODY_GRAVITY_SCALE || array == SADMM_ARRAY_BODY_DAMPING;
+           array == SADMM_ARRAY_BODY_GRAVITY_SCALE || array == SADMM_ARRAY_BODY_DAMPING ||
+           array == SADMM_ARRAY_BODY_INERTIA;
 }
 
 /* Which are marked has changed since. */
@@ -214,13 +230,46 @@ sadmm_status sadmm_environments_exchange(struct sadmm_environments *environments
         .objects = merged->objects + (is_of_bodies(bound->array) ? 0 : merged->bodies.count),
     };
     if (array.rows == 0) return SADMM_OK;
-    find_range(bound->array, &array.lo, &array.hi);
+    find_range(&array);
     TRY(upload_marks(environments));
     bound->host_behind = true;
     bound->given_unknown = bound->given_unknown || in;
+    /* limits are checked against each other: those that are both an environment's own are taken together */
+    if (bound->array == SADMM_ARRAY_JOINT_UPPER && sadmm_environments_bound(environments, SADMM_ARRAY_JOINT_LOWER, -1))
+        return SADMM_OK;
+    const struct sadmm_bound_array *upper =
+        bound->array == SADMM_ARRAY_JOINT_LOWER
+            ? sadmm_environments_bound(environments, SADMM_ARRAY_JOINT_UPPER, -1)
+            : NULL;
+    if (upper) {
+        array.upper = upper->values;
+        array.upper_single = upper->precision == SADMM_F32;
+    }
     return pass(environments, kernels_of(environments)->exchange(merged->world->context, &merged->copies, &array, in,
                                                                  merged->left, merged->refused, environments->stream,
                                                                  &merged->world->error));
+}
+
+bool sadmm_environments_may_have_gravities(const struct sadmm_environments *environments)
+{
+    return environments->merged.has_backend && sadmm_world_may_reside(environments->merged.world);
+}
+
+/* With the next step the backend takes over the world anew, with them. */
+sadmm_status sadmm_environments_open_gravities(struct sadmm_environments *environments)
+{
+    struct sadmm_merged_world *merged = &environments->merged;
+    sadmm_world *world = merged->world;
+    const size_t count = (size_t)environments->count;
+    if (merged->gravities) return SADMM_OK;
+    TRY(pass(environments, sadmm_world_detach(world)));
+    merged->gravities = (double *)sadmm_alloc(count, 3 * sizeof *merged->gravities);
+    if (!merged->gravities) return sadmm_fail_memory(&environments->error, "gravity of environments");
+    for (size_t e = 0; e < count; ++e)
+        memcpy(merged->gravities + 3 * e, environments->settings.gravity, 3 * sizeof *merged->gravities);
+    world->resident.copies = &merged->copies;
+    world->resident.gravities = merged->gravities;
+    return SADMM_OK;
 }
 
 /* The last step's, while nothing else has changed the world. */

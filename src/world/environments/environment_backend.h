@@ -25,6 +25,10 @@ bool sadmm_environments_may_exchange(const struct sadmm_environments *environmen
 /* Numbers of all that are not marked: of the world into the array, or (an input array) the array's into the world. It
  * is enqueued. */
 sadmm_status sadmm_environments_exchange(struct sadmm_environments *environments, struct sadmm_bound_array *bound);
+/* Can each have its own gravity, with the settings that there are? From then on each has, the settings' at first.
+ * Errors: OUT_OF_MEMORY, those of steps begun. */
+bool sadmm_environments_may_have_gravities(const struct sadmm_environments *environments);
+sadmm_status sadmm_environments_open_gravities(struct sadmm_environments *environments);
 /* Until that has been done. */
 sadmm_status sadmm_environments_wait_backend(struct sadmm_environments *environments);
 /* And were any numbers since that was asked last out of range, and not taken? merged.refusals says of which. */

@@ -68,6 +68,7 @@ struct sadmm_merged_world {
     struct sadmm_copy_measures *measures; /* (count) of the last step, where they are */
     bool measurable, measured; /* not read yet, and can be; read */
     bool static_moved;         /* some static body may not be where the template has it */
+    double *gravities;         /* (count x 3) m/s^2, of an array that is bound; NULL: all have the settings' */
     struct sadmm_kept_block *kept; /* by state; made when it is begun with */
     size_t kept_count;
 };

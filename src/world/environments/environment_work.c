@@ -3,13 +3,15 @@
 #include <stdatomic.h>
 
 #include "environment_merge.h"
+#include "environment_numbers.h"
 
 sadmm_status sadmm_environments_load(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,
                                      int32_t environment)
 {
     if (environments->merged.world && !environments->marked[environment])
-        return sadmm_environments_take(environments, worker->world, environment);
-    return sadmm_environment_state_load(worker->world, &environments->states[environment]);
+        TRY(sadmm_environments_take(environments, worker->world, environment));
+    else TRY(sadmm_environment_state_load(worker->world, &environments->states[environment]));
+    return sadmm_environments_read_good_frames(environments, worker, environment);
 }
 
 sadmm_status sadmm_environments_store(struct sadmm_environments *environments, struct sadmm_environment_worker *worker,

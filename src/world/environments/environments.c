@@ -198,6 +198,7 @@ size_t sadmm_environments_memory(const sadmm_environments *environments)
         bytes += bound->in_backend ? 2 * array : array; /* the host has a copy */
         if (bound->given) bytes += count * bound->numbers * sizeof *bound->given;
     }
+    if (environments->merged.gravities) bytes += 3 * count * sizeof *environments->merged.gravities;
     return (bytes + count - 1) / count;
 }
 
@@ -208,6 +209,18 @@ sadmm_status sadmm_environments_set_settings(sadmm_environments *environments, c
     sadmm_settings settings;
     TRY(sadmm_check_given(environments, "environments", NULL));
     TRY(sadmm_settings_take(&settings, given, &environments->error));
+    if (environments->merged.gravities) {
+        sadmm_world *world = environments->merged.world;
+        const sadmm_settings before = world->def.settings;
+        world->def.settings = settings;
+        const bool may = sadmm_environments_may_have_gravities(environments);
+        world->def.settings = before;
+        if (!may)
+            return sadmm_fail(&environments->error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "settings: the host would drive the steps (residual_tolerance = %g, tolerance = %g), "
+                              "and the array gravity is one on CUDA only where it does not",
+                              settings.residual_tolerance, settings.tolerance);
+    }
     if (settings.dt != environments->settings.dt) /* targets of kinematic bodies there are for the one before */
         for (size_t k = 0; k < environments->kept_count; ++k) sadmm_environments_forget_kept(environments, k);
     environments->settings = settings;
@@ -291,7 +304,7 @@ static sadmm_status begin_again(struct sadmm_environments *environments, struct 
     TRY(sadmm_environment_state_copy(state, from, &worker->world->error));
     sadmm_environments_take_mark(environments, environment);
     if (environments->bound_count == 0 && !environments->contacts) return SADMM_OK;
-    TRY(sadmm_environment_state_load(worker->world, state));
+    TRY(sadmm_environments_load(environments, worker, environment));
     return sadmm_environments_write_outputs(environments, worker, environment);
 }
 

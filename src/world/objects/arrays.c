@@ -17,7 +17,7 @@
 #include "world/state/report.h"
 
 enum owner { OF_BODY, OF_SHAPE, OF_JOINT, OF_COUPLING, OF_WORLD };
-enum { MOST_COLUMNS = 13 };
+enum { STATE_COLUMNS = 13 };
 
 struct array_kind {
     const char *name;
@@ -67,7 +67,7 @@ static sadmm_status set_state(sadmm_world *world, size_t slot, const double *row
 {
     const struct sadmm_world_body *body = &world->bodies[slot];
     const sadmm_body_state state = state_of(row);
-    double now[MOST_COLUMNS];
+    double now[STATE_COLUMNS];
     store_motion(&body->rigid, now);
     /* Such a body is part of what a backend was given once. */
     if (body->type == SADMM_BODY_STATIC && memcmp(now, row, sizeof now) == 0) return SADMM_OK;
@@ -313,6 +313,24 @@ COORDINATES_OF_JOINT(spring_damping)
 COORDINATES_OF_JOINT(spring_rest)
 COORDINATES_OF_JOINT(armature)
 
+static sadmm_status get_joint_frame(sadmm_world *world, size_t slot, double *row)
+{
+    sadmm_world_read_joint_frames(&world->joints[slot], row);
+    return SADMM_OK;
+}
+
+static sadmm_status check_joint_frame(sadmm_world *world, size_t slot, const double *row, struct sadmm_error *error)
+{
+    (void)world;
+    (void)slot;
+    return sadmm_world_check_joint_frames(row, error);
+}
+
+static sadmm_status set_joint_frame(sadmm_world *world, size_t slot, const double *row)
+{
+    return sadmm_world_set_joint_frames(world, &world->joints[slot], row);
+}
+
 /* ---- couplings --------------------------------------------------------------------------------------------------- */
 
 static sadmm_status get_target(sadmm_world *world, size_t slot, double *row)
@@ -377,7 +395,7 @@ static sadmm_status get_report(sadmm_world *world, size_t slot, double *row)
 #define COORDINATE_KIND(name, member) {name, 6, OF_JOINT, get_##member, check_##member, set_##member}
 
 static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
-    [SADMM_ARRAY_BODY_STATE] = {"body_state", 13, OF_BODY, get_state, check_state, set_state},
+    [SADMM_ARRAY_BODY_STATE] = {"body_state", STATE_COLUMNS, OF_BODY, get_state, check_state, set_state},
     [SADMM_ARRAY_BODY_WRENCH] = {"body_wrench", 6, OF_BODY, get_wrench, check_wrench, set_wrench},
     [SADMM_ARRAY_BODY_CONTACT_WRENCH] = {"body_contact_wrench", 6, OF_BODY, get_contact_wrench, NULL, NULL},
     [SADMM_ARRAY_BODY_INERTIA] = {"body_inertia", 4, OF_BODY, get_inertia, check_inertia, set_inertia},
@@ -410,6 +428,8 @@ static const struct array_kind kinds[SADMM_ARRAY_COUNT] = {
     [SADMM_ARRAY_REPORT] = {"report", 8, OF_WORLD, get_report, NULL, NULL},
     [SADMM_ARRAY_SHAPE_SIZE] = {"shape_size", 3, OF_SHAPE, get_size, check_size, set_size},
     [SADMM_ARRAY_SHAPE_FRAME] = {"shape_frame", 7, OF_SHAPE, get_frame, check_frame, set_frame},
+    [SADMM_ARRAY_JOINT_FRAME] = {"joint_frame", SADMM_JOINT_FRAME_NUMBERS, OF_JOINT, get_joint_frame,
+                                 check_joint_frame, set_joint_frame},
 };
 
 static const struct array_kind *kind_of(sadmm_array array)

@@ -7,24 +7,20 @@
 
 #include "core/base/check.h"
 #include "core/base/definition_fields.h"
+#include "core/model/moments.h"
 
 /* Of a state that is set: whatever a step can make. */
 static const double ANY = HUGE_VAL;
 
-/* World-frame moments are sums of all three, so that the smallest is known to (unit roundoff x ratio): it and the
- * velocity about its axis are lost to 1 % at these ratios, wholly at some 100 times these. */
-static double inertia_ratio_limit(sadmm_precision precision) { return precision == SADMM_F32 ? 1e6 : 1e12; }
-
 static sadmm_status check_inertia_ratio(const char *name, const double inertia[3], sadmm_precision precision,
                                         struct sadmm_error *error)
 {
-    double least = fmin(inertia[0], fmin(inertia[1], inertia[2])),
-           most = fmax(inertia[0], fmax(inertia[1], inertia[2]));
-    if (!(most <= inertia_ratio_limit(precision) * least))
+    const bool single = precision == SADMM_F32;
+    if (!moments_ratio_fits(inertia, single))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "%s = (%g, %g, %g): the largest must be at most %g times the smallest in %s precision, "
                           "which cannot resolve more", name, inertia[0], inertia[1], inertia[2],
-                          inertia_ratio_limit(precision), precision == SADMM_F32 ? "single" : "double");
+                          moments_most_ratio(single), single ? "single" : "double");
     return SADMM_OK;
 }
 
@@ -51,8 +47,8 @@ static sadmm_status check_inertia(const char *name, const double inertia[3], sad
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be in [%g, %g] kg m^2", name, k,
                               inertia[k], range->lo, range->hi);
     for (int k = 0; k < 3; ++k) {
-        double others = inertia[(k + 1) % 3] + inertia[(k + 2) % 3];
-        if (!(inertia[k] <= others * (1 + 1e-9)))
+        const double others = inertia[(k + 1) % 3] + inertia[(k + 2) % 3];
+        if (!moments_sum_fits(inertia, k))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                               "%s[%d] = %g: must be at most the sum of the other two, %g (no rigid body has more)",
                               name, k, inertia[k], others);

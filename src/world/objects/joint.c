@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "body_check.h"
 #include "core/base/check.h"
 #include "core/base/definition_fields.h"
 #include "core/base/growing.h"
@@ -49,7 +50,7 @@ static bool acts(const sadmm_joint_coordinate *c)
 
 static sadmm_status check_limits(const char *name, const sadmm_joint_coordinate *c, struct sadmm_error *error)
 {
-    if (isnan(c->lower) || isnan(c->upper) || c->lower == INFINITY || c->upper == -INFINITY || c->lower > c->upper)
+    if (!joint_limits_fit(c->lower, c->upper))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "%slower = %g, upper = %g: must be numbers, lower in [-inf, upper], upper in [lower, inf]",
                           name, c->lower, c->upper);
@@ -247,6 +248,49 @@ sadmm_status sadmm_world_set_joint_coordinate_sized(sadmm_world *world, sadmm_jo
     TRY(sadmm_world_check_coordinate(joint, index, &coordinate, error));
     joint->def.coordinates[index] = coordinate;
     return sadmm_world_take_update(world, joint, (enum sadmm_joint_update)index);
+}
+
+void sadmm_world_read_joint_frames(const struct sadmm_world_joint *joint, double *row)
+{
+    const sadmm_joint_def *def = &joint->def;
+    memcpy(row, def->position_a, sizeof def->position_a);
+    memcpy(row + 3, def->orientation_a, sizeof def->orientation_a);
+    memcpy(row + 7, def->position_b, sizeof def->position_b);
+    memcpy(row + 10, def->orientation_b, sizeof def->orientation_b);
+}
+
+/* unit: the same, orientations of unit length. */
+static sadmm_status take_frames(const double *row, double *unit, struct sadmm_error *error)
+{
+    static const char *const names[2][2] = {{"position_a", "orientation_a"}, {"position_b", "orientation_b"}};
+    memcpy(unit, row, SADMM_JOINT_FRAME_NUMBERS * sizeof *unit);
+    for (int s = 0; s < 2; ++s) {
+        TRY(sadmm_check_vector(names[s][0], row + 7 * s, 3, FRAME_LIMIT, error));
+        TRY(sadmm_world_check_turn(names[s][1], row + 7 * s + 3, unit + 7 * s + 3, error));
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_check_joint_frames(const double *row, struct sadmm_error *error)
+{
+    double ignored[SADMM_JOINT_FRAME_NUMBERS];
+    return take_frames(row, ignored, error);
+}
+
+sadmm_status sadmm_world_set_joint_frames(sadmm_world *world, struct sadmm_world_joint *joint, const double *row)
+{
+    double now[SADMM_JOINT_FRAME_NUMBERS], unit[SADMM_JOINT_FRAME_NUMBERS];
+    sadmm_joint_def *def = &joint->def;
+    TRY(take_frames(row, unit, &world->error));
+    sadmm_world_read_joint_frames(joint, now);
+    if (memcmp(now, unit, sizeof now) == 0) return SADMM_OK;
+    TRY(sadmm_world_detach(world));
+    memcpy(def->position_a, unit, sizeof def->position_a);
+    memcpy(def->orientation_a, unit + 3, sizeof def->orientation_a);
+    memcpy(def->position_b, unit + 7, sizeof def->position_b);
+    memcpy(def->orientation_b, unit + 10, sizeof def->orientation_b);
+    set_frames(joint);
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_world_check_table(const double *positions, const double *forces, int32_t count,

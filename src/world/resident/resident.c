@@ -180,6 +180,8 @@ static sadmm_status load(sadmm_world *world)
         .gear_force = world->resident.gear_force,
         .held = world->resident.held,
         .time = world->report.time,
+        .copies = world->resident.copies,
+        .gravities = world->resident.gravities,
     };
     TRY(world->kernels->resident->load(world->context, &whole, &world->def.settings, &world->error));
     world->resident.loaded = true;
@@ -238,7 +240,7 @@ static sadmm_status enqueue(sadmm_world *world)
 
 sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait)
 {
-    const bool certified = world->def.settings.certify;
+    const bool certified = world->def.settings.certify && !world->resident.gravities; /* the host knows of one */
     double begin = sadmm_clock_ms();
     TRY(take_failed(world));
     TRY(sadmm_world_contain(world, enqueue(world)));

@@ -140,6 +140,8 @@ struct sadmm_world {
         struct sadmm_resident_gear *gears;   /* in slot order */
         double *gear_force;                  /* likewise */
         bool gears_dirty;                    /* some of them */
+        const struct sadmm_resident_copies *copies; /* not NULL: of each of many equal worlds, what is solved with */
+        const double *gravities;                    /* (copies->count x 3) in the place of the settings' gravity */
         int32_t joint_count, joint_constraints, coupling_count, gear_count;
         size_t dirty_joint_count;
     } resident;
