@@ -289,7 +289,8 @@ static sadmm_status choose_pushes(struct host_step *step)
 {
     sadmm_world *world = step->world;
     const bool cuda = world->kernels->backend == SADMM_BACKEND_CUDA;
-    const int32_t bodies = world->copies > 0 ? step->system.body_count / world->copies : step->system.body_count;
+    const struct sadmm_resident_copies *copies = world->resident.copies;
+    const int32_t bodies = copies ? copies->bodies : step->system.body_count;
     if (step->depth_now <= step->settings.slop || !push_is_apart(cuda, bodies, step->system.kinematic_count))
         return SADMM_OK;
     if (!world->push) world->push = sadmm_push_create();
@@ -324,7 +325,7 @@ static sadmm_status make_plan(struct host_step *step)
     if (world->spins_known) step->system.spins = world->spins;
     TRY(sadmm_world_enter_support_frame(world, &step->system));
     world->plan = sadmm_plan_make(&step->system, &step->settings);
-    if (world->copies > 0 && world->plan.points > 0) world->plan.contact_rows = PLAN_CONTACT_ROWS_OF_COPIES;
+    if (world->resident.copies && world->plan.points > 0) world->plan.contact_rows = PLAN_CONTACT_ROWS_OF_COPIES;
     step->report = sadmm_solve_report_empty(world->kernels);
     step->solve.ncp = NULL;
     step->solve.errors_known = step->solve.ncp_missed = false;

@@ -118,7 +118,7 @@ static sadmm_status load_gravities(struct sadmm_context *c, const struct sadmm_r
 {
     struct cuda_gravities *view = &c->view.model.gravities;
     *view = {};
-    if (!world->copies) return SADMM_OK;
+    if (!world->gravities) return SADMM_OK;
     const size_t count = (size_t)world->copies->count;
     double *numbers = (double *)sadmm_alloc(count, GRAVITY_NUMBERS * sizeof *numbers);
     if (!numbers) return sadmm_fail_memory(error, "gravity of environments");
@@ -151,7 +151,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     }
     struct cuda_step *s = c->step;
     s->bodies = (int32_t)n;
-    s->copies = world->copies;
+    s->copies = world->copies ? world->copies->count : 0;
     s->slots = (int32_t)slots;
     const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     s->last_settings = *settings;

@@ -35,8 +35,7 @@ struct sadmm_resident_copies {
 /* A world, from the host. */
 struct sadmm_resident_world {
     const struct sadmm_collision_input *input;       /* shapes, bodies by slot, overrides */
-    int32_t body_count;                              /* dynamic bodies, */
-    int32_t copies;                                  /* of so many equal worlds; 0: it is none of these */
+    int32_t body_count;                              /* dynamic bodies */
     const struct sadmm_rigid *rigid;                 /* (body_count) */
     const struct sadmm_extrapolation *extrapolation; /* (body_count) */
     const int32_t *slot_of;                          /* (body_count) body slot */
@@ -56,8 +55,8 @@ struct sadmm_resident_world {
     const unsigned char *held;                 /* by body slot: joints hold it, and it is not hit at its moment
                                                   (world/hits.c) */
     double time;                               /* simulated until now, s */
-    const struct sadmm_resident_copies *copies; /* not NULL: each of many equal worlds has its own gravity */
-    const double *gravities;                    /* (copies->count x 3) m/s^2, in the place of the settings' */
+    const struct sadmm_resident_copies *copies; /* not NULL: it is many equal worlds, each solved as if alone */
+    const double *gravities;                    /* (copies->count x 3) of each, m/s^2; NULL: that of the settings */
 };
 
 enum sadmm_update_kind {

@@ -69,7 +69,6 @@ sadmm_status sadmm_environments_open_backend(struct sadmm_environments *environm
     struct sadmm_merged_world *merged = &environments->merged;
     const sadmm_world *from = environments->worker[0].world;
     TRY(pass(environments, sadmm_world_choose_backend(merged->world)));
-    merged->world->copies = environments->count;
     if (!kernels_of(environments)->allocate) return SADMM_OK;
     merged->copies = (struct sadmm_resident_copies){.count = environments->count,
                                                     .bodies = from->dynamic_count,
@@ -78,6 +77,7 @@ sadmm_status sadmm_environments_open_backend(struct sadmm_environments *environm
                                                     .joints = merged->joints.count,
                                                     .couplings = from->coupling_ids.count,
                                                     .gears = from->gear_ids.count};
+    merged->world->resident.copies = &merged->copies;
     merged->refusals = (uint8_t *)sadmm_alloc((size_t)environments->count, 1);
     merged->measures =
         (struct sadmm_copy_measures *)sadmm_alloc((size_t)environments->count, sizeof *merged->measures);
@@ -267,7 +267,6 @@ sadmm_status sadmm_environments_open_gravities(struct sadmm_environments *enviro
     if (!merged->gravities) return sadmm_fail_memory(&environments->error, "gravity of environments");
     for (size_t e = 0; e < count; ++e)
         memcpy(merged->gravities + 3 * e, environments->settings.gravity, 3 * sizeof *merged->gravities);
-    world->resident.copies = &merged->copies;
     world->resident.gravities = merged->gravities;
     return SADMM_OK;
 }

@@ -161,7 +161,6 @@ static sadmm_status load(sadmm_world *world)
     struct sadmm_resident_world whole = {
         .input = &input,
         .body_count = world->dynamic_count,
-        .copies = world->copies,
         .rigid = world->last_start.rigid,
         .extrapolation = world->resident.extrapolation,
         .slot_of = world->slot_of,

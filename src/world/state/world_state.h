@@ -44,8 +44,6 @@ struct sadmm_world {
     struct sadmm_world_coupling *couplings;
 
     int32_t dynamic_count, kinematic_count;
-    int32_t copies;           /* it is so many equal worlds (environments), each of which is solved as if it were
-                                 alone; 0: a world like any other */
     int32_t *kinematic_slots; /* of these, ascending, as of the last step */
     bool kinematic_listed;    /* none has come or gone since */
     struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */
@@ -140,8 +138,9 @@ struct sadmm_world {
         struct sadmm_resident_gear *gears;   /* in slot order */
         double *gear_force;                  /* likewise */
         bool gears_dirty;                    /* some of them */
-        const struct sadmm_resident_copies *copies; /* not NULL: of each of many equal worlds, what is solved with */
-        const double *gravities;                    /* (copies->count x 3) in the place of the settings' gravity */
+        const struct sadmm_resident_copies *copies; /* not NULL: it is many equal worlds (environments), each solved
+                                                       as if alone */
+        const double *gravities;                    /* (copies->count x 3) of each; NULL: that of the settings */
         int32_t joint_count, joint_constraints, coupling_count, gear_count;
         size_t dirty_joint_count;
     } resident;
