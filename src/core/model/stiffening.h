@@ -7,7 +7,7 @@
  * for what of F is along r. A step takes forces in the directions that they have halfway by the velocities at its
  * start. Where K dt^2 / 4 is not small beside the inertia, it is added to the inertia that the change of velocity is
  * found with: that is to take the torque halfway by the mean of the velocities at both ends, the implicit midpoint
- * rule, which is stable for any K. In double. */
+ * rule, which is stable for any K that is known. In double. */
 #ifndef SADMM_CORE_MODEL_STIFFENING_H
 #define SADMM_CORE_MODEL_STIFFENING_H
 
@@ -15,14 +15,23 @@
 #include <stdbool.h>
 
 #include "core/math/joint.h"
+#include "core/math/max.h"
 #include "core/math/principal.h"
 #include "core/math/rigid.h"
 #include "rolling.h"
 
 /* Shares of the inertia, of K dt^2 / 4: below the first one nothing is added, from the second one on all of it. The
- * explicit rule is stable up to 1; where it resolves the motion it is the one that is nearer to it. */
+ * explicit rule is stable up to 1; where it resolves the motion it is the one that is nearer to it.
+ *
+ * K is of a force that the step itself may find to be another one: a chain that swings pulls harder from step to step.
+ * With a share s added, a step is stable for K dt^2 / 4 <= 1 + s where bodies move by the mean of their velocities, and
+ * for half of that where they move by those of its end (joint_trapezoid.h). So s = K dt^2 / 4 is hardly stable where it
+ * is large: at 100 the force may be larger by 1 %. Twice as much bears twice the force, and what there is where the
+ * trapezoid correction is off. A kick swings further by that, but by no more than it moves the body freely in half a
+ * step. */
 #define STIFFENING_LEAST 0.25 /* measured: bench/constants.py, mechanisms motion */
 #define STIFFENING_ALL   0.75 /* measured: bench/constants.py, mechanisms motion */
+#define STIFFENING_ROOM  2
 
 /* Once forces are known better, a body is stiffened again if that changes its inertia by more than this share. */
 #define STIFFENING_CHANGE 0.05 /* measured: bench/constants.py, mechanisms motion */
@@ -63,7 +72,8 @@ SADMM_INLINE bool stiffening_may_be(const double inertia[3], double dt, const do
 SADMM_INLINE double stiffening_share(double size)
 {
     const double t = (size - STIFFENING_LEAST) / (STIFFENING_ALL - STIFFENING_LEAST);
-    return t <= 0 ? 0 : t >= 1 ? size : size * t * t * (3 - 2 * t);
+    const double all = max_of(size, STIFFENING_ROOM * size - 1); /* the explicit part bears 1 */
+    return t <= 0 ? 0 : t >= 1 ? all : all * t * t * (3 - 2 * t);
 }
 
 /* Axes in which the symmetric `share` is its diagonal: those it has, or others. */
