@@ -130,7 +130,7 @@ START_TEST(enqueued_substeps_equal_single_steps)
     sadmm_world *worlds[3];
     for (int k = 0; k < 3; ++k) {
         worlds[k] = towers(3, 2, 0.5, precision);
-        add_box(worlds[k], 2, 0, 0.11, 0.1, 1, 0.5); /* lands in the ninth step */
+        for (int i = 0; i < 8; ++i) add_box(worlds[k], 2 + 0.5 * i, 0, 0.11, 0.1, 1, 0.5); /* land in the ninth step */
         use_fast(worlds[k], 24);
         use_substeps(worlds[k], 3);
         if (k > 0) tune_capacities(tables[precision], worlds[k]->context, 1);

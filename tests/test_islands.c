@@ -14,7 +14,10 @@ enum { STEPS = 60 };
 enum { GROUPS = 5, MOST_BODIES = 8, ROUNDS = 6 };
 
 /* Of group g, the same whatever the world: a heap or a stack, from a height of which some land sooner than others. */
-static int bodies_of(int round, int g) { return 1 + (int)(MOST_BODIES * (1 + noise((uint32_t)round, (uint32_t)g)) / 2); }
+static int bodies_of(int round, int g)
+{
+    return 1 + (int)(MOST_BODIES * (1 + noise((uint32_t)round, (uint32_t)g)) / 2);
+}
 
 static void add_group(sadmm_world *world, int round, int g)
 {

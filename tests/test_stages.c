@@ -44,7 +44,7 @@ static bool stands_after(const struct list *list, enum sadmm_stage_kind kind, in
 static struct sadmm_plan contacts_plan(const sadmm_settings *settings, bool warm)
 {
     struct sadmm_plan plan = {.bodies = 2, .pairs = 1, .points = 4, .contact_rows = 3, .rigid = true, .threads = 1};
-    sadmm_plan_complete(&plan, settings, warm, warm);
+    sadmm_plan_complete(&plan, settings, warm, !warm);
     return plan;
 }
 

@@ -119,7 +119,8 @@ static void add_up_islands(struct sadmm_context *c)
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
         if (island->label != i) continue;
-        if (c->weight_updates < 0) island->warm = plan_may_start_warm(c->plan, c->settings) && weight_starts_warm(island->balance);
+        if (c->weight_updates < 0)
+            island->warm = plan_may_start_warm(c->plan, c->settings) && weight_starts_warm(island->balance);
         weight_update_speed(&island->weights, &island->sums,
                             weight_spring_iterations(island->warm, c->plan->rigid, c->settings->iterations));
     }

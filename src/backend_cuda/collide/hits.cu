@@ -212,7 +212,7 @@ extern "C" sadmm_status COLLISION(reserve_hits)(struct sadmm_cuda_collision *c, 
     TRY(reserve(c, HIT_LISTED, (size_t)c->candidate_capacity, sizeof *c->hits.listed, error));
     c->hits.listed = in<int32_t>(c, HIT_LISTED);
     if (c->hits_ready) return SADMM_OK;
-    c->hits.shape_count = (int32_t)(c->input_bytes[0] / sizeof *c->view.shapes);
+    c->hits.shape_count = (int32_t)c->shape_slots;
     TRY(reserve_groups(c, *c->hit_lists, error));
     TRY(reserve_bodies(c, error));
     TRY(upload_lists(c, *c->hit_lists, error));

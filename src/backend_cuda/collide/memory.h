@@ -100,6 +100,7 @@ struct sadmm_cuda_collision {
     struct collision_view view;
     struct collision_buffer buffers[BUFFERS];
     size_t input_bytes[INPUTS]; /* as uploaded; SIZE_MAX: not */
+    size_t shape_slots;         /* of the world that is attached */
     uint32_t hull_revision;
     bool smooth;                /* a shape is a smooth body (collision/shapes/geometry.h) */
     bool takes_hits;            /* the world is one of those of hits_view.h; */

@@ -312,6 +312,7 @@ extern "C" sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *c, void *
     c->view.abort_code = abort_code;
     c->view.dt = dt;
     c->view.gravity = gravity;
+    c->shape_slots = input->shape_count;
     return reserve_shape(c, input->shape_count, c->view.leaf_count >= c->tree_from, error);
 }
 
@@ -353,9 +354,8 @@ static sadmm_status keep_capacity(struct sadmm_cuda_collision *c, int name, size
 static sadmm_status reserve_substeps(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
-    const size_t slots = c->input_bytes[0] / sizeof *v->shapes;
-    TRY(reserve(c, BOXES, slots, sizeof *v->boxes, error));
-    TRY(reserve(c, REACHES, slots, sizeof *v->reaches, error));
+    TRY(reserve(c, BOXES, c->shape_slots, sizeof *v->boxes, error));
+    TRY(reserve(c, REACHES, c->shape_slots, sizeof *v->reaches, error));
     v->boxes = in<struct sadmm_box3>(c, BOXES);
     v->reaches = in<struct collision_reach>(c, REACHES);
     return SADMM_OK;

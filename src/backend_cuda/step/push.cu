@@ -145,7 +145,7 @@ static __device__ __forceinline__ void keep_pushed(const cuda_view &v, int32_t i
 }
 
 /* All bodies of an island in the air, in their order, as the host does. */
-static __device__ __noinline__ void move_island(const cuda_view &v, int32_t label, double dt)
+static __device__ __forceinline__ void move_island(const cuda_view &v, int32_t label, double dt)
 {
     const int32_t first = v.graph.slot_of[label], end = first + v.graph.island_bodies[label];
     const vec3 place = v3_load(v.step.before[label].position);
@@ -271,7 +271,7 @@ void CUDA(plan_second)(struct sadmm_context *c, bool warm)
     p->plan = c->plan;
     if (p->plan.points == 0) p->plan.points = 1; /* they come in a later sub-step */
     p->plan.row_constraints = 0;
-    sadmm_plan_complete(&p->plan, &settings, warm, false);
+    sadmm_plan_complete(&p->plan, &settings, warm, plan_updates_weights(&settings, true, false));
     CUDA(plan_settings)(p, &settings);
     p->view.model.warm_start = p->plan.warm_start;
     p->view.model.contact_rows = c->view.model.contact_rows;

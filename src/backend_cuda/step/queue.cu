@@ -127,7 +127,7 @@ static void see_pushes(struct sadmm_context *c, const struct cuda_step_report *r
 static void see_cold(struct sadmm_context *c, const struct cuda_step_report *report)
 {
     struct cuda_step *s = c->step;
-    if (!s->cold || !c->settings.warm_start) return;
+    if (!s->cold || !c->settings.warm_start) return; /* or they always do */
     s->warm = report->totals.cold > 0 ? 0 : s->warm + 1;
     if (s->warm < WARM_STEPS) return;
     s->cold = s->planned = false;
@@ -188,7 +188,7 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         s->push_streams = s->push_streams || report->totals.pushed < 0;
         s->quiet = 0;
     }
-    if (report->totals.cold > 0) {
+    if (report->totals.cold > 0 && updates_weights(c)) {
         s->cold = true;
         s->warm = 0;
     }

@@ -96,7 +96,7 @@ static void view_substep(struct sadmm_context *c, int substep)
     c->plan = plan->plan;
     s->speculation.contact_rows = plan->contact_rows;
     s->speculation.warm = plan->warm;
-    s->speculation.cold = s->cold;
+    s->speculation.cold = s->cold || !updates_weights(c);
     s->speculation.rows = plan->rows;
     c->view.model.contact_rows = plan->contact_rows == 1 ? 1 : 3;
     CUDA(view_into)(c, s->into, substep);

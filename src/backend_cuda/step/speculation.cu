@@ -89,7 +89,7 @@ struct substep_plan CUDA(plan_of)(const struct sadmm_context *c, int32_t pairs, 
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
     plan.threads = 1;
     sadmm_plan_complete(&plan, &c->settings,
-                        plan_mostly_warm(plan.pairs + joints->constraints, statistics->warm + joints->warm), !s->cold);
+                        plan_mostly_warm(plan.pairs + joints->constraints, statistics->warm + joints->warm), s->cold);
     const int32_t warm = sadmm_plan_depends_on_warmth(&c->settings) ? plan.warm : -1;
     const struct substep_plan out = {plan, plan.contact_rows, warm, s->joints > 0 ? joints->constraints > 0 : -1};
     return out;
@@ -109,11 +109,10 @@ void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_g
 static void see_start(struct sadmm_context *c, const struct speculated_step *seen)
 {
     struct cuda_step *s = c->step;
-    if (c->settings.warm_start && plan_mostly_warm(seen->live.pairs + seen->joints.constraints,
-                                                   seen->statistics.warm + seen->joints.warm))
-        return;
-    s->cold = true;
-    s->warm = 0;
+    const bool warm = plan_mostly_warm(seen->live.pairs + seen->joints.constraints,
+                                       seen->statistics.warm + seen->joints.warm);
+    s->cold = updates_weights(c) && (s->cold || !c->settings.warm_start || !warm);
+    if (!warm) s->warm = 0;
 }
 
 /* Plans of the sub-steps, and the most that any of them is known to need. */
@@ -179,7 +178,7 @@ sadmm_status CUDA(speculate)(struct sadmm_context *c, struct sadmm_error *error)
                                  : seen.statistics.point_slots <= 4 ? 4
                                                                     : SADMM_MAX_POINTS;
     s->speculation.warm = s->plans[0].warm;
-    s->speculation.cold = s->cold;
+    s->speculation.cold = s->cold || !updates_weights(c);
     s->speculation.rows = s->plans[0].rows;
     CUDA(view_counts)(c, generous(seen.counts.pairs));
     c->view.model.points = 0; /* results are read elsewhere */

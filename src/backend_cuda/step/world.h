@@ -155,6 +155,12 @@ static inline bool has_large_ncp_blocks(const struct sadmm_context *c)
     return c->step->articulations <= blocks && c->step->bodies / NCP_LARGE_BODIES <= blocks;
 }
 
+/* Are weights of islands that start cold updated? */
+static inline bool updates_weights(const struct sadmm_context *c)
+{
+    return c->fast && plan_updates_weights(&c->settings, true, false);
+}
+
 /* Are small islands of worlds with joints solved before the iterations (ncp_island.h)? Where every constraint is of a
  * part. */
 static inline bool solves_ncp(const struct sadmm_context *c)

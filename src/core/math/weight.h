@@ -128,8 +128,8 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
 
 /* ---- contacts as springs -----------------------------------------------------------------------------------------
  *
- * An island that starts warm goes on from the impulses of the last step, and its K iterations change them by B K x, x the
- * velocity at the contact: from step to step a contact is a spring of stiffness B K / dt^2. At rest B is the load over
+ * An island that starts warm goes on from the impulses of the last step, and its K iterations change them by B K x, x
+ * the velocity at the contact: from step to step a contact is a spring of stiffness B K / dt^2. At rest B is the load over
  * g dt. A column of n bodies on such springs buckles under its own weight (Euler) where
  *
  *     n^2 > 5.8 K a^2 / (g dt^2 h)       a: half the width of a body, h: its height; 5.8: the square of a root of J_0
@@ -148,8 +148,8 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
 #define WEIGHT_SEPARATION_NEED 3.3333333333333335 /* measured: bench/constants.py, heaps standing */
 #define WEIGHT_SEPARATION_LEAST 0.001 /* measured: bench/constants.py, heaps standing */
 
-/* Does an island start warm: do at least half of its constraints? `balance`: of their sides on dynamic bodies those that
- * start with an impulse, less those that start without. */
+/* Does an island start warm: do at least half of its constraints? `balance`: of their sides on dynamic bodies those
+ * that start with an impulse, less those that start without. */
 SADMM_INLINE int weight_starts_warm(double balance) { return balance >= 0; }
 
 /* K of an island whose contacts are springs, 0: they are none. A problem that is solved in short batches is no row of

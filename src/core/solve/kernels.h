@@ -12,7 +12,8 @@
  * The method FAST is iterated by `iterate` alone (update_velocity and update_constraints refuse it): an iteration is
  * Steps 2-4, then Step 1, and what is relaxed depends on how far a batch still goes (math/relax.h). update_weights and
  * factorize may follow a batch in the place of update_penalty: such a batch `goes_on`: of islands whose weights stay
- * its last iteration is none, so that they are solved as if there were no update. limit_energy ends the step's iterations, of either method.
+ * its last iteration is none, so that they are solved as if there were no update. limit_energy ends the step's
+ * iterations, of either method.
  *
  * `measure` asks the iteration (for `iterate`: its last one) to keep what the residuals and a penalty update need; only
  * allowed when the plan's `residuals` is set.

@@ -94,8 +94,7 @@ bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings)
     return settings->warm_start && may_update_penalty(settings) && !settings->penalty_update_warm;
 }
 
-void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm,
-                         bool all_warm)
+void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm, bool cold)
 {
     bool constrained = sadmm_plan_is_constrained(plan);
     plan->warm_start = settings->warm_start;
@@ -103,7 +102,7 @@ void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *s
     plan->penalty_updates =
         constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
     bool fast = constrained && settings->method == SADMM_METHOD_FAST;
-    plan->weight_updates = fast && !(settings->warm_start && all_warm);
+    plan->weight_updates = fast && cold;
     plan->momentum = plan->rigid && plan->points > 0;
     plan->energy_limit = fast && plan->momentum;
     plan->certificate = settings->certify;
@@ -126,7 +125,9 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
     size_t constraints = 0, warm = 0;
     if (settings->warm_start) count_constraints(system, plan.threads, &constraints, &warm);
-    sadmm_plan_complete(&plan, settings, plan_mostly_warm((int64_t)constraints, (int64_t)warm), warm == constraints);
+    const bool some_cold = !settings->warm_start || warm < constraints;
+    sadmm_plan_complete(&plan, settings, plan_mostly_warm((int64_t)constraints, (int64_t)warm),
+                        some_cold && plan_updates_weights(settings, plan.rigid, system->first));
     plan.initialise = settings->method == SADMM_METHOD_FAST && plan.points > 0 && system->first && warm == 0;
     if (plan.initialise) plan.warm_start = true; /* initialised impulses are the system's start values then */
     return plan;

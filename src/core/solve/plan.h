@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "core/base/inline.h"
+#include "core/math/weight.h"
 #include "core/model/system.h"
 
 #ifdef __cplusplus
@@ -66,11 +67,17 @@ SADMM_INLINE bool plan_may_start_warm(const struct sadmm_plan *plan, const struc
     return settings->warm_start && !plan->initialise;
 }
 
+/* FAST: are weights of islands that start cold updated? Steps of a world with few iterations go on from each other: the
+ * loads that one does not find the next ones do. first: no step came before. */
+SADMM_INLINE bool plan_updates_weights(const struct sadmm_settings *settings, bool rigid, bool first)
+{
+    return !rigid || first || !settings->warm_start || settings->iterations >= WEIGHT_SPRING_ITERATIONS;
+}
+
 /* What follows from the settings once the counts and `contact_rows` are in. mostly_warm: at least half of the
- * constraints (contacts counted by pairs) carry an impulse; all_warm: no island starts cold if any may start warm.
- * `threads` is left alone. */
-void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm,
-                         bool all_warm);
+ * constraints (contacts counted by pairs) carry an impulse; cold: some island may start cold, and has its weights
+ * updated. `threads` is left alone. */
+void sadmm_plan_complete(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm, bool cold);
 
 /* Does it decide anything in a plan with contacts whether most constraints are warm? */
 bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings);

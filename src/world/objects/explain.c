@@ -50,9 +50,9 @@ static void explain_options(struct text *t, const struct sadmm_plan *plan, const
                                : "start        cold: impulses 0, velocities A^-1 b (asked for)\n");
     if (s->method == SADMM_METHOD_FAST)
         line(t, "weights      by load, relaxation %g; %s\n", s->relaxation,
-             plan->weight_updates                  ? "recomputed during the step in islands that start cold"
-             : sadmm_plan_is_constrained(plan) ? "kept during the step: every island starts warm"
-                                                   : "kept: no constraints");
+             plan->weight_updates              ? "recomputed during the step in islands that start cold"
+             : sadmm_plan_is_constrained(plan) ? "kept during the step"
+                                               : "kept: no constraints");
     else if (plan->penalty_updates)
         line(t, "penalty      eq. (13) with M = %g, c = %g kg/s^2; updated (15) every %d iterations\n",
              s->penalty_mass_factor, s->penalty_offset, s->penalty_period);
