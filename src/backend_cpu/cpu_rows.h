@@ -153,6 +153,19 @@ static inline vec6d cpu_free_momentum(const struct sadmm_context *c, size_t i)
     return out;
 }
 
+/* Are both bodies of the constraint that has this wrench row dynamic? */
+static inline bool cpu_row_is_shared(const struct sadmm_context *c, int32_t row)
+{
+    const size_t record = (size_t)row % c->record_count;
+    int l = (int)(record % (size_t)LANES);
+    if (record < cpu_pair_records(c)) {
+        const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];
+        return block->body_a[l] < c->bodies && block->body_b[l] < c->bodies;
+    }
+    const struct row_block *block = cpu_row_block(c, record, &l);
+    return block->body_a[l] < c->bodies && block->body_b[l] < c->bodies;
+}
+
 /* A wrench row in double. */
 static inline row8d cpu_wrench(const struct sadmm_context *c, int32_t row)
 {

@@ -91,7 +91,8 @@ static void add_up_group(struct sadmm_context *c, size_t first, size_t count)
         for (size_t k = first; k < first + count; ++k) add_impulse(&c->constraints[k], s, impulse);
         for (int j = 0; j < 6; ++j) c->bodies[body].impulse[j] += impulse[j];
         c->bodies[c->bodies[body].label].sums.push += length3(impulse);
-        c->bodies[c->bodies[body].label].balance += dense6_dot(impulse, impulse) > 0 ? 1 : -1;
+        const double share = c->constraints[first].side[1 - s].body >= 0 ? 0.5 : 1;
+        c->bodies[c->bodies[body].label].balance += dense6_dot(impulse, impulse) > 0 ? share : -share;
     }
 }
 

@@ -1,8 +1,8 @@
 /* Parts of a step's graph that are done only if a kernel before them says so: nodes with a condition. Where there are
  * none, the part's kernels are launched all the same, and see themselves that they have nothing to do.
  *
- * The parameters of a kernel in such a part may be read, but have no address: a function that is given a reference to
- * them has to be inlined. */
+ * In such a part a kernel's parameters have no address that a device knows: what a function reads through a reference
+ * to them, if it is not inlined, is anything. */
 #ifndef SADMM_CUDA_DEVICE_CONDITION_H
 #define SADMM_CUDA_DEVICE_CONDITION_H
 

@@ -27,7 +27,7 @@
  * Whether an island is pushed apart without a velocity (core/solve/push.h) is known when the step has been solved: its
  * contacts say so in `finish`. A step in which one is has a graph of its own: there they say so behind the layout, e of
  * what overlaps is made without its push, and behind `finish`, if there is one, the second problem is gathered and
- * solved, in a context of its own, and bodies are moved by it (step/push.cu): a part with a condition (condition.h).
+ * solved, in a context of its own, and bodies are moved by it (step/push.cu); else its kernels leave at once.
  *
  * Hits of bodies in flight (collide/hits_view.h) come between the candidates and the narrow phase of steps that are
  * planned to have some: the narrow phase of others says whether any pair is fast.

@@ -195,7 +195,7 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
 /* ---- bodies again ---------------------------------------------------------------------------------------------- */
 
 /* Body i again, now that all is known of its island. */
-static __device__ __forceinline__ void move_again(const cuda_view &v, int32_t i)
+static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
 {
     const int32_t label = v.graph.label[i];
     const int island = v.islands.touch[label] | (v.islands.info[label].anchored_outside ? TOUCH_AS_A_RULE : 0),
@@ -255,21 +255,13 @@ static __device__ __noinline__ void keep_rolling(const cuda_view &v, int32_t i, 
                      island_is(v, i, ISLAND_ARTICULATED) || *round == 0, owed, stiffness);
 }
 
-/* By themselves: few bodies are, and the others should not pay in registers. */
-static __device__ __noinline__ void move_again_apart(const cuda_view &v, int32_t i) { move_again(v, i); }
-static __device__ __noinline__ void move_articulated_apart(const cuda_view &v, int32_t i) { move_articulated(v, i); }
-
-/* Body i, where its island has joints as they let it go; else again, if need be. APART: not in a part with a condition
- * (device/condition.h). */
-template <bool APART>
+/* Body i, where its island has joints as they let it go; else again, if need be. */
 static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_t i, bool again, bool articulated)
 {
     const int32_t bits = articulated ? v.joints.touch[articulation_label(v, i)] : 0;
     if (articulated && !v.joints.is_articulated[i] && !(v.ncp.points && is_solved(v, i)))
         load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
-    if (APART && bits & ISLAND_ARTICULATED) move_articulated_apart(v, i);
-    else if (bits & ISLAND_ARTICULATED) move_articulated(v, i);
-    else if (APART && again) move_again_apart(v, i);
+    if (bits & ISLAND_ARTICULATED) move_articulated(v, i);
     else if (again) move_again(v, i);
 }
 
@@ -317,7 +309,7 @@ static __global__ void __launch_bounds__(TURN_THREADS)
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)TURN_THREADS + threadIdx.x);
     if (i >= v.model.bodies || v.model.live->abort_code || !as_planned(v.model, v.step) || !some_pushed(v.push)) return;
     const bool again = moves_again(v), articulated = v.joints.count > 0 && !v.joints.apart;
-    if (again || articulated) move_once_more<false>(v, i, again, articulated);
+    if (again || articulated) move_once_more(v, i, again, articulated);
 }
 
 /* Has the step no need of a second problem, or one that fits (step/push.h)? Once all contacts have spoken. */
@@ -385,7 +377,7 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
     const bool articulated = v.joints.count > 0 && !v.joints.apart, again = moves_again(v),
                moves = (again || articulated) && !some_pushed(v.push), any = moves || rolls_again(v);
     if (moves && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
-        move_once_more<true>(v, (int32_t)own, again, articulated);
+        move_once_more(v, (int32_t)own, again, articulated);
     if (articulated) end_joints(v, (int32_t)t);
     if (any) __syncthreads(); /* threads of a block start bodies that others of it have moved */
     if (rolls_again(v)) {
@@ -418,7 +410,7 @@ static __device__ __forceinline__ void commit_bodies(const cuda_view &v, int32_t
     const int32_t lanes = commit_lanes(v.model.bodies), i = thread / lanes, lane = thread % lanes;
     const bool again = moves_again(v), rolls = rolls_again(v);
     if (lane == 0 && (again || articulated) && !some_pushed(v.push) && i < v.model.bodies)
-        move_once_more<true>(v, i, again, articulated);
+        move_once_more(v, i, again, articulated);
     if (!rolls) return;
     if (lanes == 1) return keep_rolling_of_warp(v, i);
     __syncwarp(0xffffffffu);

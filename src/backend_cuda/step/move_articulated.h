@@ -7,7 +7,7 @@
 #include "move.h"
 
 /* Body i of an island with joints goes where these let it. */
-static __device__ __forceinline__ void move_articulated(const cuda_view &v, int32_t i)
+static __device__ __noinline__ void move_articulated(const cuda_view &v, int32_t i)
 {
     const int32_t label = articulation_label(v, i), bits = v.joints.touch[label];
     const body_before before = fetch_body(v.step, i);

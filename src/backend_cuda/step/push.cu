@@ -4,7 +4,6 @@
  * or leave at once. */
 #include "backend_cuda/device/double.h"
 
-#include "backend_cuda/device/condition.h"
 #include "backend_cuda/device/parallel.h"
 #include "backend_cuda/device/plan_check.h"
 #include "backend_cuda/graph/graph.h"
@@ -37,13 +36,11 @@ static __global__ void push_report_kernel(const __grid_constant__ cuda_view v, c
     report_push(v, live ? p : -1, separation);
 }
 
-/* e of the step's problem: what overlaps is not to come nearer, and no more; and whether there is a second one. A
- * thread a pair, capacity included. */
-static __global__ void push_hold_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+/* e of the step's problem: what overlaps is not to come nearer, and no more. A thread a pair, capacity included. */
+static __global__ void push_hold_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     pdl_wait_if(all_pdl(v.model.bodies));
     const int32_t p = thread_index();
-    if (p == 0) set_condition(args.condition, v.push.due[PUSH_DUE] != 0);
     if (p >= v.contacts.pair_capacity) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
     const bool pushed = p < live_pairs(v.model) && island_is_pushed(v.push, label_of(v.graph, pair));
@@ -145,7 +142,7 @@ static __device__ __forceinline__ void keep_pushed(const cuda_view &v, int32_t i
 }
 
 /* All bodies of an island in the air, in their order, as the host does. */
-static __device__ __forceinline__ void move_island(const cuda_view &v, int32_t label, double dt)
+static __device__ __noinline__ void move_island(const cuda_view &v, int32_t label, double dt)
 {
     const int32_t first = v.graph.slot_of[label], end = first + v.graph.island_bodies[label];
     const vec3 place = v3_load(v.step.before[label].position);
@@ -184,8 +181,7 @@ static __global__ void push_move_kernel(const __grid_constant__ cuda_view v, con
 static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t threads,
                            struct sadmm_error *error)
 {
-    cuda_args args = {};
-    args.condition = c->step ? c->step->some_pushed : 0;
+    const cuda_args args = {};
     return CUDA(launch)(c, kernel, name, blocks_for(threads), &args, error);
 }
 

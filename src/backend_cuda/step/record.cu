@@ -168,13 +168,6 @@ static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *e
     return joints ? record_joints(c, error) : SADMM_OK;
 }
 
-/* Which islands are pushed, and whether any is. */
-static sadmm_status record_push_choice(struct sadmm_context *c, struct sadmm_error *error)
-{
-    CUDA_CALL(c, make_condition(c->stream, &c->step->some_pushed), "a condition of the step");
-    return CUDA(launch_push_choice)(c, error);
-}
-
 /* What is enqueued from here to end_unsolved is done if some island has not been solved before the iterations: a part
  * of the step, where it can be one. */
 static sadmm_status begin_unsolved(struct sadmm_context *c, bool after, struct sadmm_error *error)
@@ -228,7 +221,7 @@ static sadmm_status record_kinematic_plan(struct sadmm_context *c, struct sadmm_
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     TRY(CUDA(launch_support)(c, error));
     TRY(CUDA(enqueue_bodies)(c, error));
-    if (c->view.push.planned) TRY(record_push_choice(c, error));
+    if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error));
     if (c->view.joints.count > 0) {
         if (!solves_ncp(c)) TRY(CUDA(assemble_rows)(c, error));
         TRY(record_solved(c, error));
@@ -264,7 +257,7 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
     if (side) TRY(record_contacts(c, late, error));
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
-    if (c->view.push.planned) TRY(record_push_choice(c, error)); /* it says what contacts are */
+    if (c->view.push.planned) TRY(CUDA(launch_push_choice)(c, error)); /* it says what contacts are */
     if (together && !beside) TRY(record_solved(c, error));
     if (together) TRY(wait_for_joints(c, error));
     return side ? SADMM_OK : record_starts(c, error);
@@ -416,17 +409,12 @@ static sadmm_status record_pushed(struct sadmm_context *c, struct sadmm_error *e
 static sadmm_status record_push(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct sadmm_context *p = c->step->push;
-    const cudaStream_t main = c->stream, own = p->stream;
-    const condition some = c->step->some_pushed;
-    if (some) CUDA_CALL(c, begin_part(main, some, own), "a part of the step");
-    c->stream = p->stream = some ? own : main;
+    const cudaStream_t own = p->stream;
+    p->stream = c->stream;
     p->recording = true;
-    sadmm_status status = record_pushed(c, error);
+    const sadmm_status status = record_pushed(c, error);
     p->recording = false;
-    c->stream = main;
     p->stream = own;
-    const cudaError_t code = some ? end_part(own) : cudaSuccess;
-    if (status == SADMM_OK && code != cudaSuccess) status = CUDA(fail)(c, code, "a part of the step", error);
     return status;
 }
 

@@ -85,7 +85,6 @@ struct cuda_step {
     bool push_streams;          /* which has not fitted its partition once: tier STREAM */
     int32_t quiet;              /* but none has been for so many steps */
     struct sadmm_context *push; /* of that; made with the first one */
-    unsigned long long some_pushed; /* the condition of that in the sub-step that is recorded (device/condition.h) */
 
     bool cold;                  /* planned: some islands may start cold, and their weights are updated; */
     int32_t warm;               /* but none has for so many steps */
@@ -231,7 +230,7 @@ void CUDA(view_push)(struct sadmm_context *);
 void CUDA(plan_second)(struct sadmm_context *, bool warm);
 /* of what kind it is (first: gathered just now); its kernels from here on work if it is one of these; */
 sadmm_status CUDA(launch_push_kind)(struct sadmm_context *, bool first, int kinds, struct sadmm_error *error);
-/* which islands are pushed, once A and b and the layout are made, before contacts are, and the condition some_pushed;
+/* which islands are pushed, once A and b and the layout are made, before contacts are;
  * the second problem, after finish and the launch of move_again; and what bodies move by when it is solved. */
 sadmm_status CUDA(launch_push_choice)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_push_gather)(struct sadmm_context *, struct sadmm_error *error);

@@ -72,11 +72,21 @@ static inline __device__ double row_side_number(const contact_view &contacts, co
     return sum;
 }
 
-/* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes, and in *balance sides that
- * carry an impulse, less those that do not; in lane SIDE_ANCHORS how many sides anchor it. ROWS: there may be row
+/* Of two halves of a constraint those that its side has. */
+static __device__ __forceinline__ int32_t share_of_side(const model_view &model, const contact_view &contacts,
+                                                        const row_view &rows, int32_t code)
+{
+    const int32_t p = code / 2, k = p - contacts.pair_capacity;
+    const int32_t other = k < 0 ? (code & 1 ? contacts.bodies[p].body_a : contacts.bodies[p].body_b)
+                                : (code & 1 ? rows.constraints[k].body_a : rows.constraints[k].body_b);
+    return is_dynamic(model, other) ? 1 : 2;
+}
+
+/* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes, and *balance, twice
+ * that of weight_starts_warm; in lane SIDE_ANCHORS how many sides anchor it. ROWS: there may be row
  * blocks; then every lane of the warp comes here. */
 template <bool ROWS>
-static __device__ __forceinline__ double sum_sides(const graph_view &graph, const contact_view &contacts,
+static __device__ __forceinline__ double sum_sides(const model_view &model, const graph_view &graph, const contact_view &contacts,
                                                    const row_view &rows, const weight_view &weights,
                                                    const body_thread &t, int32_t *balance)
 {
@@ -103,12 +113,14 @@ static __device__ __forceinline__ double sum_sides(const graph_view &graph, cons
             const bool turns = any_of_lanes(t.lane >= 3 && t.lane < 6 && number[j] != 0);
             if (t.lane != SIDE_PUSH || code[j] / 2 < contacts.pair_capacity) continue;
             number[j] = sqrt(x * x + y * y + z * z);
-            *balance += turns && !(number[j] > 0) ? 2 : 0; /* a couple pushes nothing */
+            if (turns && !(number[j] > 0)) *balance += 2 * share_of_side(model, contacts, rows, code[j]); /* a couple */
         }
 #pragma unroll
         for (int32_t j = 0; j < AT_ONCE; ++j) {
             sum += number[j];
-            *balance += code[j] < 0 ? 0 : number[j] > 0 ? 1 : -1;
+            if (t.lane != SIDE_PUSH || code[j] < 0) continue;
+            const int32_t share = share_of_side(model, contacts, rows, code[j]);
+            *balance += number[j] > 0 ? share : -share;
         }
     }
     return sum;
@@ -128,7 +140,7 @@ static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const
         violation += violation_of(v.bodies, v.contacts, v.weights, p);
     }
     const wide_row<RIGID> row = row_of_body<RIGID>(v.bodies, t);
-    const double sum = sum_sides<ROWS>(v.graph, v.contacts, v.rows, v.weights, t, &balance), g = t.lane < 6 ? sum : 0,
+    const double sum = sum_sides<ROWS>(v.model, v.graph, v.contacts, v.rows, v.weights, t, &balance), g = t.lane < 6 ? sum : 0,
                  momentum = product(row.velocity, row.a);
     term[0] = dot_lanes(g, product(g, row.a_inverse));
     term[1] = t.live ? mass_of(v.bodies, t.body) : 0;

@@ -148,8 +148,8 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
 #define WEIGHT_SEPARATION_NEED 3.3333333333333335 /* measured: bench/constants.py, heaps standing */
 #define WEIGHT_SEPARATION_LEAST 0.001 /* measured: bench/constants.py, heaps standing */
 
-/* Does an island start warm: do at least half of its constraints? `balance`: of their sides on dynamic bodies those
- * that start with an impulse, less those that start without. */
+/* Does an island start warm: do at least half of its constraints? `balance`: constraints that start with an impulse,
+ * less those that start without, each shared out over its dynamic bodies. */
 SADMM_INLINE int weight_starts_warm(double balance) { return balance >= 0; }
 
 /* K of an island whose contacts are springs, 0: they are none. A problem that is solved in short batches is no row of
