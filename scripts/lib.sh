@@ -10,7 +10,7 @@ packages_to_run=(gcc=cc 'g++=c++' meson=meson ninja-build=ninja pkgconf=pkg-conf
 packages_to_test=("${packages_to_run[@]}" git=git libhdf5-dev check clang=clang libclang-rt-dev libomp-dev util-linux=setarch
                   python3-dev python3-venv)
 # Used where the release offers it.
-packages_to_test_if_offered=(libsiconos-numerics-dev python3-jsonschema chromium-headless-shell)
+packages_to_test_if_offered=(cmake=cmake libsiconos-numerics-dev python3-jsonschema chromium-headless-shell)
 
 say() { printf '\n==> %s\n' "$*"; }
 fail() { printf 'error: %s\n' "$*" >&2; exit 1; }

@@ -58,5 +58,16 @@ int main(int argc, char **argv)
         return 1;
     }
     sadmm_world_destroy(world);
+
+    /* A scene, where the library has them. */
+    sadmm_scene *scene = NULL;
+    if (sadmm_scene_library_count() > 0) {
+        MUST(sadmm_scene_create("two_balls", &scene));
+        MUST(sadmm_scene_create_world(scene, NULL, &world));
+        MUST(sadmm_scene_run_script(scene, world, 0));
+        MUST(sadmm_world_step(world));
+        sadmm_world_destroy(world);
+        sadmm_scene_destroy(scene);
+    }
     return 0;
 }

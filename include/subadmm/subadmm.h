@@ -16,6 +16,7 @@
 #include "problem.h"
 #include "query.h"
 #include "save.h"
+#include "scenes.h"
 #include "settings.h"
 #include "status.h"
 #include "tasks.h"

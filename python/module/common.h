@@ -10,6 +10,7 @@
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -58,7 +59,28 @@ template <size_t N> std::array<double, N> numbers<N>::as(const char *name) const
     return out;
 }
 
+// Numbers that a property reads: a subadmm.vectors.Vector, which cannot be written to. setter: the attribute that sets
+// them; NULL: none does.
+template <size_t N> struct seen {
+    std::array<double, N> values;
+    const char *setter;
+};
+nb::object vector_of(const double *values, size_t count, const char *setter);
+
 namespace nanobind::detail {
+template <size_t N> struct type_caster<seen<N>> {
+    NB_TYPE_CASTER(seen<N>, const_name("numpy.typing.NDArray[numpy.float64]"))
+    bool from_python(handle, uint32_t, cleanup_list *) noexcept { return false; }
+    static handle from_cpp(const seen<N> &x, rv_policy, cleanup_list *) noexcept
+    {
+        try {
+            return vector_of(x.values.data(), N, x.setter).release();
+        } catch (python_error &error) {
+            error.restore();
+            return handle();
+        }
+    }
+};
 template <> struct type_caster<whole> {
     NB_TYPE_CASTER(whole, const_name("int"))
     bool from_python(handle src, uint32_t, cleanup_list *) noexcept
@@ -68,7 +90,7 @@ template <> struct type_caster<whole> {
     }
 };
 template <size_t N> struct type_caster<numbers<N>> {
-    NB_TYPE_CASTER(numbers<N>, const_name("collections.abc.Sequence[float]"))
+    NB_TYPE_CASTER(numbers<N>, const_name("numpy.typing.ArrayLike"))
     bool from_python(handle src, uint32_t, cleanup_list *) noexcept
     {
         value.given = borrow(src);
@@ -98,6 +120,13 @@ struct shape_def {
     sadmm_shape_def def = sadmm_shape_def_default();
     std::shared_ptr<hull_holder> hull;
     std::shared_ptr<mesh_holder> mesh;
+    bool of_world = false; // it was read of a BodyShape
+};
+
+// What acts along a coordinate of a joint.
+struct coordinate_of {
+    sadmm_joint_coordinate values = sadmm_joint_def_default().coordinates[0];
+    bool of_joint = false; // it was read of a Joint
 };
 
 // One more use of the hull or mesh that a definition points to.
@@ -134,6 +163,19 @@ struct world {
         sadmm_scene_close(&scene);
     }
 };
+
+// Settings: those of a world, as they were read, whose members are set there, too; or some of nobody.
+struct settings_of {
+    sadmm_settings values = sadmm_settings_default();
+    nb::object owner; // a World or Environments, or none
+    // Set a member of the owner's settings: it reads them, lets `change` do so, and sets them, and no one else does so
+    // in between.
+    void (*set)(nb::handle owner, const std::function<void(settings_of &)> &change) = nullptr;
+};
+nb::object settings_read(const sadmm_settings &values, nb::handle owner,
+                         void (*set)(nb::handle owner, const std::function<void(settings_of &)> &change));
+// Those of an argument.
+sadmm_settings read_settings(nb::handle given);
 
 // f: a call that gives a status. Its message is read under the world's lock.
 template <class F> void call(world &w, F f)
@@ -211,10 +253,10 @@ template <class Id> size_t hash_of(const object_of<Id> &a)
     return (size_t)a.w ^ ((size_t)a.id.slot << 32 | a.id.generation);
 }
 
-template <size_t N> std::array<double, N> array_of(const double *x)
+template <size_t N> seen<N> array_of(const double *x, const char *setter = nullptr)
 {
-    std::array<double, N> out;
-    for (size_t k = 0; k < N; ++k) out[k] = x[k];
+    seen<N> out{{}, setter};
+    for (size_t k = 0; k < N; ++k) out.values[k] = x[k];
     return out;
 }
 template <size_t N> void put(const std::array<double, N> &from, double *to)
@@ -237,6 +279,26 @@ template <class T, class Count, class At> std::vector<T> all_of(nb::handle self,
     out.reserve(ids.size());
     for (const auto &id : ids) out.push_back(T{nb::borrow(self), &w, id});
     return out;
+}
+
+// Their ids, n x 2 (slot, generation), in the order of their rows.
+template <class T> nb::object numpy_of(std::vector<T> values, std::vector<size_t> shape);
+template <class Id, class Count, class At> nb::object ids_of(world &w, Count count, At at)
+{
+    std::vector<uint32_t> ids;
+    call(w, [&](sadmm_world *h) {
+        sadmm_status status = SADMM_OK;
+        const size_t n = (size_t)count(h);
+        ids.resize(2 * n);
+        for (size_t k = 0; k < n && status == SADMM_OK; ++k) {
+            Id id;
+            status = at(h, (int32_t)k, &id);
+            ids[2 * k] = id.slot, ids[2 * k + 1] = id.generation;
+        }
+        return status;
+    });
+    const size_t n = ids.size() / 2;
+    return numpy_of(std::move(ids), {n, 2});
 }
 
 // A numpy array that owns its numbers.

@@ -27,6 +27,16 @@ template <class F> void call(environments &e, F f)
     if (status != SADMM_OK) raise_status(status, message);
 }
 
+void set_settings(nb::handle owner, const std::function<void(settings_of &)> &change)
+{
+    call(nb::cast<environments &>(owner), [&](sadmm_environments *h) {
+        settings_of now;
+        now.values = sadmm_environments_settings(h);
+        change(now);
+        return sadmm_environments_set_settings(h, &now.values);
+    });
+}
+
 using which_rows = nb::ndarray<const int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using in_values = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
@@ -242,11 +252,18 @@ void bind_environments(nb::module_ &m)
              "types"_a)
         .def_prop_rw(
             "settings",
-            [](environments &e) {
-                std::lock_guard<std::mutex> lock(e.mutex);
-                return sadmm_environments_settings(e.handle());
+            [](nb::handle_t<environments> self) {
+                environments &e = nb::cast<environments &>(self);
+                sadmm_settings now;
+                {
+                    nb::gil_scoped_release release;
+                    std::lock_guard<std::mutex> lock(e.mutex);
+                    now = sadmm_environments_settings(e.handle());
+                }
+                return settings_read(now, self, &set_settings);
             },
-            [](environments &e, const sadmm_settings &settings) {
+            [](environments &e, nb::object given) {
+                const sadmm_settings settings = read_settings(given);
                 call(e, [&](sadmm_environments *h) { return sadmm_environments_set_settings(h, &settings); });
             });
     m.def("_replicate", &replicate, "world"_a, "count"_a, nb::rv_policy::take_ownership);

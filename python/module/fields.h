@@ -11,9 +11,33 @@
 std::string documented(const sadmm_field &field);
 
 // at: from an object to the member, [](auto &o) -> auto & { return o.member; }.
+
+// Change an object that a property was set of: by itself, or as what it belongs to wants it.
+template <class T, class F> void change(T &object, F f) { f(object); }
+template <class F> void change(settings_of &settings, F f)
+{
+    if (settings.set) settings.set(settings.owner, f);
+    f(settings);
+}
+template <class F> void change(coordinate_of &coordinate, F f)
+{
+    if (coordinate.of_joint)
+        throw nb::value_error("what Joint.coordinate gives is a copy, which is not to be written to; change its "
+                              "copy() and give that to set_coordinate, or use set_target");
+    f(coordinate);
+}
+template <class F> void change(shape_def &shape, F f)
+{
+    if (shape.of_world)
+        throw nb::value_error("a BodyShape's definition is a copy, which is not to be written to; set_material, "
+                              "set_frame and set_size change the shape, and copy() is a definition of your own");
+    f(shape);
+}
 template <class T, class At> void bind_REAL(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
-    c.def_prop_rw(name, [at](const T &o) { return at(o); }, [at](T &o, double x) { at(o) = x; }, doc.c_str());
+    c.def_prop_rw(
+        name, [at](const T &o) { return at(o); }, [at](T &o, double x) { change(o, [&](T &t) { at(t) = x; }); },
+        doc.c_str());
 }
 template <class T, class At> void bind_BOUND(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
@@ -21,25 +45,36 @@ template <class T, class At> void bind_BOUND(nb::class_<T> &c, const char *name,
 }
 template <class T, class At> void bind_FLAG(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
-    c.def_prop_rw(name, [at](const T &o) { return at(o); }, [at](T &o, bool x) { at(o) = x; }, doc.c_str());
+    c.def_prop_rw(
+        name, [at](const T &o) { return at(o); }, [at](T &o, bool x) { change(o, [&](T &t) { at(t) = x; }); },
+        doc.c_str());
 }
 template <class T, class At> void bind_WHOLE(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
     c.def_prop_rw(
-        name, [at](const T &o) { return at(o); }, [at, name](T &o, const whole &x) { at(o) = x.as_int(name); },
+        name, [at](const T &o) { return at(o); }, [at, name](T &o, const whole &given) {
+            const int x = given.as_int(name);
+            change(o, [&](T &t) { at(t) = x; });
+        },
         doc.c_str());
 }
 template <class T, class At> void bind_BITS(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
     c.def_prop_rw(
-        name, [at](const T &o) { return at(o); }, [at, name](T &o, const whole &x) { at(o) = x.as_bits(name); },
+        name, [at](const T &o) { return at(o); }, [at, name](T &o, const whole &given) {
+            const uint32_t x = given.as_bits(name);
+            change(o, [&](T &t) { at(t) = x; });
+        },
         doc.c_str());
 }
 template <size_t N, class T, class At>
 void bind_numbers(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
-    c.def_prop_rw(name, [at](const T &o) { return array_of<N>(at(o)); },
-                  [at, name](T &o, const numbers<N> &x) { put(x.as(name), at(o)); }, doc.c_str());
+    c.def_prop_rw(name, [at, name](const T &o) { return array_of<N>(at(o), name); },
+                  [at, name](T &o, const numbers<N> &given) {
+                      const std::array<double, N> x = given.as(name);
+                      change(o, [&](T &t) { put(x, at(t)); });
+                  }, doc.c_str());
 }
 template <class T, class At> void bind_VECTOR(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
@@ -52,8 +87,10 @@ template <class T, class At> void bind_TURN(nb::class_<T> &c, const char *name, 
 template <class T, class At> void bind_named(nb::class_<T> &c, const char *name, At at, const std::string &doc)
 {
     c.def_prop_rw(name, [at](const T &o) { return name_of(at(o)); },
-                  [at, name](T &o, const std::string &x) { at(o) = named<std::decay_t<decltype(at(o))>>(name, x); },
-                  doc.c_str());
+                  [at, name](T &o, const std::string &given) {
+                      const auto x = named<std::decay_t<decltype(at(o))>>(name, given);
+                      change(o, [&](T &t) { at(t) = x; });
+                  }, doc.c_str());
 }
 #define bind_METHOD bind_named
 #define bind_DRIVE bind_named
@@ -64,7 +101,7 @@ inline double shown(double x) { return x; }
 inline bool shown(bool x) { return x; }
 inline int shown(int x) { return x; }
 inline uint32_t shown(uint32_t x) { return x; }
-template <size_t N> std::array<double, N> shown(const double (&x)[N]) { return array_of<N>(x); }
+template <size_t N> seen<N> shown(const double (&x)[N]) { return array_of<N>(x); }
 template <class E> std::enable_if_t<std::is_enum_v<E>, const char *> shown(E x) { return name_of(x); }
 
 // of: def_of(object) gives the definition.

@@ -26,6 +26,13 @@ const std::string &without_null(const char *name, const std::string &text)
     return text;
 }
 
+nb::object vector_of(const double *values, size_t count, const char *setter)
+{
+    const nb::bytes numbers((const char *)values, count * sizeof *values);
+    const nb::object name = setter ? nb::object(nb::str(setter)) : nb::none();
+    return nb::module_::import_("subadmm.vectors").attr("made")(numbers, name);
+}
+
 // Gives false where it is no whole number of 64 bits.
 static bool read_whole(const char *name, nb::handle given, const std::string &must_be, long long &x)
 {

@@ -1,10 +1,10 @@
 // Joints, gears and virtual couplings.
 #include "fields.h"
 
-using C = sadmm_joint_coordinate;
+using C = coordinate_of;
 
 #define BIND(X, kind, role, name, ...) \
-    bind_##kind(c, #name, [](auto &o) -> auto & { return o.name; }, documented(*field++));
+    bind_##kind(c, #name, [](auto &o) -> auto & { return o.values.name; }, documented(*field++));
 
 static void bind_coordinate(nb::module_ &m)
 {
@@ -12,7 +12,7 @@ static void bind_coordinate(nb::module_ &m)
                     "What acts along one free coordinate of a joint; m and N, or rad and N m. Coordinate(limited=True, "
                     "lower=-1, upper=1): the defaults, with changes.");
     c.def("__init__", [](nb::pointer_and_handle<C> self, nb::kwargs values) {
-        new (self.p) C(sadmm_joint_def_default().coordinates[0]);
+        new (self.p) C();
         nb::inst_mark_ready(self.h);
         set_members(self.h, values);
     });
@@ -37,8 +37,8 @@ static joint add_joint(nb::handle_t<world> self, const std::string &kind, const 
     for (auto [k, value] : coordinates) {
         const int64_t index = whole{nb::borrow(k)}.in("key of coordinates", 0, 5);
         const std::string which = "coordinates[" + std::to_string(index) + "]";
-        if (!nb::try_cast(value, def.coordinates[index], false))
-            refuse_type(which.c_str(), value, "must be a subadmm.Coordinate");
+        if (!nb::isinstance<C>(value)) refuse_type(which.c_str(), value, "must be a subadmm.Coordinate");
+        def.coordinates[index] = nb::cast<C &>(value).values;
     }
     call(w, [&](sadmm_world *h) {
         sadmm_status status = SADMM_OK;
@@ -121,13 +121,16 @@ static void bind_joint(nb::module_ &m)
                 call(j.in(), [&](sadmm_world *h) { return sadmm_world_set_joint_enabled(h, j.id, on); });
             })
         .def(
-            "coordinate", [](const joint &j, whole index) { return def_of(j).coordinates[index_of(index)]; }, "index"_a,
-            "What acts along the coordinate.")
+            "coordinate",
+            [](const joint &j, whole index) {
+                return C{def_of(j).coordinates[index_of(index)], true};
+            },
+            "index"_a, "What acts along the coordinate: a copy, which is not to be written to.")
         .def(
             "set_coordinate",
             [](const joint &j, whole index, const C &given) {
                 const int k = index_of(index);
-                const C value = given; // another thread may change it
+                const sadmm_joint_coordinate value = given.values; // another thread may change it
                 call(j.in(), [&](sadmm_world *h) { return sadmm_world_set_joint_coordinate(h, j.id, k, &value); });
             },
             "index"_a, "coordinate"_a, "From the next step on.")

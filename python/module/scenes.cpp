@@ -40,9 +40,9 @@ static std::unique_ptr<world> build(const std::string &spec, bool is_text, const
     if (!settings.is_none()) {
         if (!nb::isinstance<nb::dict>(settings))
             refuse_type("settings", settings, "must be a dict of changes, as {'dt': 0.002}");
-        nb::object changed = nb::cast(def.settings);
+        nb::object changed = settings_read(def.settings, nb::none(), nullptr);
         set_members(changed, settings);
-        def.settings = nb::cast<sadmm_settings>(changed);
+        def.settings = read_settings(changed);
     }
     sadmm_status status;
     {
@@ -56,6 +56,46 @@ static std::unique_ptr<world> build(const std::string &spec, bool is_text, const
     made->scripted = true;
     if (!is_text) made->spec = spec;
     made->def = def;
+    return made;
+}
+
+// Another world with the same state, which makes the same steps; with the scene's script and where that is.
+static std::unique_ptr<world> clone_of(world &w)
+{
+    auto made = std::make_unique<world>();
+    sadmm_error error{};
+    sadmm_status status;
+    {
+        nb::gil_scoped_release release;
+        std::lock_guard<std::mutex> lock(w.mutex);
+        std::vector<char> bytes;
+        size_t size = 0;
+        sadmm_world *copy = nullptr;
+        status = sadmm_world_save(w.handle, nullptr, 0, &size);
+        if (status == SADMM_OK) {
+            bytes.resize(size);
+            status = sadmm_world_save(w.handle, bytes.data(), size, &size);
+        }
+        if (status != SADMM_OK) snprintf(error.message, sizeof error.message, "%s", sadmm_world_message(w.handle));
+        if (status == SADMM_OK) {
+            sadmm_world_def def = w.def;
+            def.settings = sadmm_world_settings(w.handle);
+            status = sadmm_world_create(&def, &copy);
+            if (status != SADMM_OK) snprintf(error.message, sizeof error.message, "%s", sadmm_last_message());
+        }
+        if (status == SADMM_OK) {
+            made->take(copy);
+            status = sadmm_world_restore(copy, bytes.data(), bytes.size());
+            if (status != SADMM_OK) snprintf(error.message, sizeof error.message, "%s", sadmm_world_message(copy));
+        }
+        made->def = w.def, made->steps = w.steps, made->warned = w.warned;
+        // A scene of the library belongs to nobody; one of a file has no script, and is its world's own.
+        if (w.scripted && !w.scene.loaded) {
+            made->scripted = true;
+            made->script_on = w.script_on, made->spec = w.spec, made->scene = w.scene, made->result = w.result;
+        }
+    }
+    check_error(status, error);
     return made;
 }
 
@@ -121,6 +161,9 @@ void bind_scenes(nb::module_ &m, nb::class_<world> &w)
           "chaotic.");
     m.def("_scene", &build, "spec"_a, "is_text"_a, nb::kw_only(), "backend"_a = "auto", "precision"_a = nb::none(),
           "method"_a = nb::none(), "device"_a = 0, "settings"_a = nb::none());
+    w.def("clone", &clone_of,
+          "Another World with the same state, which makes the same steps, bit for bit; events that wait are not "
+          "copied. The\nscript of a scene of the library goes on in both.");
     w.def("_to_json", &to_json, "name"_a.none(), "description"_a.none(), "duration"_a.none());
     w.def_prop_ro(
         "has_script",

@@ -1,7 +1,7 @@
 // Settings of steps, and what a step reports.
 #include "fields.h"
 
-using S = sadmm_settings;
+using S = settings_of;
 
 static std::string shown_number(const sadmm_field &field, double x)
 {
@@ -25,16 +25,60 @@ std::string documented(const sadmm_field &field)
 }
 
 #define BIND(X, kind, role, name, ...) \
-    bind_##kind(c, #name, [](auto &o) -> auto & { return o.name; }, documented(*field++));
+    bind_##kind(c, #name, [](auto &o) -> auto & { return o.values.name; }, documented(*field++));
+
+nb::object settings_read(const sadmm_settings &values, nb::handle owner,
+                         void (*set)(nb::handle owner, const std::function<void(settings_of &)> &change))
+{
+    S out;
+    out.values = values;
+    if (set) out.owner = nb::borrow(owner);
+    out.set = set;
+    return nb::cast(std::move(out));
+}
+
+sadmm_settings read_settings(nb::handle given)
+{
+    if (!nb::isinstance<S>(given)) refuse_type("settings", given, "must be a subadmm.Settings");
+    return nb::cast<S &>(given).values;
+}
+
+// The garbage collector is told of the owner, as of that of a Body (common.h).
+static int traverse_settings(PyObject *self, visitproc visit, void *arg) noexcept
+{
+    Py_VISIT(Py_TYPE(self));
+    if (nb::inst_ready(self)) Py_VISIT(nb::inst_ptr<S>(self)->owner.ptr());
+    return 0;
+}
+static int clear_settings(PyObject *self) noexcept
+{
+    if (!nb::inst_ready(self)) return 0;
+    S *settings = nb::inst_ptr<S>(self);
+    settings->set = nullptr;
+    nb::object dropped = std::move(settings->owner);
+    return 0;
+}
+
+#define NAME_OF(X, kind, role, name, ...) out.append(#name);
 
 void bind_settings(nb::module_ &m)
 {
-    nb::class_<S> c(m, "Settings", "Settings of steps. Settings(dt=0.002, iterations=50): the defaults, with changes. "
-                                    "Checked when they are set in a world.");
+    static PyType_Slot slots[] = {
+        {Py_tp_traverse, (void *)&traverse_settings}, {Py_tp_clear, (void *)&clear_settings}, {0, nullptr}};
+    nb::class_<S> c(m, "Settings", nb::type_slots(slots),
+                    "Settings of steps. Settings(dt=0.002, iterations=50): the defaults, with changes. "
+                    "Checked when they are set in a world. Those that are read of a world set their members there, "
+                    "too.");
     c.def("__init__", [](nb::pointer_and_handle<S> self, nb::kwargs values) {
-        new (self.p) S(sadmm_settings_default());
+        new (self.p) S();
         nb::inst_mark_ready(self.h);
         set_members(self.h, values);
+    });
+    c.def("_set", [](nb::handle_t<S> self, nb::dict values) { set_members(self, values); }, "values"_a);
+    c.def_prop_ro_static("_names", [](nb::handle) {
+        nb::list out;
+        SADMM_SETTINGS(NAME_OF, )
+        return nb::tuple(out);
     });
     const sadmm_field *field = sadmm_settings_table;
     SADMM_SETTINGS(BIND, )

@@ -153,7 +153,13 @@ void bind_shapes(nb::module_ &m)
          "type"_a, "size"_a = std::vector<double>())
         .def_prop_ro("type", [](const S &s) { return name_of(s.def.type); })
         .def(
-            "copy", [](const S &s) { return S(s); }, "A copy of the definition; hulls and meshes are shared.")
+            "copy",
+            [](const S &s) {
+                S out(s);
+                out.of_world = false;
+                return out;
+            },
+            "A copy of the definition; hulls and meshes are shared.")
         .def("geometry", &geometry_of,
              "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.")
         .def_prop_ro(

@@ -3,11 +3,14 @@
 
 #include "fields.h"
 
-static sadmm_settings read_settings(nb::handle given)
+static void set_settings(nb::handle owner, const std::function<void(settings_of &)> &change)
 {
-    sadmm_settings settings;
-    if (!nb::try_cast(given, settings, false)) refuse_type("settings", given, "must be a subadmm.Settings");
-    return settings;
+    call(nb::cast<world &>(owner), [&](sadmm_world *h) {
+        settings_of now;
+        now.values = sadmm_world_settings(h);
+        change(now);
+        return sadmm_world_set_settings(h, &now.values);
+    });
 }
 
 static void init_world(world *self, const std::string &backend, const std::string &precision, whole device,
@@ -161,7 +164,7 @@ template <size_t N> using member = double (sadmm_body_state::*)[N];
 
 template <size_t N> static void bind_member(nb::class_<body> &c, const char *name, member<N> at, const char *doc)
 {
-    c.def_prop_rw(name, [at](const body &b) { return array_of<N>(state_of(b).*at); },
+    c.def_prop_rw(name, [at, name](const body &b) { return array_of<N>(state_of(b).*at, name); },
                   [at, name](const body &b, const numbers<N> &given) {
                       const std::array<double, N> x = given.as(name);
                       call(b.in(), [&](sadmm_world *h) { // no step in between
@@ -204,6 +207,9 @@ static void bind_body(nb::module_ &m)
                  return "<subadmm.Body " + std::to_string(b.id.slot) + "." + std::to_string(b.id.generation) + ">";
              })
         .def_prop_ro("world", [](const body &b) { return b.owner; })
+        .def_prop_ro(
+            "id", [](const body &b) { return std::make_pair(b.id.slot, b.id.generation); },
+            "(slot, generation), as contacts and events have it.")
         .def_prop_ro(
             "index",
             [](const body &b) {
@@ -270,7 +276,7 @@ static void bind_body(nb::module_ &m)
             [](const body &b) {
                 vec6 out;
                 call(b.in(), [&](sadmm_world *h) { return sadmm_world_body_contact_wrench(h, b.id, out.data()); });
-                return out;
+                return array_of<6>(out.data());
             },
             "Force (N) and torque about the centre of mass (N m) of the last step's contacts.")
         .def(
@@ -290,6 +296,9 @@ static void bind_body(nb::module_ &m)
             "__eq__", [](const shape &a, const shape &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_shape_id>)
         .def_prop_ro("world", [](const shape &s) { return s.owner; })
+        .def_prop_ro(
+            "id", [](const shape &s) { return std::make_pair(s.id.slot, s.id.generation); },
+            "(slot, generation), as contacts and events have it.")
         .def_prop_ro("index",
                      [](const shape &s) {
                          int32_t index;
@@ -312,9 +321,10 @@ static void bind_body(nb::module_ &m)
                     if (status == SADMM_OK) hold_parts(out); // the world could let go of them
                     return status;
                 });
+                out.of_world = true;
                 return out;
             },
-            "As it is now.")
+            "As it is now; a copy, which is not to be written to.")
         .def(
             "set_material",
             [](const shape &s, double mu, double e) {
@@ -361,12 +371,20 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
           "backend: 'auto', 'ref', 'cpu' or 'cuda'; precision: 'f64' or 'f32'; device: which accelerator; "
           "contact_margin: speculative margin as a share of the thinner shape's extent; settings: Settings, or the "
           "defaults.");
-    w.def_prop_rw("settings", [](world &w) { return ask(w, [](sadmm_world *h) { return sadmm_world_settings(h); }); },
+    w.def_prop_rw("settings",
+                  [](nb::handle_t<world> self) {
+                      const sadmm_settings now =
+                          ask(nb::cast<world &>(self), [](sadmm_world *h) { return sadmm_world_settings(h); });
+                      return settings_read(now, self, &set_settings);
+                  },
                   [](world &w, nb::object given) {
                       const sadmm_settings s = read_settings(given);
                       call(w, [&](sadmm_world *h) { return sadmm_world_set_settings(h, &s); });
                   },
-                  "A copy: change it and assign it. From the next step on.");
+                  "As they are now. What is set of them, as world.settings.dt = 0.002, is set in the world, from the "
+                  "next step on; copy() is of nobody.",
+                  nb::for_getter(nb::sig("def settings(self) -> Settings")),
+                  nb::for_setter(nb::sig("def settings(self, settings: Settings, /) -> None")));
     w.def("set_backend", [](world &w, const std::string &backend, const std::string &precision, whole which) {
         const int device = which.as_int("device");
         const auto b = named<sadmm_backend>("backend", backend);
@@ -391,6 +409,26 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
     w.def_prop_ro("shapes", [](nb::handle_t<world> self) {
         return all_of<shape>(self, &sadmm_world_shape_count, &sadmm_world_shape_at);
     }, "All shapes.");
+    w.def("_body_ids",
+          [](world &w) { return ids_of<sadmm_body_id>(w, &sadmm_world_body_count, &sadmm_world_body_at); });
+    w.def("_shape_ids",
+          [](world &w) { return ids_of<sadmm_shape_id>(w, &sadmm_world_shape_count, &sadmm_world_shape_at); });
+    w.def_prop_ro("names", [](world &w) {
+        std::vector<std::string> names;
+        call(w, [&](sadmm_world *h) {
+            sadmm_status status = SADMM_OK;
+            const int32_t count = sadmm_world_body_count(h);
+            for (int32_t k = 0; k < count && status == SADMM_OK; ++k) {
+                sadmm_body_id id;
+                sadmm_body_def def;
+                status = sadmm_world_body_at(h, k, &id);
+                if (status == SADMM_OK) status = sadmm_world_body_def(h, id, &def);
+                if (status == SADMM_OK) names.push_back(def.name);
+            }
+            return status;
+        });
+        return names;
+    }, "Of all bodies, in the order of the arrays' rows; '' of those without one.");
     w.def("step", [](world &w, whole n) { step(w, n, true); }, "n"_a = 1,
           "Make n steps. Scenes also run their script.");
     w.def("step_async", [](world &w, whole n) { step(w, n, false); }, "n"_a = 1,

@@ -12,9 +12,15 @@ SI units everywhere; orientations are unit quaternions w x y z, body to world. W
 in the C headers of the same names (include/subadmm/).
 """
 
+from __future__ import annotations
+
+import os
 import warnings
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _core
 from ._core import (
@@ -55,10 +61,13 @@ from .decomposition import decompose
 from .environments import Environments
 from .given import indices, numbers, real
 from .importing import load
+from .objects import add_to_module
 from .robots import Robots
+from .vectors import read_only
 from .copies import replicate
 
-__version__ = version()
+__version__: str = version()
+add_to_module()
 
 __all__ = [
     "decompose", "load",
@@ -79,7 +88,7 @@ __all__ = [
 # ---- shapes ----------------------------------------------------------------------------------------------------------
 
 
-def _with(shape, options):
+def _with(shape: Shape, options: dict[str, Any]) -> Shape:
     for name in options:
         if name not in ("position", "orientation", "friction", "restitution", "category", "mask", "sensor"):
             raise TypeError(f"{name}: no such option of a shape")
@@ -87,57 +96,57 @@ def _with(shape, options):
     return shape
 
 
-def plane(**options):
+def plane(**options: Any) -> Shape:
     """Half-space z <= 0 of the shape's frame, for static bodies. Options of this and all shapes: position and
     orientation in the body's frame, friction (0.5), restitution (0), category, mask, sensor (False; a sensor has no
     contacts and reports overlaps)."""
     return _with(Shape("plane"), options)
 
 
-def sphere(radius, **options):
+def sphere(radius: float, **options: Any) -> Shape:
     """A ball; m."""
     return _with(Shape("sphere", [radius]), options)
 
 
-def capsule(radius, half_length, **options):
+def capsule(radius: float, half_length: float, **options: Any) -> Shape:
     """Radius and half length of the segment along the shape's z axis, m."""
     return _with(Shape("capsule", [radius, half_length]), options)
 
 
-def box(x, y, z, **options):
+def box(x: float, y: float, z: float, **options: Any) -> Shape:
     """Half extents, m."""
     return _with(Shape("box", [x, y, z]), options)
 
 
-def cylinder(radius, half_height, **options):
+def cylinder(radius: float, half_height: float, **options: Any) -> Shape:
     """Along the shape's z axis; m."""
     return _with(Shape("cylinder", [radius, half_height]), options)
 
 
-def cone(radius, half_height, **options):
+def cone(radius: float, half_height: float, **options: Any) -> Shape:
     """Along the shape's z axis, apex up; the origin is halfway up; m."""
     return _with(Shape("cone", [radius, half_height]), options)
 
 
-def ellipsoid(x, y, z, **options):
+def ellipsoid(x: float, y: float, z: float, **options: Any) -> Shape:
     """Semi-axes, m."""
     return _with(Shape("ellipsoid", [x, y, z]), options)
 
 
-def hull(points, merge=None, convex_radius=0.0, **options):
+def hull(points: ArrayLike, merge: float | None = None, convex_radius: float = 0.0, **options: Any) -> Shape:
     """The convex hull of points (n x 3, m). merge: faces that are flat to within this share of the extent become
     one; convex_radius: the shape is the Minkowski sum with a ball of this radius, m."""
     return _with(_core._hull(numbers("points", points, 3), -1.0 if merge is None else merge, convex_radius), options)
 
 
-def mesh(vertices, triangles, **options):
+def mesh(vertices: ArrayLike, triangles: ArrayLike, **options: Any) -> Shape:
     """Triangles (m x 3 indices, counter-clockwise seen from outside) of vertices (n x 3, m), for static and kinematic
     bodies."""
     vertices = numbers("vertices", vertices, 3)
     return _with(_core._mesh(vertices, indices("triangles", triangles, len(vertices))), options)
 
 
-def heightfield(heights, spacing, **options):
+def heightfield(heights: ArrayLike, spacing: ArrayLike, **options: Any) -> Shape:
     """Heights (rows along y x columns along x, m) over a grid centred at the origin; spacing: (x, y), m. For static and
     kinematic bodies."""
     return _with(_core._heightfield(numbers("heights", heights), spacing), options)
@@ -146,7 +155,8 @@ def heightfield(heights, spacing, **options):
 # ---- scenes ----------------------------------------------------------------------------------------------------------
 
 
-def scene(spec, *, backend="auto", precision=None, method=None, device=0, settings=None):
+def scene(spec: str | os.PathLike[str], *, backend: str = "auto", precision: str | None = None,
+          method: str | None = None, device: int = 0, settings: Mapping[str, Any] | None = None) -> World:
     """The world of a scene by name ("pile:300"), or of a scene file (a path that ends in .json or has a slash), as the
     subadmm command makes it; World.step also runs the scene's script. `settings`: a dict of changes to the scene's
     settings, like {"dt": 0.002}; `method`, "fast" or "paper", also sets the scene's number of iterations for it."""
@@ -154,7 +164,8 @@ def scene(spec, *, backend="auto", precision=None, method=None, device=0, settin
                         settings=settings)
 
 
-def scene_from_json(text, *, backend="auto", precision=None, method=None, device=0, settings=None):
+def scene_from_json(text: str, *, backend: str = "auto", precision: str | None = None, method: str | None = None,
+                    device: int = 0, settings: Mapping[str, Any] | None = None) -> World:
     """The same from the text of a scene file."""
     return _core._scene(text, True, backend=backend, precision=precision, method=method, device=device,
                         settings=settings)
@@ -222,7 +233,7 @@ def _struct_dtype(members, size):
 #: Members of World.contacts(): ids are (slot, generation); position, normal (from a to b) and
 #: separation (< 0: penetration) in m, impulse on b in N s,
 #: force on b in N; triangle: of a mesh, else -1.
-contact_dtype = _struct_dtype(_core._contact_members, _core._contact_size)
+contact_dtype: np.dtype[Any] = _struct_dtype(_core._contact_members, _core._contact_size)
 
 
 def _contacts(self):
@@ -233,7 +244,7 @@ def _contacts(self):
 #: Members of World.events(): step; type, one of CONTACT_BEGUN, CONTACT_ENDED, SENSOR_BEGUN, SENSOR_ENDED; ids
 #: are (slot, generation), a is the sensor. Of CONTACT_BEGUN: position (m), normal from a to b, closing speed (m/s) and
 #: the pair's impulse on b (N s).
-event_dtype = _struct_dtype(_core._event_members, _core._event_size)
+event_dtype: np.dtype[Any] = _struct_dtype(_core._event_members, _core._event_size)
 
 
 def _events(self):
@@ -271,6 +282,11 @@ World.add_ground = _add_ground
 World.add_solid = _add_solid
 World.contacts = _contacts
 World.events = _events
-World.positions = property(lambda self: self.get("body_state")[:, :3], doc="Centres of mass of all bodies, n x 3, m.")
-World.orientations = property(lambda self: self.get("body_state")[:, 3:7], doc="Of all bodies, n x 4, w x y z.")
-World.velocities = property(lambda self: self.get("body_state")[:, 7:], doc="Linear (m/s) and angular (rad/s), n x 6.")
+
+_SETS = 'World.set("body_state", states)'
+World.positions = property(lambda self: read_only(self.get("body_state")[:, :3], _SETS),
+                           doc="Centres of mass of all bodies, n x 3, m; a copy.")
+World.orientations = property(lambda self: read_only(self.get("body_state")[:, 3:7], _SETS),
+                              doc="Of all bodies, n x 4, w x y z; a copy.")
+World.velocities = property(lambda self: read_only(self.get("body_state")[:, 7:], _SETS),
+                            doc="Linear (m/s) and angular (rad/s), n x 6; a copy.")

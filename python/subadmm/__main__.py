@@ -15,6 +15,7 @@ from subadmm.output import Output
 
 def _arguments():
     parser = argparse.ArgumentParser(prog="python -m subadmm", description="Scenes to look at, and robots as scenes.")
+    parser.add_argument("--version", action="version", version=f"subadmm {subadmm.__version__} ({subadmm.build_commit()})")
     commands = parser.add_subparsers(dest="command", required=True)
     view = commands.add_parser("view", help="open a page with the running scene (needs: pip install 'subadmm[view]')")
     record = commands.add_parser(

@@ -1,4 +1,6 @@
 """Many copies of a world or of a loaded robot, stepped together."""
+from __future__ import annotations
+
 
 from . import _core
 from .environments import Environments
@@ -6,7 +8,7 @@ from .importing.model import Loaded
 from .robots import Robots
 
 
-def replicate(template, count):
+def replicate(template: _core.World | Loaded, count: int) -> Environments:
     """`count` environments, each a copy of `template` as it is now: a World, or what load() returned. They do not see
     each other, and make the same steps as worlds of their own, bit for bit, on settings.threads threads (0: all cores).
     The template does not change. Of a robot (MJCF or URDF) a Robots, else an Environments.

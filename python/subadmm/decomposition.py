@@ -1,4 +1,8 @@
 """Meshes as sets of convex hulls, by the package coacd (the extra `decompose` of the package)."""
+from __future__ import annotations
+
+
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +53,8 @@ def volume_of(vertices, triangles):
     return float(np.sum(np.cross(a, b) * c)) / 6
 
 
-def decompose(mesh, threshold=THRESHOLD, *, most=None, seed=0, **options):
+def decompose(mesh: Any, threshold: float = THRESHOLD, *, most: int | None = None, seed: int = 0,
+              **options: Any) -> list[Any]:
     """A mesh as a list of hull shapes that together are close to it, by coacd (pip install subadmm[decompose]).
 
     mesh: a Shape made by subadmm.mesh, a pair (vertices n x 3 in m, triangles m x 3), or an object with `vertices` and

@@ -1,6 +1,9 @@
 """Many copies of a world, stepped together."""
+from __future__ import annotations
+
 
 import functools
+from typing import Any
 import warnings
 
 import numpy as np
@@ -25,7 +28,7 @@ class Environments:
 
     _tensors = False  # tensors on the host, too: for tests without a device
 
-    def __init__(self, world, count):
+    def __init__(self, world: Any, count: int) -> None:
         self._library = _core._replicate(world, count)
         self._count = self._library.count
         self._failed = self._library.marked()
@@ -39,24 +42,24 @@ class Environments:
             self._library.set_stream(self._stream().cuda_stream)
         return self._library
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<subadmm environments: {self.count}>"
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self.count
 
     @property
-    def count(self):
+    def count(self) -> int:
         """How many there are."""
         return self._count
 
     @functools.cached_property
-    def device(self):
+    def device(self) -> int:
         """The CUDA device that they are on; -1: they are on the CPU."""
         return self._library.device()
 
     @functools.cached_property
-    def xp(self):
+    def xp(self) -> Any:
         """numpy, or torch on the device, whichever the arrays are of; with array (of anything), copy, zeros and full
         (float64 on the device), and norm (along the last axis, which stays) and cross of both."""
         if self.device < 0 and not self._tensors:
@@ -67,25 +70,25 @@ class Environments:
         return of_torch(f"cuda:{self.device}")
 
     @property
-    def memory(self):
+    def memory(self) -> int:
         """Bytes an environment, states and arrays."""
         return self._core.memory
 
     @property
-    def settings(self):
-        """Settings of all: a copy; assign it to change them."""
+    def settings(self) -> Any:
+        """Settings of all; what is set of them, as settings.dt = 0.002, is set in all."""
         return self._core.settings
 
     @settings.setter
-    def settings(self, settings):
+    def settings(self, settings: Any) -> None:
         self._core.settings = settings
 
     @property
-    def failed(self):
+    def failed(self) -> Any:
         """Which are marked: bool, count, of numpy; the array stays the same."""
         return self._failed
 
-    def reason(self, environment):
+    def reason(self, environment: int) -> str:
         """Why an environment is marked; '' where it is not."""
         return self._core.mark(self._one(environment))
 
@@ -110,11 +113,11 @@ class Environments:
             raise ValueError("which: must be environments")
         return np.ascontiguousarray(which, np.int32)
 
-    def step(self, steps=1):
+    def step(self, steps: int = 1) -> None:
         """Make `steps` time steps of settings.dt in all that are not marked."""
         self._core.step(steps)
 
-    def reset(self, which=None, states=None):
+    def reset(self, which: Any = None, states: Any = None) -> None:
         """Environments (numbers, or a mask; None: all) begin again, each with a state: 0 is the template's, others are
         those that keep() returned; one for all, or one each. The same steps follow, bit for bit. What input arrays have
         stays."""
@@ -131,15 +134,15 @@ class Environments:
             states = np.ascontiguousarray(np.broadcast_to(given, (n,)), np.int32)
         self._core.reset(rows, states)
 
-    def keep(self, environment=0):
+    def keep(self, environment: int = 0) -> int:
         """Keep the state of an environment to reset to; its number."""
         return self._core.keep(self._one(environment))
 
-    def forget(self, state):
+    def forget(self, state: int) -> None:
         """Forget a state that keep() kept."""
         self._core.forget(whole("state", state, 0, 2**31 - 1))
 
-    def array(self, name, precision="f64"):
+    def array(self, name: str, precision: str = "f64") -> Any:
         """An array of all environments where it lies, float64 or ('f32') float32: the same one every time. An input
         array has one precision. On CUDA a tensor of torch; only input arrays may be written to."""
         if (name, precision) in self._bound:
@@ -155,11 +158,11 @@ class Environments:
                 array = self._bound[name, precision] = self.xp.from_numpy(array)
         return array
 
-    def get(self, name, which=None):
+    def get(self, name: str, which: Any = None) -> Any:
         """A copy of an array's numbers, of numpy: of environments (numbers, or a mask; None: all)."""
         return self._core.get(name, self._which(which))
 
-    def set(self, name, values, which=None):
+    def set(self, name: str, values: Any, which: Any = None) -> None:
         """Set an array that can be set, in environments (numbers, or a mask; None: all): values of shape environments x
         rows x columns, or what fits that by NumPy's rules. If anything is refused, nothing is set."""
         rows = self._which(which)
@@ -173,25 +176,26 @@ class Environments:
             raise ValueError(f"values: must have shape {now.shape}, and has {values.shape}") from None
         self._core.set(name, np.ascontiguousarray(values, np.float64), rows)
 
-    def world(self, environment):
+    def world(self, environment: int) -> Any:
         """A new World as an environment is now: to look at it, to query it, or to go on with it. It has no contacts before
         its next step: see record_contacts."""
         world = _core.World()
         world.restore(self._core.save(self._one(environment)))
         return world
 
-    def record_contacts(self, record=True):
+    def record_contacts(self, record: bool = True) -> None:
         """Keep the contacts of each environment's last step from now on, or (False) no more."""
         self._core.record_contacts(record)
 
-    def contacts(self, environment):
+    def contacts(self, environment: int) -> Any:
         """Contacts of an environment's last step, all of them: an array of subadmm.contact_dtype, a copy; its ids are
         those of the template's bodies and shapes. After record_contacts()."""
         from . import contact_dtype
 
         return np.frombuffer(self._core.contacts(self._one(environment)), dtype=contact_dtype)
 
-    def cast_rays(self, origins, directions, length=np.inf, which=None, *, ignore=None, types=()):
+    def cast_rays(self, origins: Any, directions: Any, length: float = np.inf, which: Any = None, *, ignore: Any = None,
+                  types: Any = ()) -> dict[str, Any]:
         """What rays hit in environments (numbers, or a mask; None: all): origins and directions of shape environments x
         rays x 3, or what fits that by NumPy's rules (m, world); how far to search (m). Distances (infinite: nothing),
         points and normals, of numpy. ignore: a Body of the template; types: of bodies, like ("static",) for heights of
@@ -213,7 +217,7 @@ class Environments:
         return self._core.cast_rays(origins, directions, length, rows, ignore, list(types))
 
     @property
-    def error(self):
+    def error(self) -> Any:
         """How far the last step of each is from the laws, m/s; -1: not known. count numbers of numpy, a copy. On CUDA
         the natural map, which is worked out when it is asked for."""
         if self.device >= 0:

@@ -1,6 +1,9 @@
 """Many copies of a loaded robot, in MuJoCo's order of numbers."""
+from __future__ import annotations
+
 
 import contextlib
+from typing import Any
 
 import numpy as np
 
@@ -10,30 +13,10 @@ from .given import numbers, point
 from .importing.actuators import FORCE_SPEED
 from .importing.model import name_of
 from .namespace import to_numpy
-from .rotations import conjugate, multiply, of_vector, rotate, to_vector, unit
+from .rotations import conjugate, multiply, rotate
 
 #: Positions, velocities and accelerations that may be given.
 MOST = 1e9
-
-
-class _Free:
-    """A joint of type 'free': where its numbers are, and the bodies that move with it. own: its frame in `xp`."""
-
-    def __init__(self, joint, q, qd, rows, ties, xp):
-        self.q, self.qd = slice(q, q + 7), slice(qd, qd + 6)
-        self.body = rows[joint.body]
-        self.place, self.turn = joint._frame
-        self.own = xp.array(self.place), xp.array(self.turn)
-        self.tree = _joined(self.body, ties)
-
-
-def _joined(body, ties):
-    """Bodies that joints tie to one, that one first."""
-    found, at = [body], 0
-    while at < len(found):
-        found += sorted({b for pair in ties if found[at] in pair for b in pair} - set(found))
-        at += 1
-    return np.array(found)
 
 
 class Robots(Environments):
@@ -41,7 +24,7 @@ class Robots(Environments):
     `ctrl`: controls of the actuators (count x nu), which are written to and hold from the next step on; `loaded`: the
     template. On CUDA these, sensors and dynamics are tensors of torch, worked out on the device."""
 
-    def __init__(self, loaded, count):
+    def __init__(self, loaded: Any, count: int) -> None:
         self._drives = _Drives(loaded)
         with self._drives.all_on():
             super().__init__(loaded.world, count)
@@ -50,36 +33,19 @@ class Robots(Environments):
         self._mounts, self._pull = {}, (None, None)
         source, world = loaded.source, loaded.world
         rows = {body: k for k, body in enumerate(world.bodies)}
-        joints = {joint: k for k, joint in enumerate(world.joints)}
-        own = {joint.joint for joint in loaded.joints.values() if joint.joint is not None}  # no loops
-        ties = [(rows[j.body_a], rows[j.body_b]) for j in own if j.body_a is not None and j.body_b is not None]
-        dynamic = {rows[body] for body in rows if body.type == "dynamic"}
-        ties = [pair for pair in ties if dynamic.issuperset(pair)]
         self._tree = Tree(loaded, rows, self.xp)
         self._inputs = {name: world.get(name) for name in ("body_inertia", "body_gravity_scale", "joint_armature")}
-        self._free, self._balls, hinges = [], [], []
-        for k in range(source.njnt):
-            joint = loaded.joints[name_of(source, "joint", k)]
-            q, qd = int(source.jnt_qposadr[k]), int(source.jnt_dofadr[k])
-            if joint.type == "free":
-                self._free.append(_Free(joint, q, qd, rows, ties, self.xp))
-            elif joint.type == "ball":
-                self._balls.append((slice(q, q + 4), slice(qd, qd + 3), joints[joint.joint], joint._turn,
-                                    self.xp.array(joint._turn)))
-            else:
-                hinges.append((q, qd, joints[joint.joint], joint.coordinate, joint.sign, joint.offset))
-        self._hinges = [np.array(column) for column in zip(*hinges)] if hinges else [np.zeros(0, int)] * 6
-        self._own_hinges = [self.xp.array(column) for column in self._hinges]
+        self._coordinates = loaded.coordinates(self.xp)
         self._state = self.array("body_state")
         self._position, self._speed = self.array("joint_position"), self.array("joint_speed")
         #: Controls, as MuJoCo's ctrl, of the actuators in `loaded.actuators`.
         self.ctrl = self.xp.array(np.tile(self._drives.start, (count, 1)))
         self._arrays = {name: self.array(name) for name in self._drives.arrays}
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<subadmm robots: {self.count}>"
 
-    def step(self, steps=1):
+    def step(self, steps: int = 1) -> None:
         """Make `steps` time steps with the controls in `ctrl`, each within its actuator's range. Of an environment with
         a control that is no number it is said in `failed`."""
         shape = self.count, self._drives.start.size
@@ -88,7 +54,7 @@ class Robots(Environments):
         self._drives.write(self.xp.array(self.ctrl), self._arrays)
         super().step(steps)
 
-    def set(self, name, values, which=None):
+    def set(self, name: str, values: Any, which: Any = None) -> None:
         super().set(name, values, which)
         if self.device >= 0 and (name in self._inputs or name == "gravity") and not self._bound_of(name):
             self.array(name)
@@ -101,40 +67,16 @@ class Robots(Environments):
     # ---- positions and velocities ----------------------------------------------------------------------------------
 
     @property
-    def q(self):
+    def q(self) -> Any:
         """Positions, as MuJoCo's qpos: count x nq, a copy."""
-        out = self.xp.zeros((self.count, self.loaded.source.nq))
-        q, _, row, coordinate, sign, offset = self._own_hinges
-        out[:, q] = sign * self._position[:, row, coordinate] + offset
-        for at, _, row, _, turn in self._balls:
-            out[:, at] = of_vector(rotate(turn, self._position[:, row, 3:]))
-        for free in self._free:
-            turned = self._state[:, free.body, 3:7]
-            place, turn = free.own
-            out[:, free.q] = self.xp.concatenate(
-                [self._state[:, free.body, :3] + rotate(turned, place), multiply(turned, turn)], -1
-            )
-        return out
+        return self._coordinates.q(self._state, self._position)
 
     @property
-    def qd(self):
+    def qd(self) -> Any:
         """Velocities, as MuJoCo's qvel: count x nv, a copy."""
-        xp = self.xp
-        out = xp.zeros((self.count, self.loaded.source.nv))
-        _, qd, row, coordinate, sign, _ = self._own_hinges
-        out[:, qd] = sign * self._speed[:, row, coordinate]
-        for _, at, row, _, turn in self._balls:
-            file = of_vector(rotate(turn, self._position[:, row, 3:]))
-            out[:, at] = rotate(conjugate(file), rotate(turn, self._speed[:, row, 3:]))
-        for free in self._free:
-            state = self._state[:, free.body]
-            turned, linear, angular = state[:, 3:7], state[:, 7:10], state[:, 10:]
-            place, turn = free.own
-            linear = linear + xp.cross(angular, rotate(turned, place))
-            out[:, free.qd] = xp.concatenate([linear, rotate(conjugate(multiply(turned, turn)), angular)], -1)
-        return out
+        return self._coordinates.qd(self._state, self._position, self._speed)
 
-    def set_positions(self, q, qd=None, which=None):
+    def set_positions(self, q: Any, qd: Any = None, which: Any = None) -> None:
         """Positions and velocities (None: 0) in MuJoCo's order, of environments (numbers, or a mask; None: all): one row
         for all, or one each. What moves with the bodies does so; contacts begin anew. If anything is refused, nothing is
         set. On CUDA, too, the host does it."""
@@ -143,9 +85,7 @@ class Robots(Environments):
         source = self.loaded.source
         q = self._rows("q", q, n, source.nq)
         qd = self._rows("qd", np.zeros(source.nv) if qd is None else qd, n, source.nv)
-        for at in [free.q.start + 3 for free in self._free] + [ball[0].start for ball in self._balls]:
-            if n and not (np.linalg.norm(q[:, at : at + 4], axis=1) > 1e-6).all():
-                raise ValueError(f"q: numbers {at} to {at + 3} are a quaternion, and must not be 0")
+        self._coordinates.check_turns(q)
         self._place(rows, q, qd)
 
     @staticmethod
@@ -159,43 +99,8 @@ class Robots(Environments):
 
     def _place(self, rows, q, qd):
         core = self._core
-        position, speed = core.get("joint_position", rows), core.get("joint_speed", rows)
-        at, of, row, coordinate, sign, offset = self._hinges
-        position[:, row, coordinate] = sign * (q[:, at] - offset)
-        speed[:, row, coordinate] = sign * qd[:, of]
-        for at, of, row, turn, _ in self._balls:
-            file = unit(q[:, at])
-            position[:, row, 3:] = rotate(conjugate(turn), to_vector(file))
-            speed[:, row, 3:] = rotate(conjugate(turn), rotate(file, qd[:, of]))
-        if position.shape[1]:
-            core.set("joint_position", position, rows)
-            core.set("joint_speed", speed, rows)
-        state = core.get("body_state", rows)
-        for free in self._free:
-            self._move(state, free, q[:, free.q], qd[:, free.qd])
-        if self._free:
-            core.set("body_state", state, rows)
-
-    @staticmethod
-    def _move(state, free, q, qd):
-        """What is joined to a free joint's body moves with it, as a rigid body."""
-        old = state[:, free.body].copy()
-        turned = unit(q[:, 3:])
-        orientation = multiply(turned, conjugate(free.turn))
-        center = q[:, :3] - rotate(orientation, free.place)
-        angular = rotate(turned, qd[:, 3:])
-        linear = qd[:, :3] - np.cross(angular, q[:, :3] - center)
-        turn = multiply(orientation, conjugate(old[:, 3:7]))[:, None]
-        tree = state[:, free.tree]
-        arm = tree[..., :3] - old[:, None, :3]
-        relative = tree[..., 7:10] - old[:, None, 7:10] - np.cross(old[:, None, 10:], arm)
-        spin = tree[..., 10:] - old[:, None, 10:]
-        arm = rotate(turn, arm)
-        tree[..., :3] = center[:, None] + arm
-        tree[..., 3:7] = unit(multiply(turn, tree[..., 3:7]))
-        tree[..., 7:10] = linear[:, None] + np.cross(angular[:, None], arm) + rotate(turn, relative)
-        tree[..., 10:] = angular[:, None] + rotate(turn, spin)
-        state[:, free.tree] = tree
+        self._coordinates.place(lambda name: core.get(name, rows),
+                                lambda name, values: core.set(name, values, rows), q, qd)
 
     # ---- sensors ---------------------------------------------------------------------------------------------------
 
@@ -205,7 +110,7 @@ class Robots(Environments):
             raise KeyError(f"body: the file has none of the name {body!r}")
         return names.index(body)
 
-    def frame(self, body, place=(0.0, 0.0, 0.0), turn=(1.0, 0.0, 0.0, 0.0)):
+    def frame(self, body: str, place: Any = (0.0, 0.0, 0.0), turn: Any = (1.0, 0.0, 0.0, 0.0)) -> tuple[Any, Any]:
         """Where a frame on a body of the file is (by name; place, m, and turn, w x y z, in the body's frame): positions
         (count x 3, world), orientations (count x 4, w x y z)."""
         row, (place, turn) = self._mounted(body, place, turn)
@@ -231,7 +136,7 @@ class Robots(Environments):
         inner = outer[0] + rotate(outer[1], place), multiply(outer[1], turn / np.linalg.norm(turn))
         return self.loaded.world.bodies.index(group.body), tuple(self.xp.array(x) for x in inner)
 
-    def imu(self, body, place=(0.0, 0.0, 0.0), turn=(1.0, 0.0, 0.0, 0.0)):
+    def imu(self, body: str, place: Any = (0.0, 0.0, 0.0), turn: Any = (1.0, 0.0, 0.0, 0.0)) -> tuple[Any, Any]:
         """What an inertial sensor in a frame on a body of the file reads (place, m, and turn, w x y z, in the body's
         frame): angular velocity (count x 3, rad/s) and acceleration less gravity (count x 3, m/s^2), in the sensor's
         axes. The acceleration is the mean of the last (sub-)step."""
@@ -278,19 +183,19 @@ class Robots(Environments):
         """n x nv: of joints what each has, of free bodies the file's."""
         now = self._input("joint_armature", rows)
         out = self.xp.array(np.tile(self.loaded.source.dof_armature, (len(now), 1)))
-        _, qd, row, coordinate, _, _ = self._own_hinges
+        _, qd, row, coordinate, _, _ = self._coordinates.own_hinges
         out[:, qd] = now[:, row, coordinate]
-        for _, at, row, _, _ in self._balls:
+        for _, at, row, _, _ in self._coordinates.balls:
             out[:, at] = now[:, row, 3:]
         return out
 
-    def mass_matrix(self, which=None):
+    def mass_matrix(self, which: Any = None) -> Any:
         """n x nv x nv of environments (numbers, or a mask; None: all): kinetic energy is qd M qd / 2. By the masses,
         inertias and armatures that each has."""
         rows = self._which(which)
         return self._motion(rows).mass_matrix(self._input("body_inertia", rows), self._armature(rows))
 
-    def inverse_dynamics(self, qdd, which=None):
+    def inverse_dynamics(self, qdd: Any, which: Any = None) -> Any:
         """n x nv: generalised forces that accelerations qdd (n x nv, or one row for all) take: M qdd and those of
         gravity and velocities. Damping, springs, friction, loops and contacts are left out. The host checks qdd, on
         CUDA, too."""
@@ -300,11 +205,11 @@ class Robots(Environments):
         return motion.forces(self._input("body_inertia", rows), self._gravity(rows),
                              self._input("body_gravity_scale", rows)[..., 0], self._armature(rows), qdd)
 
-    def bias(self, which=None):
+    def bias(self, which: Any = None) -> Any:
         """n x nv: generalised forces of gravity and velocities: MuJoCo's qfrc_bias, less its gravity compensation."""
         return self.inverse_dynamics(np.zeros(self.loaded.source.nv), which)
 
-    def jacobian(self, body, place=(0.0, 0.0, 0.0), which=None):
+    def jacobian(self, body: str, place: Any = (0.0, 0.0, 0.0), which: Any = None) -> Any:
         """n x 6 x nv: times qd the velocity of a point of a body of the file (by name; in its frame, m) and its angular
         velocity, in the world's axes."""
         return self._motion(self._which(which)).jacobian(self._named(body), point("place", place))
@@ -359,7 +264,7 @@ class _Drives:
         off = []
         for drive in self.drives:
             joint, k = drive.joint.joint, drive.joint.coordinate
-            c = joint.coordinate(k)
+            c = joint.coordinate(k).copy()
             if c.drive == "off":
                 off.append((joint, k, joint.coordinate(k)))
                 c.drive, c.drive_force = "position", drive.limit

@@ -124,11 +124,13 @@ def test_settings_and_backends():
     settings = subadmm.Settings(dt=0.002, iterations=50, gravity=(0, 0, -1.62), method="paper")
     world = subadmm.World(backend="ref", settings=settings)
     assert world.settings.dt == 0.002 and world.settings.gravity == [0, 0, -1.62] and world.settings.method == "paper"
-    changed = world.settings
+    changed = world.settings.copy()
     changed.iterations = 7
-    assert world.settings.iterations == 50
+    assert world.settings.iterations == 50  # a copy is of nobody
     world.settings = changed
     assert world.settings.iterations == 7
+    world.settings.iterations = 8  # those of the world are the world's
+    assert world.settings.iterations == 8 and changed.iterations == 7
     world.add_solid(subadmm.sphere(0.1), mass=1)
     world.step()
     assert world.report.backend == "ref" and "ref" in world.explain()

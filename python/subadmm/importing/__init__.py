@@ -7,8 +7,11 @@ USD, read by usd-core (the extra `usd`).
 
 docs/guide/importing.md says what is carried over, and how. What is not is in `report`, element by element.
 """
+from __future__ import annotations
+
 
 import os
+from typing import Any
 
 from ..decomposition import THRESHOLD
 from ..given import real
@@ -47,21 +50,21 @@ def _is_stage(path):
 
 
 def load(
-    path,
+    path: Any,
     *,
-    floating=False,
-    keyframe=None,
-    qpos=None,
-    qvel=None,
-    settings=None,
-    backend="auto",
-    precision="f64",
-    device=0,
-    threads=None,
-    carrier_share=1e-4,
-    overlaps="ignore",
-    decompose=False,
-):
+    floating: bool = False,
+    keyframe: str | int | None = None,
+    qpos: Any = None,
+    qvel: Any = None,
+    settings: Any = None,
+    backend: str = "auto",
+    precision: str = "f64",
+    device: int = 0,
+    threads: int | None = None,
+    carrier_share: float = 1e-4,
+    overlaps: str = "ignore",
+    decompose: bool | float = False,
+) -> Any:
     """Build a world from an MJCF or URDF file, compiled by the package `mujoco` (pip install subadmm[import]), or
     from a USD stage (.usd, .usda, .usdc, .usdz), read by `usd-core` (pip install subadmm[usd]).
 
@@ -127,4 +130,5 @@ def load(
     add_shapes(loaded, data, overlaps, threshold)
     add_equalities(loaded)
     add_actuators(loaded, data)
+    loaded._start = data.qpos.copy(), data.qvel.copy(), loaded.ctrl
     return loaded

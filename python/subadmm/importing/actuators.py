@@ -32,7 +32,7 @@ class Drive:
         if len(self.actuators) == 1 and servos:
             a, f = servos[0]
             bounds.append(abs(f) * max(abs(a.force_range[0]), abs(a.force_range[1])))
-        c = joint.joint.coordinate(joint.coordinate)
+        c = joint.joint.coordinate(joint.coordinate).copy()
         c.drive, c.drive_force = "position", float(min(bounds))
         c.drive_stiffness, c.drive_damping, c.target_position, c.target_speed = stiffness, damping, 0.0, 0.0
         if stiffness > 0:
@@ -133,7 +133,7 @@ def _add_reflected(source, index, parts):
         value = float(getattr(source, name)[index]) if hasattr(source, name) else 0.0
         if value and len(parts) == 1:
             joint, factor = parts[0]
-            c = joint.joint.coordinate(joint.coordinate)
+            c = joint.joint.coordinate(joint.coordinate).copy()
             setattr(c, field, getattr(c, field) + factor * factor * value)
             joint.joint.set_coordinate(joint.coordinate, c)
 

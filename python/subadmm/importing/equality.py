@@ -77,7 +77,7 @@ def _add_tie(loaded, index):
         if not source.eq_active0[index]:
             report.add(what, "not carried over: it is not active, and a joint held in place is a limit here")
             return
-        c = one.joint.coordinate(one.coordinate)
+        c = one.joint.coordinate(one.coordinate).copy()
         c.limited = True
         c.lower = c.upper = one.to_coordinate(rest)
         one.joint.set_coordinate(one.coordinate, c)

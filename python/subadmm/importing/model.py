@@ -1,10 +1,21 @@
 """What load() returns."""
+from __future__ import annotations
 
-from typing import NamedTuple
+
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..coordinates import Coordinates
+from ..given import point
+from ..namespace import NUMPY
+from ..objects import no_such_name
+from ..vectors import read_only
 from .poses import mul, pose, q_of_vector, q_turn
+from .start import start_of
+
+if TYPE_CHECKING:
+    from .._core import Body, BodyShape, Gear, Joint, World
 
 
 class Note(NamedTuple):
@@ -13,7 +24,7 @@ class Note(NamedTuple):
     element: str  # as "tendon 'left'"
     reason: str
 
-    def __str__(self):
+    def __str__(self) -> str:
         return f"{self.element}: {self.reason}"
 
 
@@ -25,13 +36,13 @@ def world_name(name):
     return name.encode()[-LONGEST_NAME:].decode(errors="ignore")
 
 
-class Report(list):
+class Report(list[Note]):
     """A list of Note; printed one a line."""
 
-    def add(self, element, reason):
+    def add(self, element: str, reason: str) -> None:
         self.append(Note(element, reason))
 
-    def __str__(self):
+    def __str__(self) -> str:
         return "\n".join(str(note) for note in self)
 
 
@@ -44,6 +55,21 @@ def element(source, kind, index):
     """As reports name it."""
     name = getattr(source, kind)(index).name
     return f"{kind} '{name}'" if name else f"{kind} #{index}"
+
+
+def _row(name, values, count):
+    """Finite numbers, 1 x count."""
+    return point(name, values, count)[None]
+
+
+def start_numbers(loaded, keyframe):
+    """q, qd and ctrl of a keyframe; ctrl: of the actuators that there are."""
+    source = loaded.source
+    data = start_of(source, keyframe, None, None)
+    count = getattr(source, "nactuator", source.nu)
+    at = source.actuator_ctrladr if hasattr(source, "actuator_ctrladr") else range(count)
+    places = {name_of(source, "actuator", k): int(at[k]) for k in range(count)}
+    return data.qpos.copy(), data.qvel.copy(), [data.ctrl[places[name]] for name in loaded.actuators]
 
 
 class LoadedJoint:
@@ -67,12 +93,12 @@ class LoadedJoint:
     def __repr__(self):
         return f"<subadmm joint '{self.name}', {self.type}>"
 
-    def to_coordinate(self, position):
+    def to_coordinate(self, position: float) -> float:
         """The world's coordinate at a position of the file (hinge: rad, slide: m)."""
         return self.sign * (position - self.offset)
 
     @property
-    def position(self):
+    def position(self) -> Any:
         """As MuJoCo's qpos has it: a number (m, rad); ball: w x y z; free: position and w x y z of the body's frame."""
         if self.type == "free":
             return np.concatenate(mul(pose(self.body.position, self.body.orientation), self._frame))
@@ -81,7 +107,7 @@ class LoadedJoint:
         return self.sign * self.joint.position[self.coordinate] + self.offset
 
     @property
-    def speed(self):
+    def speed(self) -> float:
         """Of hinges and slides, rad/s or m/s."""
         if self.type in ("free", "ball"):
             raise ValueError(f"joint '{self.name}': a {self.type} joint has no one speed; see its body's velocities")
@@ -109,12 +135,12 @@ class LoadedActuator:
         return f"<subadmm actuator '{self.name}', {self.kind}>"
 
     @property
-    def control(self):
+    def control(self) -> float:
         """As MuJoCo's ctrl: a motor's force over its gain, a servo's target (m, rad or per s). In control_range."""
         return self._control
 
     @control.setter
-    def control(self, value):
+    def control(self, value: float) -> None:
         value = float(value)
         if not np.isfinite(value):
             raise ValueError(f"control of actuator '{self.name}': {value} is not finite")
@@ -123,7 +149,7 @@ class LoadedActuator:
             self._drives[joint].update()
 
     @property
-    def input(self):
+    def input(self) -> float:
         """The part of its force that does not depend on its joint, N or N m; a motor's is clipped to force_range."""
         force = self.gain * self._control + self.constant
         if self.stiffness == 0 and self.damping == 0:
@@ -138,16 +164,26 @@ class Loaded:
     `report`: what was not carried over; `source`: the file as the package that read it has it.
     """
 
-    def __init__(self, world, source, report):
-        self.world = world
-        self.source = source
-        self.report = report
-        self.bodies = {}
-        self.joints = {}
-        self.actuators = {}
-        self.gears = {}
-        self.loops = {}  # joints that the file's equality constraints became, by their names
-        self.shapes = {}  # by geom index, or path of a prim
+    def __init__(self, world: World, source: Any, report: Report) -> None:
+        self.world: World = world
+        self.source: Any = source
+        self.report: Report = report
+        self.bodies: dict[str, Body] = {}
+        self.joints: dict[str, Any] = {}
+        self.actuators: dict[str, LoadedActuator] = {}
+        self.gears: dict[str, Gear] = {}
+        self.loops: dict[str, Joint] = {}  # joints that the file's equality constraints became, by their names
+        self.shapes: dict[Any, list[BodyShape]] = {}  # by geom index, or path of a prim
+
+    def __getitem__(self, name: str) -> Any:
+        """The body, joint or actuator of this name. KeyError: there is none; ValueError: several kinds have it."""
+        kinds = ("bodies", "joints", "actuators")
+        found = [kind for kind in kinds if name in getattr(self, kind)]
+        if not found:
+            raise no_such_name("body, joint or actuator", name, [n for kind in kinds for n in getattr(self, kind)])
+        if len(found) > 1:
+            raise ValueError(f"name = {name!r}: it is in {' and in '.join(found)}: take it from there")
+        return getattr(self, found[0])[name]
 
     def __repr__(self):
         return (
@@ -166,26 +202,91 @@ class LoadedModel(Loaded):
     fixed to the world has a Body only if something can touch it.
     """
 
-    def __init__(self, world, source, report):
+    def __init__(self, world: World, source: Any, report: Report) -> None:
         super().__init__(world, source, report)
         self.groups = []  # of tree.py, one a body of the file
         self.carriers = []  # bodies between several joints of one
+        self._start = None  # q, qd and ctrl, as they were loaded
 
-    def frame(self, name):
+    def frame(self, name: str) -> tuple[Any, Any]:
         """The pose of the file's frame of a body, as MuJoCo's xpos and xquat: position (m, world), w x y z."""
         for index in range(self.source.nbody):
             if name_of(self.source, "body", index) == name:
                 return self.groups[index].frame_in_world(index)
         raise KeyError(name)
 
-    def positions(self):
-        """All joints' positions, as MuJoCo's qpos (nq)."""
-        out = np.zeros(self.source.nq)
-        for index in range(self.source.njnt):
-            at = self.source.jnt_qposadr[index]
-            value = np.atleast_1d(self.joints[name_of(self.source, "joint", index)].position)
-            out[at : at + value.size] = value
-        return out
+    def site(self, name: str) -> tuple[Any, Any]:
+        """The pose of a site of the file, as MuJoCo's site_xpos: position (m, world), w x y z."""
+        names = [name_of(self.source, "site", index) for index in range(self.source.nsite)]
+        if name not in names:
+            raise no_such_name("site", name, names)
+        index = names.index(name)
+        body = int(self.source.site_bodyid[index])
+        own = pose(self.source.site_pos[index], self.source.site_quat[index])
+        return mul(self.groups[body].frame_in_world(body), own)
+
+    # ---- positions, velocities, controls: in MuJoCo's order --------------------------------------------------------
+
+    def coordinates(self, xp=NUMPY):
+        """A Coordinates of this robot, for arrays of a namespace."""
+        source = self.source
+        joints = [(self.joints[name_of(source, "joint", k)], int(source.jnt_qposadr[k]), int(source.jnt_dofadr[k]))
+                  for k in range(source.njnt)]
+        return Coordinates(self.world, joints, int(source.nq), int(source.nv), xp)
+
+    def positions(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """All joints' positions, as MuJoCo's qpos (nq), a copy of your own."""
+        return np.array(self.q)
+
+    def _get(self, name):
+        return self.world.get(name)[None]
+
+    @property
+    def q(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """All positions, as MuJoCo's qpos (nq): a copy, not to be written to. `robot.q = q` keeps the velocities."""
+        return read_only(self.coordinates().q(self._get("body_state"), self._get("joint_position"))[0],
+                         "set_positions(q, qd)")
+
+    @q.setter
+    def q(self, q: Any) -> None:
+        self.set_positions(q, self.qd)
+
+    @property
+    def qd(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """All velocities, as MuJoCo's qvel (nv): a copy, not to be written to. `robot.qd = qd` keeps the positions."""
+        arrays = (self._get(name) for name in ("body_state", "joint_position", "joint_speed"))
+        return read_only(self.coordinates().qd(*arrays)[0], "set_positions(q, qd)")
+
+    @qd.setter
+    def qd(self, qd: Any) -> None:
+        self.set_positions(self.q, qd)
+
+    def set_positions(self, q: Any, qd: Any = None) -> None:
+        """Positions (nq) and velocities (nv; None: 0) in MuJoCo's order. What moves with the bodies does so; contacts
+        begin anew. If anything is refused, nothing is set. Time goes on, and controls stay."""
+        coordinates = self.coordinates()
+        q = _row("q", q, coordinates.nq)
+        qd = _row("qd", np.zeros(coordinates.nv) if qd is None else qd, coordinates.nv)
+        coordinates.check_turns(q)
+        coordinates.place(self._get, lambda name, values: self.world.set(name, values[0]), q, qd)
+
+    @property
+    def ctrl(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Controls of `actuators`, in the file's order, as MuJoCo's ctrl: a copy, not to be written to. `robot.ctrl = u`
+        sets them; each is brought into its actuator's range."""
+        return read_only([actuator.control for actuator in self.actuators.values()], "robot.ctrl = (...)")
+
+    @ctrl.setter
+    def ctrl(self, ctrl: Any) -> None:
+        for actuator, control in zip(self.actuators.values(), _row("ctrl", ctrl, len(self.actuators))[0]):
+            actuator.control = control
+
+    def reset(self, keyframe: str | int | None = None) -> None:
+        """Positions, velocities and controls as they were loaded, or those of a keyframe of the file, by name or index.
+        Time goes on; forces that were set stay."""
+        q, qd, ctrl = self._start if keyframe is None else start_numbers(self, keyframe)
+        self.set_positions(q, qd)
+        self.ctrl = ctrl
 
 
 class LoadedStage(Loaded):
@@ -201,7 +302,7 @@ class LoadedStage(Loaded):
         self.stage_to_world = stage_to_world  #: pose of the stage's frame, whose lengths are in m then, in the world
         self.frames = {}  # of bodies: the prim's frame in the Body's, by path
 
-    def frame(self, path):
+    def frame(self, path: Any) -> tuple[Any, Any]:
         """The pose of a body's prim, without its scale: position (m, world), w x y z."""
         body = self.bodies[str(path)]
         return mul(pose(body.position, body.orientation), self.frames[str(path)])

@@ -1,5 +1,8 @@
 """A camera that looks at a point."""
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +39,8 @@ def check_place(azimuth, elevation, zoom, prefix=""):
             real(f"{prefix}zoom", zoom, 1e-3, 1e3))
 
 
-def looking_at(description, azimuth=-60.0, elevation=24.0, zoom=1.0, field=0.6):
+def looking_at(description: Any, azimuth: float = -60.0, elevation: float = 24.0, zoom: float = 1.0,
+               field: float = 0.6) -> Camera:
     """A camera that has what moves in view. azimuth, elevation: where it stands, degrees, in [-3600, 3600] and
     [-89, 89]; zoom: 2 comes twice as near, in [0.001, 1000]; field: as of Camera."""
     azimuth, elevation, zoom = check_place(azimuth, elevation, zoom)

@@ -1,5 +1,8 @@
 """What there is to draw of a world: meshes with instances on bodies, their colours, and where to look from."""
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -88,7 +91,7 @@ def _colours(world, bodies):
     return colour
 
 
-def describe(world) -> Description:
+def describe(world: Any) -> Description:
     """What there is to draw of a world, as it is now."""
     bodies = world.bodies
     state = world.get("body_state")

@@ -1,6 +1,11 @@
 """Pictures of a world without a window or a GPU: a rasteriser with a sun, its shadows and ambient occlusion."""
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 
+from .._core import World
 from ..given import whole
 from ..output import Output
 from .camera import Camera, looking_at
@@ -22,7 +27,8 @@ def check_size(width, height, prefix=""):
     return whole(f"{prefix}width", width, 16, 8192), whole(f"{prefix}height", height, 16, 8192)
 
 
-def picture(world, width=960, height=600, camera=None, smooth=2, description=None):
+def picture(world: World, width: int = 960, height: int = 600, camera: Any = None, smooth: int = 2,
+            description: Any = None) -> Any:
     """The world as it is now: height x width x 3, uint8, sRGB. The same world gives the same picture.
 
     width, height: in [16, 8192]; camera: Camera, or None: all that moves in view; smooth: samples along a pixel's side,
@@ -88,7 +94,7 @@ def picture(world, width=960, height=600, camera=None, smooth=2, description=Non
     return np.clip(np.rint(np.clip(image, 0, 1) ** (1 / 2.2) * 255), 0, 255).astype(np.uint8)
 
 
-def save_picture(path, world, **options):
+def save_picture(path: Any, world: World, **options: Any) -> None:
     """Write picture(world, ...) as a PNG file, which is complete or as it was."""
     with Output("path", path) as file:
         file.write(png_of(picture(world, **options)))

@@ -1,9 +1,14 @@
 """Recordings of a world: the poses of all bodies at times, kept as small whole numbers."""
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from .._core import World
 from ..given import real, whole
 from ..output import Output
 from .description import Description, describe
@@ -29,20 +34,20 @@ class Recording:
     measures: dict = field(default_factory=dict)
     forces: list = field(default_factory=list)
 
-    def poses(self, frame):
+    def poses(self, frame: int) -> Any:
         """(positions n x 3 in m, orientations n x 4, unit) of all bodies, as they are played. Off by half a
         position_step along an axis and 2.5e-4 in a component of the quaternion, an angle of 5e-4 rad, at most."""
         turns = self.orientations[frame] * TURN_STEP
         return self.positions[frame] * self.position_step, turns / np.linalg.norm(turns, axis=1, keepdims=True)
 
-    def save(self, path):
+    def save(self, path: Any) -> None:
         """Write a file that its ending says: .html, a page that plays by itself, or .glb, glTF with animation. It is
         complete, or as it was."""
         check_ending("path", path)
         with Output("path", path) as file:
             file.write(self.data(path))
 
-    def data(self, path):
+    def data(self, path: Any) -> bytes:
         """What save() writes, text or bytes."""
         if Path(path).suffix == ".html":
             from .page import page_of as made_of
@@ -71,7 +76,8 @@ def check_frames(fps, contacts, prefix=""):
     return real(f"{prefix}fps", fps, 0, 1000, above=True), whole(f"{prefix}contacts", contacts, 0, 2**31 - 1)
 
 
-def record(world, seconds, fps=30.0, title="", contacts=0, after_frame=None):
+def record(world: World, seconds: float, fps: float = 30.0, title: str = "", contacts: int = 0,
+           after_frame: Callable[[int, int], None] | None = None) -> Recording:
     """Step a world for a time (s, simulated) and keep its poses `fps` times a second, at the nearest step; the first
     frame is the world as it is. contacts: so many of the largest contact forces are kept a frame, with their errors
     where settings ask for certificates. seconds: in (0, 1e9], fps: in (0, 1000], MOST_FRAMES frames at most.
