@@ -132,7 +132,8 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
             lanes delta = lambda - old;
             if (cpu_sweep_passes_changes(sweep)) delta = pick(y > 0, -step, -old);
             if (sweep == CPU_SWEEP_RELAX) slot->lambda = old + relaxation * delta;
-            else if (sweep == CPU_SWEEP_RELAX_WARM) slot->lambda = pick(relaxation > 1, old + relaxation * delta, lambda);
+            else if (sweep == CPU_SWEEP_RELAX_WARM)
+                slot->lambda = pick(relaxation > 1, old + relaxation * delta, lambda);
             else slot->lambda = lambda;
             if (cpu_sweep_measures(sweep)) change_max = larger(change_max, magnitude(delta));
             if (cpu_sweep_passes_changes(sweep)) {

@@ -35,13 +35,13 @@
  * fast, small islands (c->prologue): `iterate` does penalties and limit too, and the last two check the plan.
  *
  * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, whether
- * any island starts cold. All of it goes into a graph that is launched again and again, two of them in turn, because states and contact
- * sets change places at every step; where updates come often steps with them have two of their own. Where a plan does
- * not hold, the step sets cuda_live.abort_code (with c->prologue only its last kernel does: what runs until then keeps
- * to what was planned for), what was enqueued behind it does nothing, and the host, when it sees the report, reads the
- * statistics, plans again and enqueues the same steps again: a repeated step starts from the same state, settings
- * included, and gives the same bits. The settings' numbers are data in device memory, so that a change of them is an
- * update like others: nothing is recorded again or waited for.
+ * any island starts cold. All of it goes into a graph that is launched again and again, two of them in turn, because
+ * states and contact sets change places at every step; where updates come often steps with them have two of their own.
+ * Where a plan does not hold, the step sets cuda_live.abort_code (with c->prologue only its last kernel does: what
+ * runs until then keeps to what was planned for), what was enqueued behind it does nothing, and the host, when it sees
+ * the report, reads the statistics, plans again and enqueues the same steps again: a repeated step starts from the
+ * same state, settings included, and gives the same bits. The settings' numbers are data in device memory, so that a
+ * change of them is an update like others: nothing is recorded again or waited for.
  * Reports and updates travel through pinned memory, a ring of STEPS_AHEAD, written and read by the device itself.
  */
 #ifndef SADMM_CUDA_DEVICE_STEP_H

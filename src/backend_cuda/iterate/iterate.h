@@ -7,8 +7,8 @@
 /* ---- iterate.cu, residuals.cu, stop_rule.cu, energy_limit.cu ---- */
 
 /* Iterations, as the entry; limit: what is wanted for the energy limit after the last. */
-sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool goes_on, bool measure, enum cuda_energy_limit limit,
-                                      struct sadmm_error *error);
+sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool goes_on, bool measure,
+                                      enum cuda_energy_limit limit, struct sadmm_error *error);
 /* (16) and (17) of the iteration that was measured, into view.iteration.residual. */
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: the bodies' momentum residuals, recomputed. */

@@ -53,7 +53,8 @@ static __device__ __forceinline__ void store_terms(const graph_view &graph, cons
 static __device__ __forceinline__ void store_first_terms(const cuda_view &v, const cuda_args &args,
                                                          const block_part &part, const body_thread &own)
 {
-    store_terms(v.graph, part, own, [&](const body_thread &t) { return terms_of_body<false, true, false>(v, args, t); });
+    store_terms(v.graph, part, own,
+                [&](const body_thread &t) { return terms_of_body<false, true, false>(v, args, t); });
 }
 template <class Barrier>
 static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const cuda_args &args, const block_part &part,

@@ -86,9 +86,9 @@ static __device__ __forceinline__ int32_t share_of_side(const model_view &model,
  * that of weight_starts_warm; in lane SIDE_ANCHORS how many sides anchor it. ROWS: there may be row
  * blocks; then every lane of the warp comes here. */
 template <bool ROWS>
-static __device__ __forceinline__ double sum_sides(const model_view &model, const graph_view &graph, const contact_view &contacts,
-                                                   const row_view &rows, const weight_view &weights,
-                                                   const body_thread &t, int32_t *balance)
+static __device__ __forceinline__ double sum_sides(const model_view &model, const graph_view &graph,
+                                                   const contact_view &contacts, const row_view &rows,
+                                                   const weight_view &weights, const body_thread &t, int32_t *balance)
 {
     enum { AT_ONCE = 4 };
     double sum = 0;
@@ -113,7 +113,8 @@ static __device__ __forceinline__ double sum_sides(const model_view &model, cons
             const bool turns = any_of_lanes(t.lane >= 3 && t.lane < 6 && number[j] != 0);
             if (t.lane != SIDE_PUSH || code[j] / 2 < contacts.pair_capacity) continue;
             number[j] = sqrt(x * x + y * y + z * z);
-            if (turns && !(number[j] > 0)) *balance += 2 * share_of_side(model, contacts, rows, code[j]); /* a couple */
+            if (turns && !(number[j] > 0)) /* a couple pushes nothing */
+                *balance += 2 * share_of_side(model, contacts, rows, code[j]);
         }
 #pragma unroll
         for (int32_t j = 0; j < AT_ONCE; ++j) {
@@ -126,8 +127,9 @@ static __device__ __forceinline__ double sum_sides(const model_view &model, cons
     return sum;
 }
 
-/* Terms of a body (struct weight_sums; the last two: SCALES), one a lane, and, where its weights are new, its momentum residual
- * r = b + g - A v, g = J^T lambda. A pair counts at its first dynamic body. Every lane of the warp comes here. */
+/* Terms of a body (struct weight_sums; the last two: SCALES), one a lane, and, where its weights are new, its momentum
+ * residual r = b + g - A v, g = J^T lambda. A pair counts at its first dynamic body. Every lane of the warp comes
+ * here. */
 template <bool SCALES, bool RIGID, bool ROWS>
 static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const cuda_args &args, const body_thread &t)
 {
@@ -140,8 +142,8 @@ static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const
         violation += violation_of(v.bodies, v.contacts, v.weights, p);
     }
     const wide_row<RIGID> row = row_of_body<RIGID>(v.bodies, t);
-    const double sum = sum_sides<ROWS>(v.model, v.graph, v.contacts, v.rows, v.weights, t, &balance), g = t.lane < 6 ? sum : 0,
-                 momentum = product(row.velocity, row.a);
+    const double sum = sum_sides<ROWS>(v.model, v.graph, v.contacts, v.rows, v.weights, t, &balance),
+                 g = t.lane < 6 ? sum : 0, momentum = product(row.velocity, row.a);
     term[0] = dot_lanes(g, product(g, row.a_inverse));
     term[1] = t.live ? mass_of(v.bodies, t.body) : 0;
     term[2] = dot_lanes(row.velocity, momentum);

@@ -129,8 +129,8 @@ SADMM_INLINE double weight_update_scale(struct weight_island *island, const stru
 /* ---- contacts as springs -----------------------------------------------------------------------------------------
  *
  * An island that starts warm goes on from the impulses of the last step, and its K iterations change them by B K x, x
- * the velocity at the contact: from step to step a contact is a spring of stiffness B K / dt^2. At rest B is the load over
- * g dt. A column of n bodies on such springs buckles under its own weight (Euler) where
+ * the velocity at the contact: from step to step a contact is a spring of stiffness B K / dt^2. At rest B is the load
+ * over g dt. A column of n bodies on such springs buckles under its own weight (Euler) where
  *
  *     n^2 > 5.8 K a^2 / (g dt^2 h)       a: half the width of a body, h: its height; 5.8: the square of a root of J_0
  *
