@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "run_suite.h"
+#include "subadmm/scenes.h"
 #include "subadmm/subadmm.h"
 
 static sadmm_world *world;
@@ -550,6 +551,38 @@ static void on_masses(void)
     REFUSES("orientation", sadmm_mass_pose_of_body(&mass, position, NULL));
 }
 
+static void on_scenes(void)
+{
+    sadmm_scene *scene;
+    sadmm_world_def def;
+    sadmm_world *made;
+    size_t size;
+    ck_assert_int_ge(sadmm_scene_library_count(), 0);
+    if (sadmm_scene_library_count() == 0) return; /* a build without scenes: all calls are refused as such */
+    ck_assert_int_eq(sadmm_scene_library_at(0, NULL, NULL, NULL), SADMM_OK);
+    ck_assert_int_eq(sadmm_scene_create(NULL, &scene), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_str_eq(sadmm_last_message(), "scene = NULL: must be a string");
+    REFUSES("out", sadmm_scene_create("incline", NULL));
+    REFUSES("text", sadmm_scene_create_from_text(NULL, 1, "a text", &scene));
+    REFUSES("out", sadmm_scene_create_from_text("{}", 2, NULL, NULL));
+    sadmm_scene_destroy(NULL);
+    ck_assert_ptr_null(sadmm_scene_name(NULL));
+    ck_assert_ptr_null(sadmm_scene_description(NULL));
+    ck_assert_double_eq(sadmm_scene_duration(NULL), 0);
+    REFUSES("scene", sadmm_scene_choose_method(NULL, SADMM_METHOD_FAST));
+    REFUSES("scene", sadmm_scene_world_def(NULL, &def));
+    REFUSES("scene", sadmm_scene_create_world(NULL, NULL, &made));
+    REFUSES("scene", sadmm_scene_run_script(NULL, world, 0));
+    ck_assert(!sadmm_scene_is_scripted(NULL));
+    REFUSES("world", sadmm_scene_write_text(NULL, NULL, NULL, 0, &size));
+    ck_assert_int_eq(sadmm_scene_create("incline", &scene), SADMM_OK);
+    REFUSES("def", sadmm_scene_world_def(scene, NULL));
+    REFUSES("out", sadmm_scene_create_world(scene, NULL, NULL));
+    REFUSES("world", sadmm_scene_run_script(scene, NULL, 0));
+    REFUSES("size", sadmm_scene_write_text(scene, world, NULL, 0, NULL));
+    sadmm_scene_destroy(scene);
+}
+
 /* Nothing is written. */
 static void on_defaults(void)
 {
@@ -662,6 +695,11 @@ static const struct {
       "sadmm_mesh_file_triangle_count", "sadmm_mesh_file_vertices", "sadmm_mesh_file_triangles",
       "sadmm_mesh_file_describe_sized"}},
     {on_masses, {"sadmm_shape_mass", "sadmm_mass_sum", "sadmm_mass_pose_in_body", "sadmm_mass_pose_of_body"}},
+    {on_scenes,
+     {"sadmm_scene_library_count", "sadmm_scene_library_at", "sadmm_scene_create", "sadmm_scene_create_from_text",
+      "sadmm_scene_destroy", "sadmm_scene_name", "sadmm_scene_description", "sadmm_scene_duration",
+      "sadmm_scene_choose_method", "sadmm_scene_world_def_sized", "sadmm_scene_create_world",
+      "sadmm_scene_run_script", "sadmm_scene_is_scripted", "sadmm_scene_write_text"}},
     {on_others, {"sadmm_backend_query_sized", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {on_defaults,
      {"sadmm_settings_init", W(def_init), "sadmm_body_def_init", "sadmm_shape_def_init", "sadmm_hull_def_init",

@@ -107,7 +107,7 @@ START_TEST(scene_errors)
     ck_assert_ptr_null(scene);
     REFUSED(sadmm_scene_create("pile:0", &scene), SADMM_ERROR_INVALID_ARGUMENT, "N must be in [1, 1000000]");
     REFUSED(sadmm_scene_create(NULL, &scene), SADMM_ERROR_INVALID_ARGUMENT, "scene = NULL");
-    REFUSED(sadmm_scene_create("pile", NULL), SADMM_ERROR_INVALID_ARGUMENT, "scene out = NULL");
+    REFUSED(sadmm_scene_create("pile", NULL), SADMM_ERROR_INVALID_ARGUMENT, "out = NULL");
     REFUSED(sadmm_scene_create_from_text(NULL, 0, NULL, &scene), SADMM_ERROR_INVALID_ARGUMENT, "text = NULL");
     REFUSED(sadmm_scene_library_at(-1, NULL, NULL, NULL), SADMM_ERROR_INVALID_ARGUMENT, "index = -1: must be in [0, ");
     REFUSED(sadmm_scene_create_world(NULL, NULL, &world), SADMM_ERROR_INVALID_ARGUMENT, "scene = NULL");

@@ -537,7 +537,7 @@ START_TEST(arguments_are_checked)
     struct sadmm_error error;
     sadmm_world *world = build_scene(&plain);
     expect_refused(sadmm_scene_open_file(NULL, &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "path = NULL");
-    expect_refused(sadmm_scene_open_file("x", NULL, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "scene out = NULL");
+    expect_refused(sadmm_scene_open_file("x", NULL, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "out = NULL");
     expect_refused(sadmm_scene_open_file("/no/such.json", &scene, &error), SADMM_ERROR_IO, &error,
                    "/no/such.json: could not be opened: No such file");
     expect_refused(sadmm_scene_open("/tmp/", &scene, &error), SADMM_ERROR_IO, &error, "/tmp/: could not be read: Is a");
@@ -545,7 +545,7 @@ START_TEST(arguments_are_checked)
     expect_refused(sadmm_scene_open("json", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "must be one of");
     expect_refused(sadmm_scene_open_text(NULL, 0, "x", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
                    "text = NULL");
-    expect_refused(sadmm_scene_open_text("", 0, NULL, NULL, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "scene out");
+    expect_refused(sadmm_scene_open_text("", 0, NULL, NULL, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "out = NULL");
     expect_refused(sadmm_scene_open_text("", 0, NULL, &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
                    "line 1, column 0: '[' or '{' expected");
     expect_refused(sadmm_scene_open_text("{\n1", 3, "x", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,

@@ -26,7 +26,7 @@ sadmm_status sadmm_scene_library_at(int32_t index, const char **name, const char
 /* text: of `length` bytes; NULL: `spec` says what it is. */
 static sadmm_status create(const char *spec, const char *text, size_t length, sadmm_scene **out)
 {
-    if (!out) REFUSE("scene out = NULL: must not be NULL");
+    if (!out) REFUSE("out = NULL: must be given");
     *out = NULL;
     sadmm_scene *made = (sadmm_scene *)sadmm_alloc(1, sizeof *made);
     if (!made) return sadmm_fail_memory(NULL, "a scene");
@@ -43,7 +43,7 @@ sadmm_status sadmm_scene_create(const char *spec, sadmm_scene **out) { return cr
 
 sadmm_status sadmm_scene_create_from_text(const char *text, size_t length, const char *name, sadmm_scene **out)
 {
-    if (!text) REFUSE("text = NULL: must not be NULL");
+    if (!text) REFUSE("text = NULL: must be given");
     return create(name, text, length, out);
 }
 
@@ -59,7 +59,7 @@ double sadmm_scene_duration(const sadmm_scene *scene) { return scene ? scene->du
 
 sadmm_status sadmm_scene_choose_method(sadmm_scene *scene, sadmm_method method)
 {
-    if (!scene) REFUSE("scene = NULL: must not be NULL");
+    if (!scene) REFUSE("scene = NULL: must be given");
     if ((int)method < 0 || (int)method >= (int)SADMM_METHOD_COUNT)
         REFUSE("method = %d: must be in [0, %d)", (int)method, (int)SADMM_METHOD_COUNT);
     sadmm_scene_set_method(scene, method);
@@ -69,8 +69,8 @@ sadmm_status sadmm_scene_choose_method(sadmm_scene *scene, sadmm_method method)
 sadmm_status sadmm_scene_world_def_sized(const sadmm_scene *scene, sadmm_world_def *def, size_t size,
                                          size_t settings_size)
 {
-    if (!scene) REFUSE("scene = NULL: must not be NULL");
-    if (!def) REFUSE("def = NULL: must not be NULL");
+    if (!scene) REFUSE("scene = NULL: must be given");
+    if (!def) REFUSE("def = NULL: must be given");
     sadmm_world_def_init(def, size, settings_size);
     def->backend = scene->def.backend;
     def->precision = scene->def.precision;
@@ -86,9 +86,9 @@ sadmm_status sadmm_scene_world_def_sized(const sadmm_scene *scene, sadmm_world_d
 
 sadmm_status sadmm_scene_create_world(const sadmm_scene *scene, const sadmm_world_def *def, sadmm_world **out)
 {
-    if (!out) REFUSE("world out = NULL: must not be NULL");
+    if (!out) REFUSE("out = NULL: must be given");
     *out = NULL;
-    if (!scene) REFUSE("scene = NULL: must not be NULL");
+    if (!scene) REFUSE("scene = NULL: must be given");
     if (!def) return sadmm_scene_build(scene, out, NULL);
     /* The program's headers may be of another version: a world that is made from it knows what was meant. */
     sadmm_scene with = *scene;
@@ -108,8 +108,8 @@ bool sadmm_scene_is_scripted(const sadmm_scene *scene) { return sadmm_scene_has_
 
 sadmm_status sadmm_scene_run_script(const sadmm_scene *scene, sadmm_world *world, int64_t step)
 {
-    if (!scene) REFUSE("scene = NULL: must not be NULL");
-    if (!world) REFUSE("world = NULL: must not be NULL");
+    if (!scene) REFUSE("scene = NULL: must be given");
+    if (!world) REFUSE("world = NULL: must be given");
     if (step < 0) REFUSE("step = %lld: must be >= 0", (long long)step);
     return sadmm_scene_before_step(scene, world, step, NULL);
 }
@@ -131,9 +131,9 @@ static sadmm_status write_to(const sadmm_scene *scene, sadmm_world *world, FILE 
 sadmm_status sadmm_scene_write_text(const sadmm_scene *scene, sadmm_world *world, char *text, size_t capacity,
                                     size_t *size)
 {
-    if (!world) REFUSE("world = NULL: must not be NULL");
-    if (!size) REFUSE("size = NULL: must not be NULL");
-    if (!text && capacity > 0) REFUSE("text = NULL: must not be NULL where capacity = %zu", capacity);
+    if (!world) REFUSE("world = NULL: must be given");
+    if (!size) REFUSE("size = NULL: must be given");
+    if (!text && capacity > 0) REFUSE("text = NULL: must be given where capacity = %zu", capacity);
     FILE *stream = tmpfile();
     if (!stream) return sadmm_fail(NULL, SADMM_ERROR_IO, "a temporary file cannot be made");
     sadmm_status status = write_to(scene, world, stream);

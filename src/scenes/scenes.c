@@ -129,7 +129,7 @@ sadmm_status sadmm_scene_open_file(const char *path, struct sadmm_scene *scene, 
 {
     struct sadmm_scene_file *file;
     if (!path) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "path = NULL: must be a string");
-    if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene out = NULL: must not be NULL");
+    if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "out = NULL: must be given");
     TRY(sadmm_scene_file_open(path, &file, error));
     return take_file(file, scene, error);
 }
@@ -138,8 +138,8 @@ sadmm_status sadmm_scene_open_text(const char *text, size_t length, const char *
                                    struct sadmm_error *error)
 {
     struct sadmm_scene_file *file;
-    if (!text) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "text = NULL: must not be NULL");
-    if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene out = NULL: must not be NULL");
+    if (!text) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "text = NULL: must be given");
+    if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "out = NULL: must be given");
     TRY(sadmm_scene_file_parse(text, length, name, &file, error));
     return take_file(file, scene, error);
 }
@@ -157,8 +157,8 @@ sadmm_status sadmm_scene_write(const struct sadmm_scene *scene, const char *spec
                                struct sadmm_error *error)
 {
     if (!scene || !scene->info) return fail_unopened(error);
-    if (!world) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "world = NULL: must not be NULL");
-    if (!stream) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "stream = NULL: must not be NULL");
+    if (!world) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "world = NULL: must be given");
+    if (!stream) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "stream = NULL: must be given");
     const struct sadmm_scene_info *info = scene->info;
     struct sadmm_scene_about about = {.spec = spec ? spec : info->name,
                                       .name = info->name,
@@ -182,7 +182,7 @@ sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struc
     long n, m;
 
     if (!spec) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = NULL: must be a string");
-    if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene out = NULL: must not be NULL");
+    if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "out = NULL: must be given");
     if (sadmm_scene_is_file(spec)) return sadmm_scene_open_file(spec, scene, error);
     colon = strchr(spec, ':');
     family = find(spec, colon ? (size_t)(colon - spec) : strlen(spec));
@@ -216,7 +216,7 @@ sadmm_status sadmm_scene_build(const struct sadmm_scene *scene, sadmm_world **wo
     const struct sadmm_scene_family *family = family_of(scene);
     sadmm_status status;
 
-    if (!world) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "world out = NULL: must not be NULL");
+    if (!world) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "out = NULL: must be given");
     *world = NULL;
     if (!family && !(scene && scene->loaded)) return fail_unopened(error);
     status = sadmm_world_create(&scene->def, world);
@@ -256,7 +256,7 @@ sadmm_status sadmm_scene_observe(const struct sadmm_scene *scene, sadmm_world *w
     const struct sadmm_scene_family *family = family_of(scene);
 
     if (!family && !(scene && scene->loaded)) return fail_unopened(error);
-    if (!result) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "result = NULL: must not be NULL");
+    if (!result) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "result = NULL: must be given");
     return family && family->observe ? family->observe(scene, world, step, result, error) : SADMM_OK;
 }
 
