@@ -4,6 +4,8 @@
 #include "environment_tools.h"
 #include "world/environments/environment_types.h"
 
+enum { FEW = 4 };
+
 static sadmm_environments *replicate(sadmm_world *world, int32_t count)
 {
     sadmm_environments *environments;
@@ -59,6 +61,14 @@ static void give(sadmm_environments *environments, const struct view *view)
                                                               sizeof *view->host, &world->error), SADMM_OK);
 }
 
+/* Environments together, single ones, and what they were made from. */
+static void destroy_all(sadmm_environments *all, sadmm_environments *const *own, sadmm_world *origin)
+{
+    for (int32_t e = 0; e < FEW; ++e) sadmm_environments_destroy(own[e]);
+    sadmm_environments_destroy(all);
+    sadmm_world_destroy(origin);
+}
+
 static size_t numbers_of(const sadmm_environments *environments, sadmm_array array)
 {
     return (size_t)sadmm_environments_rows(environments, array) * (size_t)sadmm_array_columns(array);
@@ -72,7 +82,7 @@ static const struct {
               {"grippers:1", 2, EMULATED ? 6 : 60},
               {"pile:12", EMULATED ? 20 : 40, EMULATED ? 6 : 60},
               {"hand_demo", 2, EMULATED ? 2 : 30}};
-enum { SCENES = sizeof scenes / sizeof *scenes, FEW = 4 };
+enum { SCENES = sizeof scenes / sizeof *scenes };
 /* Pushes that differ from environment to environment, of every body that moves; one without joints is thrown up, so
  * that nothing in it touches. */
 static void push(sadmm_world *world, const double *template_state, int32_t environment, size_t count, double *state)
@@ -165,9 +175,7 @@ START_TEST(environments_step_as_if_alone)
         free(views[k].host);
         for (int32_t e = 0; e < FEW; ++e) free(mine[e][k].host);
     }
-    for (int32_t e = 0; e < FEW; ++e) sadmm_environments_destroy(own[e]);
-    sadmm_environments_destroy(all);
-    sadmm_world_destroy(origin);
+    destroy_all(all, own, origin);
     free(state);
 }
 END_TEST
@@ -343,9 +351,7 @@ START_TEST(inputs_and_contacts_are_an_environments_own)
         for (int32_t e = 0; e < FEW; ++e) free(given[e][k].host);
     }
     for (int32_t e = 0; e < FEW; ++e) free(mine[e].host);
-    for (int32_t e = 0; e < FEW; ++e) sadmm_environments_destroy(own[e]);
-    sadmm_environments_destroy(all);
-    sadmm_world_destroy(origin);
+    destroy_all(all, own, origin);
 }
 END_TEST
 
@@ -667,9 +673,7 @@ START_TEST(each_has_its_own_gravity)
         free(views[k].host);
         for (int32_t e = 0; e < FEW; ++e) free(mine[e][k].host);
     }
-    for (int32_t e = 0; e < FEW; ++e) sadmm_environments_destroy(own[e]);
-    sadmm_environments_destroy(all);
-    sadmm_world_destroy(origin);
+    destroy_all(all, own, origin);
 }
 END_TEST
 

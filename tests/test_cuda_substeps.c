@@ -123,7 +123,8 @@ START_TEST(impacts_equal_those_by_host_and_of_short_steps)
 }
 END_TEST
 
-/* Steps in the queue, as bodies land; twice, to the same bits. */
+/* Steps in the queue, as bodies land and one comes to lie 10 mm deep, for which steps are repeated with pushes; twice,
+ * to the same bits. */
 START_TEST(enqueued_substeps_equal_single_steps)
 {
     const int precision = _i;
@@ -136,12 +137,14 @@ START_TEST(enqueued_substeps_equal_single_steps)
         if (k > 0) tune_capacities(tables[precision], worlds[k]->context, 1);
     }
     for (int step = 0; step < 12; ++step) {
+        for (int k = 0; k < 3 && step == 4; ++k) place(worlds[k], body_at(worlds[k], 7), 2, 0, 0.09);
         MUST(worlds[0], sadmm_world_step(worlds[0]));
         for (int k = 1; k < 3; ++k) MUST(worlds[k], sadmm_world_step_async(worlds[k]));
     }
     for (int k = 1; k < 3; ++k) {
         MUST(worlds[k], sadmm_world_wait(worlds[k]));
         expect_same_world(worlds[0], worlds[k], "12 steps");
+        ck_assert_int_gt(world_report(worlds[k]).repeated, 0);
     }
     for (int k = 0; k < 3; ++k) sadmm_world_destroy(worlds[k]);
 }

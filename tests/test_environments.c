@@ -208,6 +208,16 @@ static struct machine build_machine(void)
     return m;
 }
 
+static struct machine machine_on(int threads)
+{
+    sadmm_test_force_threads(threads > 1);
+    const struct machine m = build_machine();
+    sadmm_settings settings = sadmm_world_settings(m.world);
+    settings.threads = threads;
+    MUST(m.world, sadmm_world_set_settings(m.world, &settings));
+    return m;
+}
+
 static const sadmm_array inputs[] = {SADMM_ARRAY_BODY_WRENCH,
                                      SADMM_ARRAY_BODY_INERTIA,
                                      SADMM_ARRAY_JOINT_TARGET_POSITION,
@@ -250,12 +260,7 @@ static void vary(sadmm_world *world, sadmm_array array, int32_t environment, int
 
 START_TEST(inputs_are_an_environments_own)
 {
-    const int threads = _i ? 2 : 1;
-    sadmm_test_force_threads(threads > 1);
-    struct machine m = build_machine();
-    sadmm_settings settings = sadmm_world_settings(m.world);
-    settings.threads = threads;
-    MUST(m.world, sadmm_world_set_settings(m.world, &settings));
+    struct machine m = machine_on(_i ? 2 : 1);
     static const double up[3] = {0.1, 0, 0.05}, straight[4] = {1, 0, 0, 0};
     MUST(m.world, sadmm_world_move_body(m.world, m.lift, up, straight)); /* in the first step */
     sadmm_environments *environments = replicate(m.world, FEW);
@@ -671,12 +676,7 @@ END_TEST
 START_TEST(frames_of_joints_are_an_environments_own)
 {
     enum { MANY = 6, STEPS = 40 };
-    const int threads = _i ? 2 : 1;
-    sadmm_test_force_threads(threads > 1);
-    struct machine m = build_machine();
-    sadmm_settings settings = sadmm_world_settings(m.world);
-    settings.threads = threads;
-    MUST(m.world, sadmm_world_set_settings(m.world, &settings));
+    struct machine m = machine_on(_i ? 2 : 1);
     sadmm_environments *environments = replicate(m.world, MANY);
     const size_t n = numbers_of(m.world, SADMM_ARRAY_JOINT_FRAME), bodies = numbers_of(m.world, SADMM_ARRAY_BODY_STATE),
                  joints = numbers_of(m.world, SADMM_ARRAY_JOINT_POSITION);

@@ -545,7 +545,8 @@ START_TEST(arguments_are_checked)
     expect_refused(sadmm_scene_open("json", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "must be one of");
     expect_refused(sadmm_scene_open_text(NULL, 0, "x", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
                    "text = NULL");
-    expect_refused(sadmm_scene_open_text("", 0, NULL, NULL, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "out = NULL");
+    expect_refused(sadmm_scene_open_text("", 0, NULL, NULL, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
+                   "out = NULL");
     expect_refused(sadmm_scene_open_text("", 0, NULL, &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
                    "line 1, column 0: '[' or '{' expected");
     expect_refused(sadmm_scene_open_text("{\n1", 3, "x", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,

@@ -124,8 +124,8 @@ struct cpu_island {
     struct weight_island weights;
     double scale_weights;       /* not 0: the weights of pairs stay, times this */
     bool rows;                  /* there are constraints by rows: no energy limit, the weight scale stays 1 */
-    double balance;             /* of sides that start with an impulse (weight_starts_warm), of which follows */
-    bool warm;                  /* no weight updates */
+    double balance;             /* as in weight_starts_warm: */
+    bool warm;                  /* it starts warm, and has no weight updates */
     struct island_energies energies;
     double along; /* v . A v_f / 2 */
 };
@@ -194,8 +194,8 @@ struct sadmm_context {
     double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
     double *pair_violation;     /* pair records: terms of the islands' sums */
     struct arm_sums *pair_arms; /* where contacts have three rows: of pair records on a and b, once a step */
-    int weight_updates;         /* in this solve, */
-    bool any_cold, any_warm;    /* of which some island has any; has none */
+    int weight_updates;         /* in this solve */
+    bool any_cold, any_warm;    /* some island starts so */
     int exact_since;            /* iterations since the momentum residuals were taken */
     double *body_sums;          /* bodies x BODY_SUMS: terms of the islands' sums */
 
@@ -277,7 +277,7 @@ enum cpu_sweep {
     /* fast: Steps 2-4; wrenches = J^T (lambda^ - lambda) */
     CPU_SWEEP_RELAX,   /* lambda goes `relaxation` times as far as lambda^ */
     CPU_SWEEP_PLAIN,   /* as far */
-    CPU_SWEEP_RELAX_WARM, /* so of islands that start warm, PLAIN of others */
+    CPU_SWEEP_RELAX_WARM, /* RELAX in islands that start warm, PLAIN in others */
     CPU_SWEEP_PLAIN_MEASURE /* and *primal: eq. (16) */
 };
 static inline bool cpu_sweep_passes_changes(enum cpu_sweep sweep) { return sweep >= CPU_SWEEP_RELAX; }
@@ -290,7 +290,7 @@ void CPU(sweep_rows)(struct sadmm_context *, size_t begin, size_t end, enum cpu_
 /* Step 1 of a thread's share of the bodies; `step1_done`: all but the bodies without constraints. */
 void CPU(sweep_bodies)(struct sadmm_context *, int thread, int threads, bool step1_done);
 /* The same for the method `fast`: velocities go `velocity` times as far, multipliers have gone `multipliers` times;
- * warm: so of islands that start warm, others once. */
+ * warm: so in islands that start warm, in others once. */
 void CPU(sweep_bodies_fast)(struct sadmm_context *, int thread, int threads, bool step1_done, double velocity,
                             double multipliers, bool warm);
 /* fast: the momentum residuals of bodies [begin, end), recomputed, in double from v and lambda (cpu_residuals.c). */

@@ -123,10 +123,10 @@ static void iterate_fast(const struct batch *s, int thread, int threads, double 
         const bool relaxes = relax_constraints(i, batch), step1_done = c->step1_done || i > 0,
                    warm = on && c->any_cold && i + 1 == s->count;
         update_constraints(c, thread, threads,
-                           warm      ? CPU_SWEEP_RELAX_WARM
-                           : relaxes ? CPU_SWEEP_RELAX
+                           warm         ? CPU_SWEEP_RELAX_WARM
+                           : relaxes    ? CPU_SWEEP_RELAX
                            : s->measure ? CPU_SWEEP_PLAIN_MEASURE
-                                     : CPU_SWEEP_PLAIN,
+                                        : CPU_SWEEP_PLAIN,
                            primal);
         sadmm_barrier_wait(&c->barrier, threads);
         CPU(sweep_bodies_fast)(c, thread, threads, step1_done, relax_velocity(i, batch, step1_done) ? relaxation : 1,

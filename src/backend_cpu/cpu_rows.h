@@ -153,10 +153,9 @@ static inline vec6d cpu_free_momentum(const struct sadmm_context *c, size_t i)
     return out;
 }
 
-/* Are both bodies of the constraint that has this wrench row dynamic? */
-static inline bool cpu_row_is_shared(const struct sadmm_context *c, int32_t row)
+/* Are both bodies of a record's constraint dynamic? */
+static inline bool cpu_is_shared(const struct sadmm_context *c, size_t record)
 {
-    const size_t record = (size_t)row % c->record_count;
     int l = (int)(record % (size_t)LANES);
     if (record < cpu_pair_records(c)) {
         const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];

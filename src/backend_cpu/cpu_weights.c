@@ -116,7 +116,9 @@ static void add_up_body(const struct sadmm_context *c, size_t i, double sums[BOD
                      force = length3(f);
         sum += wrench;
         push += force;
-        const double share = cpu_row_is_shared(c, c->incident[at]) ? 0.5 : 1;
+        if (c->weight_updates > 0) continue;
+        int side;
+        const double share = cpu_is_shared(c, cpu_record(c, at, &side)) ? 0.5 : 1;
         balance += force > 0 || length3(m) > 0 ? share : -share;
     }
     for (int k = 0; k < 6; ++k) g[k] = sum[k];

@@ -267,7 +267,7 @@ void CUDA(plan_second)(struct sadmm_context *c, bool warm)
     p->plan = c->plan;
     if (p->plan.points == 0) p->plan.points = 1; /* they come in a later sub-step */
     p->plan.row_constraints = 0;
-    sadmm_plan_complete(&p->plan, &settings, warm, plan_updates_weights(&settings, true, false));
+    sadmm_plan_complete(&p->plan, &settings, warm, plan_updates_weights(&settings, true, false, c->step->uneven));
     CUDA(plan_settings)(p, &settings);
     p->view.model.warm_start = p->plan.warm_start;
     p->view.model.contact_rows = c->view.model.contact_rows;

@@ -194,6 +194,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
         c->bounces = c->bounces ||
                      (sadmm_shape_collides(&world->input->shapes[k]) && world->input->shapes[k].restitution > 0);
     c->plan.gyroscopic = sadmm_plan_is_gyroscopic(world->rigid, world->body_count);
+    s->uneven = sadmm_plan_is_uneven(world->rigid, world->body_count);
     /* The state before the first step is the one that is not written by it. */
     TRY(COLLISION(upload)(s->collision, c->stream, world->contacts, error));
     s->into = 1 - COLLISION(current)(s->collision);

@@ -64,6 +64,7 @@ struct ncp_block_memory {
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
     int32_t bodies, slots, kinematic;
+    bool uneven;                /* their masses are, since load (math/weight.h) */
     int32_t copies;             /* equal worlds that it is; 0: none of these */
     int32_t joints, joint_constraints, couplings, gears;
     bool tables;                /* some joint has one of a spring */
@@ -157,7 +158,7 @@ static inline bool has_large_ncp_blocks(const struct sadmm_context *c)
 /* Are weights of islands that start cold updated? */
 static inline bool updates_weights(const struct sadmm_context *c)
 {
-    return c->fast && plan_updates_weights(&c->settings, true, false);
+    return c->fast && plan_updates_weights(&c->settings, true, false, c->step->uneven);
 }
 
 /* Are small islands of worlds with joints solved before the iterations (ncp_island.h)? Where every constraint is of a

@@ -70,6 +70,7 @@ struct sadmm_system {
     struct sadmm_contact_set *contacts;
     bool errors_given;               /* points carry e (problem level) instead of a separation */
     bool first;                      /* no step came before: where there are no impulses, none are known */
+    bool uneven;                     /* masses of the world's dynamic bodies are (math/weight.h) */
     struct sadmm_rows *rows;         /* constraints given by Jacobian rows; NULL: none */
     const int32_t *islands;          /* (body_count) as sadmm_islands finds them; NULL: not known yet */
 };

@@ -1,5 +1,7 @@
 #include "plan.h"
 
+#include <math.h>
+
 #include "core/base/parallel.h"
 #include "core/math/rigid.h"
 
@@ -81,6 +83,16 @@ bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count)
     return false;
 }
 
+bool sadmm_plan_is_uneven(const struct sadmm_rigid *rigid, int32_t count)
+{
+    double lightest = INFINITY, heaviest = 0;
+    for (int32_t i = 0; i < count; ++i) {
+        lightest = fmin(lightest, rigid[i].mass);
+        heaviest = fmax(heaviest, rigid[i].mass);
+    }
+    return weight_is_uneven(lightest, heaviest);
+}
+
 static bool may_update_penalty(const struct sadmm_settings *settings)
 {
     return settings->method == SADMM_METHOD_PAPER && settings->penalty_period > 0 &&
@@ -127,7 +139,7 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     if (settings->warm_start) count_constraints(system, plan.threads, &constraints, &warm);
     const bool some_cold = !settings->warm_start || warm < constraints;
     sadmm_plan_complete(&plan, settings, plan_mostly_warm((int64_t)constraints, (int64_t)warm),
-                        some_cold && plan_updates_weights(settings, plan.rigid, system->first));
+                        some_cold && plan_updates_weights(settings, plan.rigid, system->first, system->uneven));
     plan.initialise = settings->method == SADMM_METHOD_FAST && plan.points > 0 && system->first && warm == 0;
     if (plan.initialise) plan.warm_start = true; /* initialised impulses are the system's start values then */
     return plan;

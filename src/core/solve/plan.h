@@ -68,10 +68,10 @@ SADMM_INLINE bool plan_may_start_warm(const struct sadmm_plan *plan, const struc
 }
 
 /* FAST: are weights of islands that start cold updated? Steps of a world with few iterations go on from each other: the
- * loads that one does not find the next ones do. first: no step came before. */
-SADMM_INLINE bool plan_updates_weights(const struct sadmm_settings *settings, bool rigid, bool first)
+ * loads that one does not find the next ones do, where masses are not uneven. first: no step came before. */
+SADMM_INLINE bool plan_updates_weights(const struct sadmm_settings *settings, bool rigid, bool first, bool uneven)
 {
-    return !rigid || first || !settings->warm_start || settings->iterations >= WEIGHT_SPRING_ITERATIONS;
+    return !rigid || first || uneven || !settings->warm_start || settings->iterations >= WEIGHT_SPRING_ITERATIONS;
 }
 
 /* What follows from the settings once the counts and `contact_rows` are in. mostly_warm: at least half of the
@@ -84,6 +84,9 @@ bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings);
 
 /* Does one of the bodies have unequal principal moments? */
 bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count);
+
+/* Do masses of bodies differ too much for loads to be found over steps? */
+bool sadmm_plan_is_uneven(const struct sadmm_rigid *rigid, int32_t count);
 
 /* Is there any constraint? */
 bool sadmm_plan_is_constrained(const struct sadmm_plan *plan);

@@ -250,6 +250,7 @@ sadmm_status sadmm_push_solve(struct sadmm_push *p, const struct sadmm_kernels *
         .kinematic_count = system->kinematic_count,
         .support_motion = system->support_motion ? p->support_motion : NULL,
         .contacts = &p->contacts,
+        .uneven = system->uneven,
     };
     struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
     plan.contact_rows = contact_rows;

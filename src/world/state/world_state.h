@@ -44,6 +44,7 @@ struct sadmm_world {
     struct sadmm_world_coupling *couplings;
 
     int32_t dynamic_count, kinematic_count;
+    bool uneven_masses; /* of dynamic bodies (math/weight.h), as of the step */
     int32_t *kinematic_slots; /* of these, ascending, as of the last step */
     bool kinematic_listed;    /* none has come or gone since */
     struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */

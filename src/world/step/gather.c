@@ -1,10 +1,12 @@
 /* The world as a step reads it: dynamic bodies in slot order, bodies and shapes as collision sees them, the system. */
+#include <math.h>
 #include <string.h>
 
 #include "collision/base/bounds.h"
 #include "core/base/barrier.h"
 #include "core/base/definition_fields.h"
 #include "core/base/memory.h"
+#include "core/math/weight.h"
 #include "core/model/extrapolation.h"
 #include "core/model/forces.h"
 #include "coupling_step.h"
@@ -49,9 +51,15 @@ static void start_body(sadmm_world *world, int32_t i, const struct sadmm_rigid *
     memcpy(world->start.velocity + 6 * (size_t)i, velocity, 6 * sizeof *velocity);
 }
 
+/* Of bodies. */
+struct mass_range {
+    double lightest, heaviest;
+};
+
 /* Slots [begin, end), whose dynamic bodies are `dynamic` and the following. */
-static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t dynamic)
+static struct mass_range gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t dynamic)
 {
+    struct mass_range range = {INFINITY, 0};
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
     for (size_t slot = begin; slot < end; ++slot) {
         struct sadmm_world_body *body = &world->bodies[slot];
@@ -65,7 +73,10 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
         start_body(world, dynamic, &body->rigid, &body->extrapolation, settings.dt);
         if (settings.substeps > 1) world->extrapolation[dynamic] = body->extrapolation;
         world->slot_of[dynamic++] = (int32_t)slot;
+        range.lightest = min_of(range.lightest, body->rigid.mass);
+        range.heaviest = max_of(range.heaviest, body->rigid.mass);
     }
+    return range;
 }
 
 static int last_threads(const sadmm_world *world) /* by the contacts of the last step */
@@ -76,7 +87,8 @@ static int last_threads(const sadmm_world *world) /* by the contacts of the last
 struct gathering {
     sadmm_world *world;
     struct sadmm_barrier barrier;
-    int32_t moving[SADMM_MOST_THREADS]; /* dynamic bodies in each member's share of the slots */
+    int32_t moving[SADMM_MOST_THREADS]; /* dynamic bodies in each member's share of the slots; */
+    struct mass_range masses[SADMM_MOST_THREADS]; /* theirs */
 };
 
 static void gather_share(void *argument, int thread, int threads)
@@ -88,7 +100,7 @@ static void gather_share(void *argument, int thread, int threads)
     g->moving[thread] = count_moving(g->world, begin, end);
     sadmm_barrier_wait(&g->barrier, threads);
     for (int t = 0; t < thread; ++t) first += g->moving[t];
-    gather_slots(g->world, begin, end, first);
+    g->masses[thread] = gather_slots(g->world, begin, end, first);
 }
 
 sadmm_status sadmm_world_gather(sadmm_world *world)
@@ -105,7 +117,14 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     struct gathering g;
     g.world = world;
     g.barrier = (struct sadmm_barrier){0};
-    sadmm_parallel(&world->team, sadmm_pass_threads(last_threads(world), slots), gather_share, &g);
+    const int ran =
+        sadmm_parallel(&world->team, sadmm_pass_threads(last_threads(world), slots), gather_share, &g);
+    struct mass_range masses = g.masses[0];
+    for (int t = 1; t < ran; ++t) {
+        masses.lightest = min_of(masses.lightest, g.masses[t].lightest);
+        masses.heaviest = max_of(masses.heaviest, g.masses[t].heaviest);
+    }
+    world->uneven_masses = weight_is_uneven(masses.lightest, masses.heaviest);
     TRY(sadmm_world_gather_kinematic(world));
     sadmm_world_begin_couplings(world);
     return sadmm_world_begin_joints(world);
@@ -188,6 +207,7 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
         .velocity = world->velocity,
         .contacts = &world->contacts,
         .first = !world->stepped,
+        .uneven = world->uneven_masses,
         .kinematic = world->start.kinematic,
         .kinematic_count = world->start.kinematic_count,
         .rows = world->start.rows.constraint_count > 0 ? &world->start.rows : NULL,
