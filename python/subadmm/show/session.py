@@ -50,7 +50,7 @@ class Session:
         """Other settings of the world, as method="paper", iterations=50, certify=True; from the next step on. All of
         them, or, where one is refused, none."""
         with self.lock:
-            before, made = self.world.settings, self.world.settings
+            before, made = self.world.settings.copy(), self.world.settings.copy()
             for name, value in settings.items():
                 setattr(made, name, value)
             self.world.settings = made

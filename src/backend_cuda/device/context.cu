@@ -142,6 +142,7 @@ sadmm_status CUDA(clear)(struct sadmm_context *c, enum cuda_scalar scalar, struc
         c->cleared &= ~(unsigned)scalar;
         return SADMM_OK;
     }
+    if (c->skips) return SADMM_OK;
     if (scalar == SCALAR_BARRIER) {
         CUDA_CALL(c, cudaMemsetAsync(v->iteration.barrier, 0, sizeof *v->iteration.barrier, c->stream),
                   "cudaMemsetAsync(barrier)");
@@ -262,6 +263,7 @@ static sadmm_status launch_configured(struct sadmm_context *c, cuda_kernel kerne
                                       const struct cuda_partition *partition, bool pdl, const cuda_args *args,
                                       struct sadmm_error *error)
 {
+    if (c->skips) return SADMM_OK;
     cudaLaunchAttribute attributes[MOST_ATTRIBUTES];
     const cudaLaunchConfig_t launch = configure(c, partition, pdl, attributes);
     c->kernel = name;

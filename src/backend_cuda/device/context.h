@@ -76,7 +76,8 @@ struct sadmm_context {
     int checks;     /* fast: at the stop rule, in this step */
     bool prologue; /* fast: the iterating kernels of the step enqueued do prologue and epilogue (iterate/prologue.h) */
     unsigned cleared; /* enum cuda_scalar: those that a kernel of this step has set to 0 for their first use */
-    bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
+    bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it; */
+    bool skips;     /* what is enqueued is left out of it */
 
     enum sadmm_cuda_tier wanted;     /* by a test */
     int wanted_cluster;              /* blocks a cluster, by a test; 0: any */

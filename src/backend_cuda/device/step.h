@@ -61,7 +61,8 @@ struct cuda_step_totals {
     int32_t met;             /* sub-steps that met theirs */
     int32_t constrained;     /* sub-steps with contacts, or rows; */
     int32_t spared;          /* of which every island was solved before any iteration */
-    int32_t cold;            /* sub-steps in which some island starts cold */
+    int32_t cold;            /* sub-steps in which some island starts cold; */
+    int32_t unsolved;        /* in which one is not solved before the iterations, where islands are */
     int32_t pushed;          /* sub-steps in which some island is pushed apart (step/push.h); -1: one did not fit */
     int32_t most_iterations; /* sums: of islands that stopped, the most; */
     double iterations_mean;  /* and of all */
@@ -117,6 +118,7 @@ struct cuda_step_speculation {
     int32_t point_slots;
     int32_t warm;         /* most pairs, and constraints of joints, carry an impulse; -1: does not matter */
     int32_t cold;         /* fast: some islands may start cold: weights are updated */
+    int32_t unsolved;     /* some islands may not be solved before the iterations: these are made */
     int32_t rows;         /* there are constraints of joints; -1: there are no joints */
     int32_t apart;        /* articulations do not iterate: their block direct solve runs beside what else the step
                              does */

@@ -511,7 +511,6 @@ struct cuda_args {
     int32_t relax;      /* fast, STREAM: bits of enum cuda_relax */
     double factor;
     double row_floor;   /* fast: weight_row_floor */
-    unsigned long long condition; /* that the kernel sets (device/condition.h) */
 };
 
 /* Of the dense contact solve: all islands are solved, or left to the iterations; some are left to large blocks; these

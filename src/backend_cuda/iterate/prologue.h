@@ -65,8 +65,8 @@ static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const 
     add_up_in_block<add_terms>(part.bodies, part.range, part.terms, barrier);
     for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t i) {
         const int32_t first = t.live ? part.range[i].first : 0;
-        cuda_island island;
         double C[PACKED];
+        cuda_island island = new_island(part.terms + first * TERMS, args);
         const bool cold = weigh_island<false>(&island, part.terms + first * TERMS, args);
         const bool own_sides = i < (int32_t)blockDim.x / LANES;
         weighted_matrix<true>(v, t,

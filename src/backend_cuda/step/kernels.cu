@@ -336,7 +336,7 @@ static __device__ int32_t abort_of(int32_t aborted, bool planned, int32_t offend
 /* The sub-step is added to those before it. args.count: its iterations. */
 static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cuda_args &args)
 {
-    const struct cuda_step_totals zero = {0, -1, 0, 0, 0, 0, 0, 0, 0, {}};
+    const struct cuda_step_totals zero = {0, -1, 0, 0, 0, 0, 0, 0, 0, 0, {}};
     const struct cuda_step_control *control = v.step.control;
     struct cuda_step_totals totals = v.step.substep > 0 ? control->totals : zero;
     totals.pushed = count_pushed(v.push, totals.pushed);
@@ -355,6 +355,7 @@ static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cu
     }
     totals.limited = limited > totals.limited ? limited : totals.limited;
     totals.cold += v.model.statistics->cold;
+    totals.unsolved += v.ncp.points && *v.ncp.unsolved != 0;
     totals.constrained += constrained;
     totals.spared += constrained && spared;
     totals.iterations_mean += iterations;

@@ -4,7 +4,6 @@
 
 #include "backend_cuda/device/double.h"
 
-#include "backend_cuda/device/condition.h"
 #include "backend_cuda/device/plan_check.h"
 #include "core/model/push_law.h"
 #include "anchors.h"
@@ -200,13 +199,16 @@ static __global__ void put_kernel(const __grid_constant__ cuda_view v, const __g
     if (i < v.rows.count) put_constraint(v, i);
 }
 
-/* Is some island not solved? args.begin: before the iterations; else after them. */
-static __global__ void ask_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+/* Is the step what it was planned for, as penalties ask, which may be left out; and are all islands solved, if it was
+ * planned so? args.begin: before the iterations; else after them. */
+static __global__ void check_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     pdl_wait_if(all_pdl(v.model.bodies));
-    if (args.begin) check_plan(v.model, v.iteration, v.step); /* as penalties do, which may be left out */
-    else if (thread_index() == 0) stamp_solved(v.step);
-    if (thread_index() == 0) set_condition(args.condition, *v.ncp.unsolved != 0 && !v.model.live->abort_code);
+    if (args.begin) check_plan(v.model, v.iteration, v.step);
+    if (thread_index() > 0) return;
+    if (!args.begin) stamp_solved(v.step);
+    else if (!v.model.live->abort_code && *v.ncp.unsolved != 0 && !v.step.speculation.unsolved)
+        v.model.live->abort_code = ABORT_PLAN;
 }
 
 /* ---- launches ---------------------------------------------------------------------------------------------------- */
@@ -248,13 +250,11 @@ sadmm_status CUDA(launch_ncp)(struct sadmm_context *c, bool after, struct sadmm_
     return launch_pass(c, true, large ? NCP_ALL : NCP_LEFT, false, error);
 }
 
-sadmm_status CUDA(launch_ncp_ask)(struct sadmm_context *c, bool after, unsigned long long condition,
-                                  struct sadmm_error *error)
+sadmm_status CUDA(launch_ncp_check)(struct sadmm_context *c, bool after, struct sadmm_error *error)
 {
     cuda_args args = {};
     args.begin = !after;
-    args.condition = condition;
-    return CUDA(launch)(c, ask_kernel, "islands that are left", 1, &args, error);
+    return CUDA(launch)(c, check_kernel, "islands that are left", 1, &args, error);
 }
 
 sadmm_status CUDA(launch_ncp_put)(struct sadmm_context *c, struct sadmm_error *error)

@@ -123,6 +123,17 @@ static void see_pushes(struct sadmm_context *c, const struct cuda_step_report *r
     s->pushes = s->planned = false;
 }
 
+/* A step was done that was planned to have islands that are not solved before the iterations. It is planned that there
+ * are none when there has been none for a while, the longer the more often that was wrong. */
+static void see_unsolved(struct sadmm_context *c, const struct cuda_step_report *report)
+{
+    struct cuda_step *s = c->step;
+    if (!s->unsolved) return;
+    s->solved = report->totals.unsolved > 0 ? 0 : s->solved + 1;
+    if (s->solved < s->solved_backoff) return;
+    s->unsolved = s->planned = false;
+}
+
 /* A step was done that was planned to have islands that start cold. */
 static void see_cold(struct sadmm_context *c, const struct cuda_step_report *report)
 {
@@ -188,6 +199,11 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         s->push_streams = s->push_streams || report->totals.pushed < 0;
         s->quiet = 0;
     }
+    if (report->abort_code == ABORT_PLAN && report->totals.unsolved > 0 && !s->unsolved) {
+        s->unsolved = true;
+        s->solved = 0;
+        s->solved_backoff = std::min(2 * s->solved_backoff, (int32_t)MOST_BACKOFF);
+    }
     if (report->totals.cold > 0 && updates_weights(c)) {
         s->cold = true;
         s->warm = 0;
@@ -235,6 +251,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     if (s->conservative > 0 && --s->conservative == 0) s->planned = false;
     see_articulations(c, &report);
     see_pushes(c, &report);
+    see_unsolved(c, &report);
     see_cold(c, &report);
     see_hits(c, &report);
     /* A plan with far too large capacities wastes launches. */

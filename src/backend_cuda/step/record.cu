@@ -1,6 +1,5 @@
 /* Whole steps on the device: a step, launch by launch, and the graph that is made of it (step/world.h). */
 #include "backend_cuda/assemble/assemble.h"
-#include "backend_cuda/device/condition.h"
 #include "backend_cuda/graph/graph.h"
 #include "backend_cuda/iterate/iterate.h"
 #include "backend_cuda/weight/weight.h"
@@ -59,8 +58,7 @@ sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, int substep, struct sad
     return CUDA(launch_admit)(c, error);
 }
 
-/* Launches go to a side stream while this lives; it begins behind what is on the main one. Parts with a condition have
- * no branches. */
+/* Launches go to a side stream while this lives; it begins behind what is on the main one. */
 namespace {
 struct side_branch {
     struct sadmm_context *c;
@@ -69,7 +67,6 @@ struct side_branch {
     side_branch(struct sadmm_context *context, cudaStream_t side)
         : c(context), main(context->stream), code(cudaSuccess)
     {
-        if (main == c->step->part) return;
         code = cudaEventRecord(c->fork, main);
         if (code == cudaSuccess) code = cudaStreamWaitEvent(side, c->fork, 0);
         c->stream = side;
@@ -97,6 +94,7 @@ static void view_substep(struct sadmm_context *c, int substep)
     s->speculation.contact_rows = plan->contact_rows;
     s->speculation.warm = plan->warm;
     s->speculation.cold = s->cold || !updates_weights(c);
+    s->speculation.unsolved = s->unsolved;
     s->speculation.rows = plan->rows;
     c->view.model.contact_rows = plan->contact_rows == 1 ? 1 : 3;
     CUDA(view_into)(c, s->into, substep);
@@ -168,32 +166,18 @@ static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *e
     return joints ? record_joints(c, error) : SADMM_OK;
 }
 
-/* What is enqueued from here to end_unsolved is done if some island has not been solved before the iterations: a part
- * of the step, where it can be one. */
+/* What is enqueued from here to end_unsolved is left out where every island is planned to be solved before the
+ * iterations. */
 static sadmm_status begin_unsolved(struct sadmm_context *c, bool after, struct sadmm_error *error)
 {
-    struct cuda_step *s = c->step;
-    unsigned long long some = 0;
     const bool measured = c->plan.residuals && !stop_rule_checked(c); /* of iterations, which then are to be made */
-    if (!solves_ncp(c) || measured || c->partition.tier == SADMM_CUDA_TIER_GRID)
-        return SADMM_OK; /* GRID: launches are cooperative */
-    CUDA_CALL(c, make_condition(c->stream, &some), "a condition of the step");
-    if (!some) return SADMM_OK;
-    TRY(CUDA(launch_ncp_ask)(c, after, some, error));
-    CUDA_CALL(c, begin_part(c->stream, some, s->part), "a part of the step");
-    s->main = c->stream;
-    c->stream = s->part;
+    if (!solves_ncp(c) || measured) return SADMM_OK;
+    TRY(CUDA(launch_ncp_check)(c, after, error));
+    c->skips = !c->step->unsolved;
     return SADMM_OK;
 }
 
-static sadmm_status end_unsolved(struct sadmm_context *c, struct sadmm_error *error)
-{
-    struct cuda_step *s = c->step;
-    if (c->stream != s->part) return SADMM_OK;
-    c->stream = s->main;
-    CUDA_CALL(c, end_part(s->part), "a part of the step");
-    return SADMM_OK;
-}
+static void end_unsolved(struct sadmm_context *c) { c->skips = false; }
 
 /* Islands that are solved before the iterations; what the others need, up to SOLUTION, and of their articulations.
  * Contacts are read by the end of every step. */
@@ -299,7 +283,7 @@ static sadmm_status record_articulation_finish(struct sadmm_context *c, struct s
     }
     TRY(begin_unsolved(c, true, error));
     TRY(CUDA(launch_articulations)(c, true, error));
-    TRY(end_unsolved(c, error));
+    end_unsolved(c);
     TRY(wait_for_joints(c, error));
     return CUDA(launch_joint_solution)(c, error);
 }
@@ -309,7 +293,7 @@ static sadmm_status end_iterations(struct sadmm_context *c, struct sadmm_error *
 {
     if (!solves_ncp(c) || c->view.joints.count == 0) return SADMM_OK;
     TRY(CUDA(launch_ncp)(c, true, error));
-    TRY(end_unsolved(c, error));
+    end_unsolved(c);
     return CUDA(launch_ncp_put)(c, error);
 }
 
@@ -502,13 +486,8 @@ sadmm_status CUDA(record_step)(struct sadmm_context *c, bool with_updates, int i
     CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
     s->into = into;
     c->recording = true;
-    const cudaStream_t main = c->stream;
     sadmm_status status = enqueue_step(c, with_updates, error);
-    if (c->stream != main) { /* it has failed within a part */
-        (void)end_part(c->stream);
-        c->stream = main;
-    }
-    c->recording = false;
+    c->recording = c->skips = false;
     s->into = next;
     cudaError_t code = cudaStreamEndCapture(c->stream, &graph);
     if (status == SADMM_OK && code != cudaSuccess) status = CUDA(fail)(c, code, "cudaStreamEndCapture", error);

@@ -179,6 +179,7 @@ sadmm_status CUDA(speculate)(struct sadmm_context *c, struct sadmm_error *error)
                                                                     : SADMM_MAX_POINTS;
     s->speculation.warm = s->plans[0].warm;
     s->speculation.cold = s->cold || !updates_weights(c);
+    s->speculation.unsolved = s->unsolved;
     s->speculation.rows = s->plans[0].rows;
     CUDA(view_counts)(c, generous(seen.counts.pairs));
     c->view.model.points = 0; /* results are read elsewhere */

@@ -93,7 +93,6 @@ void CUDA(step_destroy)(struct sadmm_context *c)
     for (const struct step_graphs &graphs : s->graphs)
         for (cudaGraphExec_t graph : graphs.into)
             if (graph) (void)cudaGraphExecDestroy(graph);
-    if (s->part) (void)cudaStreamDestroy(s->part);
     CUDA(destroy)(s->push);
     COLLISION(destroy)(s->collision);
     sadmm_free(s);
@@ -106,7 +105,6 @@ static sadmm_status step_create(struct sadmm_context *c, struct sadmm_error *err
     if (!s) return sadmm_fail_memory(error, "the cuda backend's world");
     c->step = s;
     TRY(COLLISION(create)(c->device, &s->collision, error));
-    CUDA_CALL(c, cudaStreamCreateWithFlags(&s->part, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     for (struct queued_step &q : s->queue)
         CUDA_CALL(c, cudaEventCreateWithFlags(&q.done, cudaEventDisableTiming), "cudaEventCreate");
     return SADMM_OK;
@@ -169,7 +167,9 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->hits_planned = s->last_hits = false;
     s->calm = 0;
     s->untouched = 0;
-    s->backoff = LEAST_BACKOFF;
+    s->backoff = s->solved_backoff = LEAST_BACKOFF;
+    s->unsolved = false;
+    s->solved = 0;
     for (struct queued_step &q : s->queue) q.update_count = 0;
     memset(&s->last, 0, sizeof s->last);
     memset(&s->now, 0, sizeof s->now);

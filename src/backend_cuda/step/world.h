@@ -45,7 +45,8 @@ struct learned {
     struct cuda_graph_statistics statistics; /* the most of any */
 };
 
-/* Steps that articulations are left alone until it is planned that they are; twice as many each time they were not. */
+/* Steps that articulations are left alone, or all islands solved before the iterations, until it is planned that they
+ * are; twice as many each time they were not. */
 enum { LEAST_BACKOFF = 16, MOST_BACKOFF = 1 << 16 };
 /* Steps without a push until they are planned to have none: to plan takes what a second problem's empty kernels do in
  * as many. */
@@ -79,8 +80,8 @@ struct cuda_step {
 
     bool ncp_trees;             /* some of them are trees (ncp_plan.cu); */
     struct ncp_block_memory ncp_blocks[2]; /* that solve islands: small ones, large ones */
-    cudaStream_t part;          /* parts of a step with a condition are recorded on it; */
-    cudaStream_t main;          /* while such a part is recorded: what it is a part of */
+    bool unsolved;              /* planned: some islands are not solved before the iterations, which are made; */
+    int32_t solved, solved_backoff; /* steps since one was; that it takes until it is planned that all are */
 
     bool pushes;                /* planned: islands are pushed apart, in a second problem (push.cu), */
     bool push_streams;          /* which has not fitted its partition once: tier STREAM */
@@ -276,12 +277,10 @@ sadmm_status CUDA(load_ncp)(struct sadmm_context *, int32_t first_gear, const st
                             struct sadmm_error *error);
 sadmm_status CUDA(reserve_ncp)(struct sadmm_context *, struct sadmm_error *error);
 void CUDA(view_ncp)(struct sadmm_context *);
-/* ncp_solve.cu: islands, before the iterations and what is left after them; the condition of what is done about those
- * that are not solved before; and what is solved is put where iterations begin and where the end of the step reads
- * it. */
+/* ncp_solve.cu: islands, before the iterations and what is left after them; whether there are such, if it was planned
+ * that there are none; and what is solved is put where iterations begin and where the end of the step reads it. */
 sadmm_status CUDA(launch_ncp)(struct sadmm_context *, bool after, struct sadmm_error *error);
-sadmm_status CUDA(launch_ncp_ask)(struct sadmm_context *, bool after, unsigned long long condition,
-                                  struct sadmm_error *error);
+sadmm_status CUDA(launch_ncp_check)(struct sadmm_context *, bool after, struct sadmm_error *error);
 sadmm_status CUDA(launch_ncp_put)(struct sadmm_context *, struct sadmm_error *error);
 cudaError_t CUDA(ncp_allow)(int shared_limit); /* once a device */
 

@@ -38,17 +38,19 @@ static __device__ __forceinline__ bool is_weighed(const cuda_island *island, con
     return args.start || !island->warm;
 }
 
+/* As a solve begins, before there are scales. */
+static __device__ __forceinline__ cuda_island new_island(const double sum[TERMS], const cuda_args &args)
+{
+    return {weight_new_island(), 0, 1, sum[TERM_ANCHORED] > 0, 0, 0,
+            args.may_be_warm && weight_starts_warm(sum[TERM_BALANCE]), sum[TERM_ANCHORED] >= 1};
+}
+
 /* What follows from the sums over an island. Returns whether it starts cold. */
 template <bool SCALES>
 static __device__ __forceinline__ bool weigh_island(cuda_island *island, const double sum[TERMS], const cuda_args &args)
 {
     static_assert(sizeof(struct weight_sums) == TERMS * sizeof(double), "a term for each");
     const struct weight_sums sums = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5]};
-    /* while there are no scales, the terms of these are others */
-    const cuda_island fresh = {weight_new_island(), 0, 1, !SCALES && sum[TERM_ANCHORED] > 0, 0, 0,
-                               !SCALES && args.may_be_warm && weight_starts_warm(sum[TERM_BALANCE]),
-                               !SCALES && sum[TERM_ANCHORED] >= 1};
-    if (args.start) *island = fresh;
     if (!is_weighed(island, args)) return false;
     weight_update_speed(&island->weights, &sums, island->warm ? args.spring_iterations : 0);
     if (!SCALES || island->rows) return !island->warm;

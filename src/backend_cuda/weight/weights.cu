@@ -57,6 +57,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         v.bodies.rigid ? terms_of_body<SCALES, true, ROWS>(v, args, t) : terms_of_body<SCALES, false, ROWS>(v, args, t);
     if (add_up_island<add_terms>(v.graph, v.islands, t, t.live, term, total) && t.lane == 0) {
         cuda_island *island = &v.islands.info[v.graph.label[t.body]];
+        if (!SCALES && args.start) *island = new_island(total, args);
         if (weigh_island<SCALES>(island, total, args)) v.model.statistics->cold = 1;
         if (!SCALES && args.start && !island->anchored) *v.islands.floating = 1;
     }

@@ -79,9 +79,11 @@ sadmm_status sadmm_environments_open_backend(struct sadmm_environments *environm
                                                     .gears = from->gear_ids.count};
     merged->world->resident.copies = &merged->copies;
     merged->refusals = (uint8_t *)sadmm_alloc((size_t)environments->count, 1);
+    merged->left_last = (uint8_t *)sadmm_alloc((size_t)environments->count, 1);
     merged->measures =
         (struct sadmm_copy_measures *)sadmm_alloc((size_t)environments->count, sizeof *merged->measures);
-    if (!merged->refusals || !merged->measures) return sadmm_fail_memory(&environments->error, "environments");
+    if (!merged->refusals || !merged->left_last || !merged->measures)
+        return sadmm_fail_memory(&environments->error, "environments");
     TRY(list_objects(environments));
     TRY(upload(environments, NULL, (size_t)environments->count, (void **)&merged->left));
     TRY(upload(environments, NULL, (size_t)environments->count, (void **)&merged->refused));
@@ -205,15 +207,14 @@ static bool is_of_bodies(sadmm_array array)
            array == SADMM_ARRAY_BODY_INERTIA;
 }
 
-/* Which are marked has changed since. */
 static sadmm_status upload_marks(struct sadmm_environments *environments)
 {
     struct sadmm_merged_world *merged = &environments->merged;
-    if (!environments->marks_changed) return SADMM_OK;
+    const size_t count = (size_t)environments->count;
+    if (memcmp(merged->left_last, environments->marked, count) == 0) return SADMM_OK;
     TRY(pass(environments, kernels_of(environments)->to_backend(merged->world->context, merged->left,
-                                                                environments->marked, (size_t)environments->count,
-                                                                &merged->world->error)));
-    environments->marks_changed = false;
+                                                                environments->marked, count, &merged->world->error)));
+    memcpy(merged->left_last, environments->marked, count);
     return SADMM_OK;
 }
 

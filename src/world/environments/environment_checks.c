@@ -23,7 +23,6 @@ void sadmm_environments_take_mark(struct sadmm_environments *environments, int32
 {
     sadmm_free(environments->marks[environment]);
     environments->marks[environment] = NULL;
-    environments->marks_changed = environments->marks_changed || environments->marked[environment];
     environments->marked[environment] = 0;
 }
 
@@ -32,7 +31,6 @@ void sadmm_environments_put_mark(struct sadmm_environments *environments, int32_
     const size_t size = strlen(why) + 1;
     sadmm_environments_take_mark(environments, environment);
     environments->marked[environment] = 1;
-    environments->marks_changed = true;
     environments->marks[environment] = (char *)sadmm_alloc(size, 1);
     if (environments->marks[environment]) memcpy(environments->marks[environment], why, size);
 }

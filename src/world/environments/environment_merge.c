@@ -273,7 +273,7 @@ void sadmm_environments_free_merged(struct sadmm_environments *environments)
     void *blocks[] = {merged->bodies.slots,    merged->bodies.numbers, merged->shapes.slots, merged->shapes.numbers,
                       merged->joints.slots,    merged->joints.numbers, merged->groups,       merged->progress,
                       merged->contacts,        merged->replaced,       merged->refusals,     merged->measures,
-                      merged->kept,            merged->unwritten,      merged->gravities};
+                      merged->kept,            merged->unwritten,      merged->gravities,  merged->left_last};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
 }
 

@@ -63,8 +63,8 @@ struct sadmm_merged_world {
     bool has_backend;
     struct sadmm_resident_copies copies;
     const int32_t *objects;   /* of rows of bodies; then of rows of anything else */
-    uint8_t *left, *refused;  /* (count) not 0: marked; what is out of range */
-    uint8_t *refusals;        /* (count) as they were read last */
+    uint8_t *left, *refused;  /* (count) not 0: marked; what is out of range; */
+    uint8_t *left_last, *refusals; /* (count) as they were written, and read, last */
     struct sadmm_copy_measures *measures; /* (count) of the last step, where they are */
     bool measurable, measured; /* not read yet, and can be; read */
     bool static_moved;         /* some static body may not be where the template has it */
@@ -93,7 +93,6 @@ struct sadmm_environments {
     size_t kept_count;
     uint8_t *marked; /* (count) */
     char **marks;    /* (count) why; NULL where it is not marked, or no memory was left to say so */
-    bool marks_changed; /* since the backend has seen them */
     void *stream;    /* of the caller, whose work on inputs comes before a step; NULL: the default one */
     uint64_t *seen;  /* (count) the last call that named it */
     uint64_t calls;
