@@ -76,7 +76,7 @@ static __device__ __forceinline__ void store_row(const cuda_view &v, const struc
 
 /* What the joint will keep: as before, but for what the solution says. */
 static __device__ __forceinline__ void begin_memory(const joint_view &joints, int32_t j, int lane, bool winds,
-                                                    double angle, bool acts, vec3 point)
+                                                    double angle, const struct joint_laws &laws, bool acts, vec3 point)
 {
     const struct sadmm_joint_memory *before = &joints.before[j];
     struct sadmm_joint_memory *after = &joints.after[j];
@@ -85,11 +85,13 @@ static __device__ __forceinline__ void begin_memory(const joint_view &joints, in
         after->wrench[lane] = after->local[lane] = 0;
         after->angle[lane] = winds ? angle : before->angle[lane];
         after->left[lane] = before->left[lane];
+        after->expected[lane] = laws.expected, after->missed[lane] = laws.missed, after->ahead[lane] = laws.ahead;
         if (lane < 3) after->point[lane] = acts ? v3_part(point, lane) : 0;
         return;
     }
     if (lane > JOINT_COORDINATES) return;
     after->trapezoid_off = before->trapezoid_off;
+    after->followed = false; /* the end of the step says */
     after->broken = before->broken;
 }
 
@@ -177,6 +179,7 @@ static __global__ void __launch_bounds__(ROWS_JOINTS * LANES)
     struct joint_moving moving;
     struct joint_laws laws;
     laws.count = 0;
+    laws.expected = laws.missed = laws.ahead = 0;
     act_all(v, settings, first_joint, acting_of);
     if (coordinate) {
         moving = joint_moving_of(def, &v.joints.before[j], &acting, lane, &settings);
@@ -198,7 +201,7 @@ static __global__ void __launch_bounds__(ROWS_JOINTS * LANES)
     store_constraints(v, joint, acting, first, lane, rows);
     /* Parts are of all joints, islands of those that act: they are not the same where one does not. */
     if (rows == 0 && joint->constraints > 0 && lane == 0) v.step.control->joints.together = 1;
-    begin_memory(v.joints, j, lane, coordinate && joint_winds(def->locks, lane), coordinate ? moving.value : 0,
+    begin_memory(v.joints, j, lane, coordinate && joint_winds(def->locks, lane), coordinate ? moving.value : 0, laws,
                  rows > 0, enabled ? acting.middle.point : v3(0, 0, 0));
     if (rows == 0) return;
     store_middle(v.joints, j, lane, acting);
@@ -273,6 +276,10 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
             const struct raw_row *row = &v.raw.rows[slots + (size_t)r];
             finite += lambda[r] - lambda[r];
             if (!articulated) v.joints.solution[slots + (size_t)r] = lambda[r];
+            if (joint_role_foresees(source[r].role))
+                memory.expected[source[r].coordinate] += joint_solved_rate(
+                    row->jacobian[0], row->jacobian[1], bodies[0].rigid ? bodies[0].velocity : nullptr,
+                    bodies[1].rigid ? bodies[1].velocity : nullptr);
             joint_keep_row(&memory, middle->axis, source[r].role, source[r].coordinate,
                            source[r].sign * lambda[r] / settings.dt);
             moorings |= joint_mooring(&source[r], lambda[r], bodies);

@@ -37,8 +37,9 @@ static __device__ __forceinline__ void end_joints(const cuda_view &v, int32_t j)
     }
     const struct sadmm_row_constraint *first = &v.raw.constraints[constraint];
     if (first->count == 0) return;
-    joints.after[j].trapezoid_off =
-        joints.touch[articulation_label(v, first->body_a >= 0 ? first->body_a : first->body_b)] & ISLAND_TRAPEZOID_OFF;
+    const int32_t bits = joints.touch[articulation_label(v, first->body_a >= 0 ? first->body_a : first->body_b)];
+    joints.after[j].trapezoid_off = bits & ISLAND_TRAPEZOID_OFF;
+    joints.after[j].followed = joint_island_is_followed(bits);
 }
 
 #endif

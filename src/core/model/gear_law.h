@@ -29,7 +29,7 @@ struct sadmm_resident_gear {
 /* What it is between. */
 struct gear_joint {
     const sadmm_joint_def *def;
-    const struct sadmm_joint_memory *memory; /* of the (sub-)step at hand: angles alone */
+    const struct sadmm_joint_memory *memory; /* of the (sub-)step at hand: angles, and what locks foresee */
     int coordinate;
     double factor;                           /* 1, or the ratio */
 };
@@ -192,7 +192,8 @@ SADMM_INLINE bool gear_leave_carrier(const struct gear_joint joint[GEAR_JOINTS],
         const struct joint_moving m = joint_moving_of(joint[i].def, joint[i].memory, &acting->joint[i], k, settings);
         share[n] *= locks.scale[n];
         gear_add_coordinate(acting, i, k, share[n]);
-        acting->bias += share[n] * (m.turned + joint_feedback(m.value, settings->dt, settings->correction_speed));
+        acting->bias += share[n] * (m.turned + joint_feedback(m.value, settings->dt, settings->correction_speed) -
+                                    joint[i].memory->ahead[k]);
     }
     gear_drop_body(acting, at);
     return reaches;

@@ -36,7 +36,11 @@ struct sadmm_joint_memory {
     double wrench[6], point[3];                        /* as in sadmm_joint_state, on b */
     double local[6];                                   /* the wrench along the axes of a's frame */
     double left[JOINT_COORDINATES];                    /* of locks: articulation_left of their rows; 0: not reported */
+    double expected[JOINT_COORDINATES];                /* of locks and springs: e, and w of the step before, if */
+    double missed[JOINT_COORDINATES];                  /* `followed`; */
+    double ahead[JOINT_COORDINATES];                   /* s of the step at hand (joint_foresee) */
     bool trapezoid_off;                                /* its bodies were moved by the velocities of the step's end */
+    bool followed;                                     /* its bodies were left with what the laws make of them */
     bool broken;                                       /* it gave more than it bears */
 };
 
@@ -268,6 +272,7 @@ enum { JOINT_COORDINATE_LAWS = 6 };
 
 struct joint_laws {
     struct joint_law law[JOINT_COORDINATE_LAWS];
+    double expected, missed, ahead; /* what the joint keeps */
     int count;
 };
 
@@ -283,6 +288,7 @@ struct joint_moving {
     bool turns;           /* by more than a step resolves: its bodies will be moved by the velocities of the step's
                              end, */
     bool late;            /* as they were in the last step, too */
+    double most_missed;   /* joint_most_missed, of locks and springs whose joint is `followed` */
     double reach;         /* it may move by so much */
     double response;
     double dt, most;      /* most: speed of corrections */
@@ -374,6 +380,79 @@ SADMM_INLINE bool joint_turns_within(const struct joint_turn_bounds *bounds, int
     return k >= 3 ? !(fabs(turning) > bounds->rotation) : half * half * bounds->turn2 <= most * most * bounds->around2;
 }
 
+/* What a lock misses. With d = g/dt of its error g, its rate u at the start and the feedback c its law is
+ *
+ *     J (v_0 + v) = u - c + s,     so     d' = d + (u - c + s)/2 + p,     u' = -c + s + q
+ *
+ * with p and q of second order, what J halfway does not see of the motion's curvature. With s = 0 a steady motion has
+ * c = w, w = p + q/2: an error that follows the lock's force, which does work of third order, always of one sign, and
+ * energy grows without end. As the next step begins w is known, from what was expected:
+ *
+ *     w = (d' + u'/2) - e,     e = d + u/2 + (J v + J v_0 - u)
+ *
+ * with J v as solved for: a row that cannot follow its s would wind it up. s takes away the w of the step at hand,
+ * foreseen from the last two. What is left is of higher order; as w is foreseen with some of its change to come, it
+ * takes energy rather than giving it. */
+#define JOINT_FORESIGHT 1.25 /* three hinges at 2 ms: with 1 they gain 0.5 % in 300 s; 1.5 loses twice as much */
+
+/* More than this, of what rows turn by in a step, is no curvature of a motion: bodies have been struck or set
+ * elsewhere. */
+#define JOINT_MOST_MISSED 0.5
+
+/* Nor does it follow a body's spin that turns it by more than this in a step, rad: a fast top's. */
+#define JOINT_MOST_FOLLOWED 0.2
+
+SADMM_INLINE double joint_most_missed_by(const struct joint_turn_bounds *bounds, int k, double dt)
+{
+    if (dt * dt * bounds->turn2 > JOINT_MOST_FOLLOWED * JOINT_MOST_FOLLOWED) return 0;
+    return JOINT_MOST_MISSED * dt * (k >= 3 ? bounds->turn2 : sqrt(bounds->turn2 * bounds->around2));
+}
+
+/* Coordinates that a law holds. */
+SADMM_INLINE bool joint_foresees(const sadmm_joint_def *def, int k)
+{
+    return def->locks >> k & 1 || def->coordinates[k].spring_stiffness > 0;
+}
+
+/* Of the role whose row's J v they expect. */
+SADMM_INLINE bool joint_role_foresees(int role) { return role == SADMM_ROLE_LOCK || role == SADMM_ROLE_SPRING; }
+
+/* With sides of prescribed motion none: what they do next is not known. */
+SADMM_INLINE bool joint_is_prescribed(const struct acting_joint *acting)
+{
+    return acting->side[0].prescribed || acting->side[1].prescribed;
+}
+
+SADMM_INLINE double joint_most_missed(const struct acting_joint *acting, int k, bool radial, double dt)
+{
+    const struct joint_geometry *g = &acting->start;
+    const struct joint_turn_bounds bounds = joint_turn_bounds_of(acting);
+    const double most = joint_most_missed_by(&bounds, k, dt);
+    vec3 past;
+    if (joint_is_prescribed(acting)) return 0;
+    if (!(radial && k == 0)) return most;
+    past = v3_sub(v3_add(v3_load(acting->side[1].velocity), v3_cross(v3_load(acting->side[1].velocity + 3), g->arm_b)),
+                  v3_add(v3_load(acting->side[0].velocity), v3_cross(v3_load(acting->side[0].velocity + 3), g->arm_a)));
+    return most + JOINT_MOST_MISSED * dt * v3_norm2(past) / max_of(g->value[0], JOINT_LEAST_LENGTH);
+}
+
+/* s, of the above. now: d + u/2; missed: w, 0 where it is not known. */
+SADMM_INLINE double joint_foresee(const struct sadmm_joint_memory *memory, int k, double now, double most,
+                                  double *missed)
+{
+    const double last = memory->missed[k], w = now - memory->expected[k];
+    *missed = 0;
+    if (!memory->followed || !(fabs(w) <= most)) return 0;
+    *missed = w;
+    return last == 0 ? -w : JOINT_FORESIGHT * (last - w) - w;
+}
+
+/* J v of a row by what the step has solved for; NULL: the side does not move, or as prescribed. */
+SADMM_INLINE double joint_solved_rate(const double row_a[6], const double row_b[6], const double *a, const double *b)
+{
+    return (a ? joint_row_product(row_a, a) : 0) + (b ? joint_row_product(row_b, b) : 0);
+}
+
 /* Rates of a coordinate: at the start; of the step's row, by velocities at the start, halfway, and free, of sides that
  * move by forces; of those that move as prescribed; the row's response. free, response: not where it is locked, whose
  * law does not ask how it would move. */
@@ -404,6 +483,8 @@ SADMM_INLINE struct joint_moving joint_moving_by(const sadmm_joint_def *def, con
     m.late = memory->trapezoid_off || m.turns;
     m.turned = (m.late ? 0 : m.turning) + m.prescribed; /* the solve's rates are of its bodies alone */
     m.reach = 2 * m.dt * max_of(fabs(m.before), fabs(free));
+    m.most_missed = joint_foresees(def, k) && memory->followed
+                      ? joint_most_missed(acting, k, joint_is_radial(def->kind), settings->dt) : 0;
     return m;
 }
 
@@ -453,14 +534,17 @@ SADMM_INLINE void joint_add_limits(struct joint_laws *laws, const struct joint_m
     }
 }
 
+/* ahead: s; as stiff as it is, it is a lock. */
 SADMM_INLINE void joint_add_spring(struct joint_laws *laws, const struct joint_moving *m, int k, int role,
-                                   double stiffness, double damping, double rest, double speed, double most)
+                                   double stiffness, double damping, double rest, double speed, double most,
+                                   double ahead)
 {
     const double own = joint_late(stiffness, damping, m->response, m->dt), late = m->late ? 1 : own;
     double gain, bias;
     joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late,
                  late + joint_lead(stiffness, damping, own, m->dt), &gain, &bias);
-    joint_add_law(laws, m, role, k, 1, gain, bias + gain * m->turned, 1, -most, most, INFINITY);
+    if (ahead != 0) ahead *= own * m->dt * stiffness / (m->dt * stiffness + damping);
+    joint_add_law(laws, m, role, k, 1, gain, bias + gain * (m->turned - ahead), 1, -most, most, INFINITY);
 }
 
 /* The way that a spring with a table is predicted to go in the step. One that gave nothing meets what moves freely;
@@ -506,9 +590,15 @@ SADMM_INLINE void joint_coordinate_laws(const sadmm_joint_def *def, int k, const
     const sadmm_joint_coordinate *c = &def->coordinates[k];
     const double drive = c->drive_force * m->dt, friction = c->friction * m->dt;
     laws->count = 0;
+    laws->expected = laws->missed = laws->ahead = 0;
+    if (joint_foresees(def, k)) {
+        const double now = m->value / m->dt + m->before / 2;
+        if (!m->late) laws->ahead = joint_foresee(m->memory, k, now, m->most_missed, &laws->missed);
+        laws->expected = now + m->turning; /* with J v once it is known */
+    }
     if (def->locks >> k & 1) {
-        joint_add_law(laws, m, SADMM_ROLE_LOCK, k, 1, 1, m->turned + joint_feedback(m->value, m->dt, m->most), 0,
-                      -INFINITY, INFINITY, 0);
+        const double feedback = joint_feedback(m->value, m->dt, m->most);
+        joint_add_law(laws, m, SADMM_ROLE_LOCK, k, 1, 1, m->turned + feedback - laws->ahead, 0, -INFINITY, INFINITY, 0);
         return;
     }
     if (c->limited) joint_add_limits(laws, m, k, c);
@@ -516,12 +606,12 @@ SADMM_INLINE void joint_coordinate_laws(const sadmm_joint_def *def, int k, const
         joint_add_law(laws, m, SADMM_ROLE_DRIVE, k, 1, 1, m->turned - c->target_speed, 0, -drive, drive, 0);
     if (c->drive == SADMM_DRIVE_POSITION && drive > 0)
         joint_add_spring(laws, m, k, SADMM_ROLE_DRIVE, c->drive_stiffness, c->drive_damping, c->target_position,
-                         c->target_speed, drive);
+                         c->target_speed, drive, 0);
     if (friction > 0) joint_add_law(laws, m, SADMM_ROLE_FRICTION, k, 1, 1, m->turned, 0, -friction, friction, 0);
     if (table) joint_add_table_spring(laws, m, k, c, table);
     else if (c->spring_stiffness > 0 || c->spring_damping > 0)
         joint_add_spring(laws, m, k, SADMM_ROLE_SPRING, c->spring_stiffness, c->spring_damping, c->spring_rest, 0,
-                         INFINITY);
+                         INFINITY, laws->ahead);
     if (c->armature > 0) /* lambda = -armature (rate at the end - rate at the start) */
         joint_add_law(laws, m, SADMM_ROLE_ARMATURE, k, 1, c->armature, c->armature * (m->turned - m->before), 1,
                       -INFINITY, INFINITY, 0);
@@ -563,6 +653,7 @@ SADMM_INLINE void joint_forget_forces(struct sadmm_joint_memory *memory)
         memory->wrench[k] = memory->local[k] = 0;
         if (k < 3) memory->point[k] = 0;
     }
+    memory->followed = false;
 }
 
 /* A row's multiplier, as a force and as what it is in the world, about the joint's point; axis: in the middle of the

@@ -32,6 +32,13 @@ enum {
  * that is moved to close a joint has another orientation for its spin. */
 SADMM_INLINE bool joint_island_may_open(int bits) { return (bits & (ISLAND_STRAYS | ISLAND_TURNS)) != 0; }
 
+/* Are its bodies left with what the laws of locks make of them (joint_foresee)? Not if joints may be closed, or are
+ * because they fold, or bodies have an inertia that is none. */
+SADMM_INLINE bool joint_island_is_followed(int bits)
+{
+    return !(bits & (ISLAND_TRAPEZOID_OFF | ISLAND_CLOSED)) && !joint_island_may_open(bits);
+}
+
 /* A body as the step ends. */
 struct joint_trapezoid {
     const struct sadmm_rigid *rigid; /* at the start; NULL: it does not move */

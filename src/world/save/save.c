@@ -13,7 +13,7 @@
 #include "world/resident/resident.h"
 
 /* Raised with every change of what is written. */
-enum { FORMAT = 6 };
+enum { FORMAT = 7 };
 
 struct header {
     char magic[8];

@@ -8,7 +8,7 @@
 #include "world/objects/joint.h"
 #include "world/objects/joint_slots.h"
 
-LISTED(struct sadmm_joint_memory, 560);
+LISTED(struct sadmm_joint_memory, 704);
 
 static void archive_joint_def(struct sadmm_archive *archive, sadmm_joint_def *def)
 {
@@ -25,7 +25,10 @@ static void archive_joint_memory(struct sadmm_archive *archive, struct sadmm_joi
     SADMM_ARCHIVE(archive, m->point);
     SADMM_ARCHIVE(archive, m->local);
     SADMM_ARCHIVE(archive, m->left);
+    SADMM_ARCHIVE(archive, m->expected);
+    SADMM_ARCHIVE(archive, m->missed);
     sadmm_archive_flag(archive, &m->trapezoid_off);
+    sadmm_archive_flag(archive, &m->followed);
     sadmm_archive_flag(archive, &m->broken);
 }
 
@@ -52,7 +55,8 @@ static bool memory_fits(const struct sadmm_joint_memory *m)
     return sadmm_all_finite(m->force[0], SADMM_ROLE_COUNT * JOINT_COORDINATES) &&
            sadmm_all_finite(m->angle, JOINT_COORDINATES) && sadmm_all_finite(m->wrench, 6) &&
            sadmm_all_finite(m->point, 3) && sadmm_all_finite(m->local, 6) &&
-           sadmm_all_finite(m->left, JOINT_COORDINATES);
+           sadmm_all_finite(m->left, JOINT_COORDINATES) && sadmm_all_finite(m->expected, JOINT_COORDINATES) &&
+           sadmm_all_finite(m->missed, JOINT_COORDINATES);
 }
 
 static bool joint_fits(const sadmm_world *world, struct sadmm_world_joint *joint, struct sadmm_error *error)

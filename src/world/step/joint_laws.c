@@ -56,6 +56,7 @@ static int put_coordinate(struct sadmm_world_joint *joint, const struct acting_j
     const struct joint_table table = {joint->table[k], joint->table[k] ? joint->table[k] + joint->table_count[k] : NULL,
                                       joint->table_count[k]};
     joint_coordinate_laws(&joint->def, k, &m, joint->table[k] ? &table : NULL, &laws);
+    joint->next.expected[k] = laws.expected, joint->next.missed[k] = laws.missed, joint->next.ahead[k] = laws.ahead;
     for (int i = 0; i < laws.count; ++i) {
         put_row(acting, rates, k, laws.law[i].sign, r + (size_t)i, to);
         put_law(joint, &laws.law[i], r + (size_t)i, settings->dt, to);
@@ -67,7 +68,7 @@ static int put_coordinate(struct sadmm_world_joint *joint, const struct acting_j
 
 /* What the laws of locked coordinates are made of, in joint_moving's terms. */
 struct locks {
-    double turned[SIX_RATES], feedback[SIX_RATES];
+    double turning[SIX_RATES], turned[SIX_RATES], feedback[SIX_RATES];
     bool beyond[SIX_RATES]; /* not joint_turns_within */
 };
 
@@ -90,6 +91,7 @@ static inline void find_locks(const struct acting_joint *acting, const struct jo
                 half = lanes_fill(dt / 2) * row_turning, bound = lanes_fill(bounds->rotation);
     const lanes_mask within = first ? (row_turning <= bound) & (-row_turning <= bound)
                                 : half * half * lanes_fill(bounds->turn2) <= lanes_fill(most * most * bounds->around2);
+    lanes_put(turning, out->turning + first);
     lanes_put((late ? lanes_fill(0) : turning) + prescribed, out->turned + first);
     lanes_put(clamped(lanes_fill(JOINT_FEEDBACK) * lanes_at(acting->start.value + first) / lanes_fill(dt),
                       settings->correction_speed),
@@ -98,26 +100,33 @@ static inline void find_locks(const struct acting_joint *acting, const struct jo
 }
 
 /* Of all of them, where none is a length. */
-static int put_locks(const struct sadmm_world_joint *joint, const struct acting_joint *acting,
+static int put_locks(struct sadmm_world_joint *joint, const struct acting_joint *acting,
                      const struct joint_rates *rates, const struct joint_turn_bounds *bounds,
                      const sadmm_settings *settings, const struct joint_row_lists *to)
 {
     const double *force = joint->next.force[SADMM_ROLE_LOCK];
+    const bool off = joint->next.trapezoid_off, follows = joint->next.followed && !joint_is_prescribed(acting);
+    const double most[2] = {follows ? joint_most_missed_by(bounds, 0, settings->dt) : 0,
+                            follows ? joint_most_missed_by(bounds, 3, settings->dt) : 0};
     struct locks locks;
     size_t r = 0;
-    if (joint->def.locks & 7)
-        find_locks(acting, rates, bounds, joint->next.trapezoid_off, 0, settings, &locks);
-    if (joint->def.locks & ~7u)
-        find_locks(acting, rates, bounds, joint->next.trapezoid_off, 3, settings, &locks);
+    if (joint->def.locks & 7) find_locks(acting, rates, bounds, off, 0, settings, &locks);
+    if (joint->def.locks & ~7u) find_locks(acting, rates, bounds, off, 3, settings, &locks);
     for (uint32_t left = joint->def.locks & JOINT_ALL_LOCKED; left; left &= left - 1, ++r) {
         const int k = __builtin_ctz(left);
         const double prescribed = rates->prescribed[k],
                      turning = rates->start[k] + prescribed - rates->before[k];
-        const bool turns = locks.beyond[k] && joint_turns(acting, k, false, turning, settings->dt);
+        const bool turns = locks.beyond[k] && joint_turns(acting, k, false, turning, settings->dt),
+                   late = off || turns;
+        const double now = acting->start.value[k] / settings->dt + rates->before[k] / 2;
+        double missed = 0;
+        const double ahead = late ? 0 : joint_foresee(&joint->next, k, now, most[k / 3], &missed);
+        joint->next.expected[k] = now + locks.turning[k];
+        joint->next.missed[k] = missed, joint->next.ahead[k] = ahead;
         put_row(acting, rates, k, 1, r, to);
         to->gain[r] = 1, to->compliance[r] = 0;
         to->lo[r] = -INFINITY, to->hi[r] = INFINITY;
-        to->bias[r] = (turns ? prescribed : locks.turned[k]) + locks.feedback[k];
+        to->bias[r] = (turns ? prescribed : locks.turned[k]) + locks.feedback[k] - ahead;
         to->lambda[r] = to->multiplier[r] = force[k] * settings->dt;
         to->source[r] = (struct sadmm_joint_source){
             joint->number, SADMM_ROLE_LOCK, (int8_t)k, 1, 0, turns ? INFINITY : 0, prescribed};

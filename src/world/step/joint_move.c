@@ -134,5 +134,10 @@ sadmm_status sadmm_world_move_articulated(sadmm_world *world, const sadmm_settin
             *island_of(world, constraint->body_a, constraint->body_b) & ISLAND_TRAPEZOID_OFF;
     }
     TRY(sadmm_world_close_joints(world, settings, off));
+    for (size_t k = 0; k < system.rows->constraint_count; ++k) {
+        const struct sadmm_row_constraint *constraint = &system.rows->constraints[k];
+        world->step_joints[world->joint_sources[constraint->first].joint]->next.followed =
+            joint_island_is_followed(*island_of(world, constraint->body_a, constraint->body_b));
+    }
     return sadmm_world_restore_articulated(world, settings);
 }

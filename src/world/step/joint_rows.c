@@ -169,6 +169,13 @@ static void end_joint(sadmm_world *world, struct sadmm_world_joint *joint, const
                       acting->middle.arm_b, dt);
 }
 
+/* As the step has solved for it; NULL: the side does not move, or as prescribed. */
+static const double *velocity_of(const sadmm_world *world, const struct acting_joint *acting, int s)
+{
+    const int32_t body = acting->side[s].system_body;
+    return body >= 0 ? world->velocity + 6 * (size_t)body : NULL;
+}
+
 void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
 {
     const struct sadmm_rows *rows = &world->start.rows;
@@ -183,6 +190,10 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
             v3_store(acting->middle.point, joint->next.point);
         }
         const double force = source->sign * rows->lambda[r] / settings->dt;
+        if (joint_role_foresees(source->role))
+            joint->next.expected[source->coordinate] +=
+                joint_solved_rate(rows->jacobian_a + 6 * r, rows->jacobian_b + 6 * r, velocity_of(world, acting, 0),
+                                  velocity_of(world, acting, 1));
         joint_keep_row(&joint->next, acting->middle.axis, source->role, source->coordinate, force);
     }
     if (joint) end_joint(world, joint, acting, settings->dt);
