@@ -317,6 +317,13 @@ static void on_queries(void)
     REFUSES("rays", sadmm_world_cast_rays(world, 1, NULL, NULL, &hit));
     REFUSES("hits", sadmm_world_cast_rays(world, 1, &ray, NULL, NULL));
     ck_assert_int_eq(sadmm_world_cast_rays(world, 0, NULL, NULL, NULL), SADMM_OK);
+    REFUSES("world", sadmm_world_cast_shape(NULL, &def, zero, unit, ray.direction, 1, NULL, &hit));
+    REFUSES("def", sadmm_world_cast_shape(world, NULL, zero, unit, ray.direction, 1, NULL, &hit));
+    REFUSES("position", sadmm_world_cast_shape(world, &def, NULL, unit, ray.direction, 1, NULL, &hit));
+    REFUSES("orientation", sadmm_world_cast_shape(world, &def, zero, NULL, ray.direction, 1, NULL, &hit));
+    REFUSES("direction", sadmm_world_cast_shape(world, &def, zero, unit, NULL, 1, NULL, &hit));
+    REFUSES("hit", sadmm_world_cast_shape(world, &def, zero, unit, ray.direction, 1, NULL, NULL));
+    ck_assert_int_eq(sadmm_world_cast_shape(world, &def, zero, unit, ray.direction, 1, NULL, &hit), SADMM_OK);
     REFUSES("world", sadmm_world_overlap_box(NULL, zero, zero, NULL, 1, &id, &count));
     REFUSES("lowest", sadmm_world_overlap_box(world, NULL, zero, NULL, 1, &id, &count));
     REFUSES("highest", sadmm_world_overlap_box(world, zero, NULL, NULL, 1, &id, &count));
@@ -649,8 +656,8 @@ static const struct {
     {on_gears,
      {W(add_gear), W(remove_gear), W(gear_count), W(gear_at), W(gear_def_sized), W(set_gear_enabled), W(gear_state)}},
     {on_queries,
-     {W(cast_ray), W(cast_ray_all), W(cast_rays), W(overlap_box), W(overlap_shape), W(closest_points),
-      W(closest_to_shape)}},
+     {W(cast_ray), W(cast_ray_all), W(cast_rays), W(cast_shape), W(overlap_box), W(overlap_shape),
+      W(closest_points), W(closest_to_shape)}},
     {on_events, {W(record_events), W(event_capacity), W(event_count), W(take_events), W(sensor_overlaps)}},
     {on_steps,
      {W(step), W(step_async), W(wait), W(report_sized), W(contact_count), W(contacts), W(contact_errors), W(state_hash),

@@ -1,4 +1,4 @@
-/* Spatial queries: ray casts, overlaps, closest points.
+/* Spatial queries: ray casts, shape casts, overlaps, closest points.
  *
  * Queries see all shapes of dynamic, kinematic and static bodies after the steps begun so far. They compute in double;
  * results do not depend on the world's precision, backend or threads, nor on the order in which bodies were added.
@@ -33,8 +33,9 @@ typedef struct sadmm_query_filter {
     int32_t environment;     /* of bodies that collide with this environment (sadmm_body_def); >= 0, or -1, the default:
                                 of any */
     uint32_t category, mask; /* that would collide with a shape with these (sadmm_shape_def); default both 0: any */
-    bool from_inside;        /* rays: also shapes that contain the origin, at distance 0; default true */
-    bool from_behind;        /* rays: also the back of mesh triangles; default false */
+    bool from_inside;        /* rays: also shapes that contain the origin, at distance 0; shape casts: also shapes
+                                that overlap it where it begins; default true */
+    bool from_behind;        /* rays and shape casts: also the back of mesh triangles; default false */
     bool sensors;            /* also sensors; default false */
 } sadmm_query_filter;
 
@@ -93,6 +94,25 @@ SADMM_API sadmm_status sadmm_world_cast_ray_all(sadmm_world *world, const sadmm_
  * names the first ray that is refused. */
 SADMM_API sadmm_status sadmm_world_cast_rays(sadmm_world *world, int32_t count, const sadmm_ray *rays,
                                              const sadmm_query_filter *filter, sadmm_ray_hit *hits);
+
+/* ---- shape casts ------------------------------------------------------------------------------------------------- */
+
+/* What the shape in `def`, on a body at this pose (as in sadmm_world_overlap_shape, but no PLANE), touches first if it
+ * moves along `direction` (as of a ray) without turning, by up to `length` m (>= 0; may be infinite); among equal
+ * distances, the shape with the lowest slot. Of *hit, `distance` is how far it moves until they touch, in [0, length];
+ * `point` is where (of a face or an edge that touches, one of its points), `normal` the other shape's there, outward.
+ *
+ * What it overlaps where it begins is hit at distance 0, with `inside`, `point` and `normal` as of
+ * sadmm_world_closest_to_shape; with filter.from_inside = false not at all, so that it can be moved out. What it only
+ * touches there, to within 4e-12 of the sizes and the distance between, is hit if it moves into it, and not as long as
+ * it slides along it. A mesh is hit from the front (with filter.from_behind from both sides), and its triangles one by
+ * one: what slides over it finds no edges inside of it.
+ *
+ * Accuracy: distances to 1e-11 of the sizes and the way, unless it grazes what it hits within 0.01 rad; whether it hits
+ * what it grazes is decided to that tolerance. Errors: STALE_ID (filter->ignored). */
+SADMM_API sadmm_status sadmm_world_cast_shape(sadmm_world *world, const sadmm_shape_def *def, const double position[3],
+                                              const double orientation[4], const double direction[3], double length,
+                                              const sadmm_query_filter *filter, sadmm_ray_hit *hit);
 
 /* ---- overlaps ---------------------------------------------------------------------------------------------------- */
 

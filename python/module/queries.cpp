@@ -88,6 +88,39 @@ void bind_queries(nb::class_<world> &w)
 {
     w.def("_cast_rays", &cast_rays, "origins"_a.noconvert(), "directions"_a.noconvert(), "length"_a, "ignore"_a.none(),
           "types"_a, "category"_a, "mask"_a, "from_inside"_a, "from_behind"_a, "sensors"_a);
+    w.def(
+        "cast_shape",
+        [](nb::handle_t<world> self, const shape_def &shape_, numbers<3> direction, numbers<3> position,
+           numbers<4> orientation, double length, const std::optional<body> &ignore,
+           const std::vector<std::string> &types, whole category, whole mask, bool from_inside, bool from_behind,
+           bool sensors) -> std::optional<nb::dict> {
+            world &w = nb::cast<world &>(self);
+            const sadmm_shape_def def = shape_.def; // another thread may change it
+            const vec3 way = direction.as("direction"), x = position.as("position");
+            const quat q = orientation.as("orientation");
+            const sadmm_query_filter filter =
+                filter_of(w, ignore, types, category, mask, from_inside, from_behind, sensors);
+            sadmm_ray_hit hit;
+            call(w, [&](sadmm_world *h) {
+                return sadmm_world_cast_shape(h, &def, x.data(), q.data(), way.data(), length, &filter, &hit);
+            });
+            if (hit.shape.slot == 0) return std::nullopt;
+            nb::dict out;
+            out["shape"] = shape{nb::borrow(self), &w, hit.shape};
+            out["distance"] = hit.distance;
+            out["point"] = array_of<3>(hit.point), out["normal"] = array_of<3>(hit.normal);
+            out["triangle"] = hit.triangle;
+            out["inside"] = hit.inside;
+            return out;
+        },
+        "shape"_a, "direction"_a, "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0},
+        "length"_a = std::numeric_limits<double>::infinity(), nb::kw_only(), "ignore"_a.none() = nb::none(),
+        "types"_a = std::vector<std::string>{}, "category"_a = 0, "mask"_a = 0, "from_inside"_a = true,
+        "from_behind"_a = false, "sensors"_a = false,
+        "What a shape definition at a pose in the world touches first as it moves along `direction` without turning, "
+        "by up to `length` m: a dict with shape, distance (m, that it moves), point and normal (of the shape it "
+        "touches, outward; world), triangle (of a mesh, else -1), inside (they overlap where it begins); None: "
+        "nothing. Filters as of cast_rays.");
     w.def("overlap_box", [](nb::handle_t<world> self, numbers<3> from, numbers<3> to) {
         const vec3 lowest = from.as("lowest"), highest = to.as("highest");
         return overlaps(self, [&](sadmm_world *h, int32_t capacity, sadmm_shape_id *ids, int32_t *count) {

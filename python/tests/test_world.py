@@ -316,6 +316,18 @@ def test_queries():
     apart = world.closest_points(cube, globe)
     assert apart["distance"] == pytest.approx(1.7) and apart["normal"] == pytest.approx([1, 0, 0])
     assert world.closest_to(subadmm.sphere(0.1), globe, position=(2, 0, 2))["distance"] == pytest.approx(0.7)
+    onto = world.cast_shape(subadmm.sphere(0.1), (0, 0, -2), position=(2, 0, 3))
+    assert onto["shape"] == globe and onto["distance"] == pytest.approx(1.7) and not onto["inside"]
+    assert onto["normal"] == pytest.approx([0, 0, 1]) and onto["point"] == pytest.approx([2, 0, 1.2])
+    assert onto["triangle"] == -1
+    assert world.cast_shape(subadmm.sphere(0.1), (0, 0, -1), position=(2, 0, 3), length=1.6) is None
+    past = world.cast_shape(subadmm.sphere(0.1), (0, 0, -1), position=(2, 0, 3), ignore=ball)
+    assert past["shape"] == ground and past["distance"] == pytest.approx(2.9)
+    inside = world.cast_shape(subadmm.sphere(0.1), (1, 0, 0), position=(2, 0, 1))
+    assert inside["shape"] == globe and inside["inside"] and inside["distance"] == 0
+    assert world.cast_shape(subadmm.sphere(0.1), (1, 0, 0), position=(2, 0, 1), from_inside=False) is None
+    with pytest.raises(subadmm.InvalidArgument, match="direction"):
+        world.cast_shape(subadmm.sphere(0.1), (0, 0, 0))
     with pytest.raises(subadmm.InvalidArgument, match="direction"):
         world.cast_rays([[0, 0, 5]], [[0, 0, 0]])
     with pytest.raises(ValueError, match="as many"):

@@ -10,7 +10,7 @@ bool sadmm_closest_is_known(int type_a, int type_b)
     return pair_is_listed(type_a, type_b) || type_a + type_b == SADMM_SHAPE_PLANE + SADMM_SHAPE_MESH;
 }
 
-static struct closest_pose pose_of(const struct sadmm_placed *a, const struct sadmm_placed *b)
+struct closest_pose sadmm_closest_pose(const struct sadmm_placed *a, const struct sadmm_placed *b)
 {
     struct closest_pose pose;
     mat3 columns; /* of a's axes in b's frame */
@@ -122,7 +122,7 @@ static bool closest_in_order(const struct sadmm_placed *a, const struct sadmm_pl
                              struct sadmm_separation *separation)
 {
     if (a->geometry.type == SADMM_SHAPE_PLANE) return plane_closest(a, b, limit, separation);
-    const struct closest_pose pose = pose_of(a, b);
+    const struct closest_pose pose = sadmm_closest_pose(a, b);
     if (b->geometry.type == SADMM_SHAPE_MESH) return sadmm_closest_on_mesh(a, b, &pose, limit, separation);
     if (is_round(b->geometry.type)) return rounds_closest(&a->geometry, &b->geometry, &pose, limit, separation);
     return convex_closest(a, b, &pose, limit, separation);

@@ -20,14 +20,16 @@ struct search {
     struct sadmm_separation *separation;
 };
 
-/* Of the triangle's polytope. */
-static void triangle_pair(const struct search *s, const struct mesh_triangle *t, double *thin, double *size, vec3 *move)
+/* ---- one triangle ------------------------------------------------------------------------------------------------ */
+
+static void triangle_pair(const struct sadmm_placed *a, const struct closest_pose *pose, const struct mesh_triangle *t,
+                          double *thin, double *size, vec3 *move)
 {
     double reach2 = 0;
     for (int k = 0; k < 3; ++k) reach2 = max_of(reach2, v3_norm2(mesh_corner(t, k)));
-    *thin = geometry_thickness(&s->a->geometry);
-    *move = v3_sub(s->pose->t, t->origin);
-    *size = geometry_radius(&s->a->geometry) + sqrt(reach2) + v3_norm(*move);
+    *thin = geometry_thickness(&a->geometry);
+    *move = v3_sub(pose->t, t->origin);
+    *size = geometry_radius(&a->geometry) + sqrt(reach2) + v3_norm(*move);
 }
 
 /* Straight to the front of the triangle; point: the body's farthest behind. */
@@ -37,13 +39,13 @@ static void to_the_front(vec3 normal, vec3 point, struct sadmm_separation *separ
     closest_put(v3_neg(normal), height, point, v3_madd(point, -height, normal), separation);
 }
 
-static bool touches_polytope(const struct search *s, const struct mesh_triangle *t, double limit,
-                             struct sadmm_separation *separation)
+static bool touches_polytope(const struct sadmm_placed *a, const struct closest_pose *pose,
+                             const struct mesh_triangle *t, double limit, struct sadmm_separation *separation)
 {
-    struct polytope_pair pair = {.R = s->pose->R};
-    triangle_pair(s, t, &pair.thin, &pair.size, &pair.t);
+    struct polytope_pair pair = {.R = pose->R};
+    triangle_pair(a, pose, t, &pair.thin, &pair.size, &pair.t);
     pair.slack = 8 * SADMM_EPSILON * pair.size;
-    polytope_of(&s->a->geometry, s->a->blocks, &pair.a);
+    polytope_of(&a->geometry, a->blocks, &pair.a);
     mesh_triangle_polytope(t, &pair.b);
     if (!closest_of_polytopes(&pair, v3_neg(t->normal), limit, separation)) return false;
     if (separation->distance < 0 && v3_dot(separation->normal, t->normal) > 0) {
@@ -53,13 +55,13 @@ static bool touches_polytope(const struct search *s, const struct mesh_triangle 
     return true;
 }
 
-static bool touches_smooth(const struct search *s, const struct mesh_triangle *t, double limit,
-                           struct sadmm_separation *separation)
+static bool touches_smooth(const struct sadmm_placed *a, const struct closest_pose *pose, const struct mesh_triangle *t,
+                           double limit, struct sadmm_separation *separation)
 {
-    struct convex_pair pair = {.R = s->pose->R};
+    struct convex_pair pair = {.R = pose->R};
     const struct difference_point zero = {{0, 0, 0}, 0, 0};
-    triangle_pair(s, t, &pair.thin, &pair.size, &pair.t);
-    convex_of(&s->a->geometry, s->a->blocks, &pair.a);
+    triangle_pair(a, pose, t, &pair.thin, &pair.size, &pair.t);
+    convex_of(&a->geometry, a->blocks, &pair.a);
     pair.b.form = CONVEX_POLYTOPE;
     mesh_triangle_polytope(t, &pair.b.p);
     convex_pair_finish(&pair);
@@ -71,6 +73,18 @@ static bool touches_smooth(const struct search *s, const struct mesh_triangle *t
     return true;
 }
 
+bool sadmm_closest_on_triangle(const struct sadmm_placed *a, const struct closest_pose *pose,
+                               const struct mesh_triangle *triangle, double limit, struct sadmm_separation *separation)
+{
+    if (!(geometry_is_smooth(&a->geometry) ? touches_smooth : touches_polytope)(a, pose, triangle, limit, separation))
+        return false;
+    separation->a = v3_add(separation->a, triangle->origin);
+    separation->b = v3_add(separation->b, triangle->origin);
+    return true;
+}
+
+/* ---- all of them ------------------------------------------------------------------------------------------------- */
+
 static double limit_of(const struct search *s) { return s->limit > 0 ? s->limit : 0; }
 
 static void try_triangle(struct search *s, int32_t triangle)
@@ -78,13 +92,10 @@ static void try_triangle(struct search *s, int32_t triangle)
     struct mesh_triangle t;
     struct sadmm_separation separation;
     mesh_triangle_of(s->mesh, triangle, &t);
-    if (!(geometry_is_smooth(&s->a->geometry) ? touches_smooth : touches_polytope)(s, &t, limit_of(s), &separation))
-        return;
+    if (!sadmm_closest_on_triangle(s->a, s->pose, &t, limit_of(s), &separation)) return;
     if (separation.distance > s->limit ||
         (s->found && separation.distance == s->limit && triangle > s->separation->triangle)) return;
     separation.triangle = triangle;
-    separation.a = v3_add(separation.a, t.origin);
-    separation.b = v3_add(separation.b, t.origin);
     *s->separation = separation;
     s->limit = separation.distance;
     s->found = true;

@@ -12,8 +12,14 @@ struct closest_pose {
     mat3 R;
     vec3 t;
 };
+struct closest_pose sadmm_closest_pose(const struct sadmm_placed *a, const struct sadmm_placed *b);
 /* a: not a plane; b: a mesh. In the frame of b. */
 bool sadmm_closest_on_mesh(const struct sadmm_placed *a, const struct sadmm_placed *b, const struct closest_pose *pose,
                            double limit, struct sadmm_separation *separation);
+
+/* The same of one triangle of it. */
+struct mesh_triangle;
+bool sadmm_closest_on_triangle(const struct sadmm_placed *a, const struct closest_pose *pose,
+                               const struct mesh_triangle *triangle, double limit, struct sadmm_separation *separation);
 
 #endif

@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "collision/mesh/mesh.h"
 #include "core/base/check.h"
 #include "core/base/memory.h"
 #include "query_scene.h"
@@ -22,22 +21,26 @@ static bool is_ray(const sadmm_ray *ray)
            isfinite(d[1]) && isfinite(d[2]) && (d[0] != 0 || d[1] != 0 || d[2] != 0) && ray->length >= 0;
 }
 
+sadmm_status sadmm_query_check_direction(const char *name, const double d[3], struct sadmm_error *error)
+{
+    TRY(sadmm_check_vector(name, d, 3, HUGE_VAL, error));
+    if (d[0] != 0 || d[1] != 0 || d[2] != 0) return SADMM_OK;
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s = (0, 0, 0): must not be 0", name);
+}
+
 /* What is wrong with one that is none. `name`: "ray->" or "rays[17].". */
 static sadmm_status check_ray(const sadmm_ray *ray, const char *name, struct sadmm_error *error)
 {
     if (is_ray(ray)) return SADMM_OK;
     char field[48];
-    const double *d = ray->direction;
     snprintf(field, sizeof field, "%sorigin", name);
     TRY(sadmm_check_vector(field, ray->origin, 3, ORIGIN_LIMIT, error));
     snprintf(field, sizeof field, "%sdirection", name);
-    TRY(sadmm_check_vector(field, d, 3, HUGE_VAL, error));
-    if (!(d[0] != 0 || d[1] != 0 || d[2] != 0))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s = (0, 0, 0): must not be 0", field);
+    TRY(sadmm_query_check_direction(field, ray->direction, error));
     return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%slength = %g: must be >= 0 m", name, ray->length);
 }
 
-static void make_unit(const double d[3], double unit[3])
+void sadmm_query_make_unit(const double d[3], double unit[3])
 {
     double scaled[3] = {d[0], d[1], d[2]}, length2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     if (!(length2 > 1e-200 && length2 < 1e200)) { /* by a power of two, which changes no digit */
@@ -55,7 +58,7 @@ static struct sadmm_ray_line line_of(const sadmm_ray *ray, const sadmm_query_fil
     struct sadmm_ray_line line = {
         .length = ray->length, .from_inside = filter->from_inside, .from_behind = filter->from_behind};
     memcpy(line.origin, ray->origin, sizeof line.origin);
-    make_unit(ray->direction, line.direction);
+    sadmm_query_make_unit(ray->direction, line.direction);
     return line;
 }
 
@@ -71,11 +74,7 @@ static void give_hit(const sadmm_world *world, const struct sadmm_ray_line *line
         hit->point[k] = line->origin[k] + find->distance * line->direction[k];
         hit->normal[k] = find->normal[k];
     }
-    hit->triangle = find->triangle;
-    if (find->triangle >= 0) {
-        const int32_t *source = world->block_shapes[found->slot].mesh->source;
-        if (source) hit->triangle = source[find->triangle];
-    }
+    hit->triangle = sadmm_world_source_triangle(world, found->slot, find->triangle);
     hit->inside = find->inside;
 }
 

@@ -6,6 +6,7 @@
 #include "collision/hull/hull.h"
 #include "collision/hull/hull_data.h"
 #include "collision/hull/hull_write.h"
+#include "collision/mesh/mesh.h"
 #include "core/base/growing.h"
 #include "core/base/memory.h"
 #include "query_scene.h"
@@ -43,6 +44,12 @@ sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filte
     if (!sadmm_world_find_body(world, given->ignored, "filter->ignored", error)) return SADMM_ERROR_STALE_ID;
     taken->ignored = (int32_t)given->ignored.slot - 1;
     return SADMM_OK;
+}
+
+int32_t sadmm_world_source_triangle(const sadmm_world *world, uint32_t slot, int32_t triangle)
+{
+    const int32_t *source = triangle >= 0 ? world->block_shapes[slot].mesh->source : NULL;
+    return source ? source[triangle] : triangle;
 }
 
 void sadmm_world_place_shape(const sadmm_world *world, uint32_t slot, struct sadmm_placed *placed)

@@ -4,7 +4,6 @@
 
 #include "collision/base/radix_sort.h"
 #include "collision/hull/hull.h"
-#include "collision/mesh/mesh.h"
 #include "collision/query/closest.h"
 #include "core/base/check.h"
 #include "core/base/definition_fields.h"
@@ -23,8 +22,8 @@ enum { SLOT_BITS = 28 };
 
 /* ---- a shape that is none of the world's ------------------------------------------------------------------------- */
 
-static sadmm_status take_shape(sadmm_world *world, const sadmm_shape_def *given, const double position[3],
-                               const double orientation[4], struct sadmm_placed *placed)
+sadmm_status sadmm_world_take_query_shape(sadmm_world *world, const sadmm_shape_def *given, const double position[3],
+                                          const double orientation[4], struct sadmm_placed *placed)
 {
     struct sadmm_error *error = &world->error;
     double own[4], turn[4], at[3], axes[4];
@@ -141,7 +140,7 @@ sadmm_status sadmm_world_overlap_shape(sadmm_world *world, const sadmm_shape_def
     size_t found;
     TRY(sadmm_world_check_overlap_room(capacity, shapes, count, &world->error));
     TRY(sadmm_world_take_filter(world, filter, &taken, &given));
-    TRY(take_shape(world, def, position, orientation, &shape));
+    TRY(sadmm_world_take_query_shape(world, def, position, orientation, &shape));
     placed_box(&shape, &box);
     TRY(sadmm_world_list_overlaps(world, &box, &shape, &taken, &found));
     sadmm_world_give_overlaps(world, found, capacity, shapes, count);
@@ -165,12 +164,8 @@ static sadmm_status find_closest(sadmm_world *world, const struct sadmm_placed *
     v3_store(separation.normal, closest->normal);
     v3_store(separation.a, closest->a);
     v3_store(separation.b, closest->b);
-    closest->triangle = separation.triangle;
-    if (separation.triangle >= 0) {
-        const uint32_t slot = type_a == SADMM_SHAPE_MESH ? a->slot : b->slot;
-        const int32_t *source = world->block_shapes[slot].mesh->source;
-        if (source) closest->triangle = source[separation.triangle];
-    }
+    closest->triangle = sadmm_world_source_triangle(world, type_a == SADMM_SHAPE_MESH ? a->slot : b->slot,
+                                                    separation.triangle);
     return SADMM_OK;
 }
 
@@ -198,7 +193,7 @@ sadmm_status sadmm_world_closest_to_shape(sadmm_world *world, const sadmm_shape_
     struct sadmm_placed first, second;
     if (!sadmm_world_find_shape(world, b, "b", error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(closest, "closest", error));
-    TRY(take_shape(world, def, position, orientation, &first));
+    TRY(sadmm_world_take_query_shape(world, def, position, orientation, &first));
     sadmm_world_place_shape(world, b.slot - 1, &second);
     return find_closest(world, &first, &second, closest);
 }

@@ -1,8 +1,12 @@
-/* Overlaps. */
+/* Shapes that are none of the world's, and what overlaps them. */
 #ifndef SADMM_WORLD_QUERY_QUERY_SHAPE_H
 #define SADMM_WORLD_QUERY_QUERY_SHAPE_H
 
 #include "world/state/world_state.h"
+
+/* The caller's shape at a pose. The world is ready for a query. */
+sadmm_status sadmm_world_take_query_shape(sadmm_world *world, const sadmm_shape_def *given, const double position[3],
+                                          const double orientation[4], struct sadmm_placed *placed);
 
 /* What meets a box (shape: NULL), or overlaps a shape in that box: its slots into query.slots, ascending. The tree is
  * brought up to date. */
