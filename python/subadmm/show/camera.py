@@ -1,23 +1,29 @@
 """A camera that looks at a point."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..given import point, real
+from ..importing.model import LoadedModel, name_of
+from ..importing.poses import mul, pose, q_matrix
+from ..objects import no_such_name
 
 
 @dataclass
 class Camera:
-    """eye, target: m, world frame, apart; field: vertical angle of view, rad, in [0.001, 3]; z is up."""
+    """eye, target: m, world frame, apart; field: vertical angle of view, rad, in [0.001, 3]; up: what is up in the
+    picture, world frame, as far as it can be."""
     eye: np.ndarray
     target: np.ndarray
     field: float = 0.6
+    up: Any = (0.0, 0.0, 1.0)
 
     def __post_init__(self):
         self.eye, self.target = point("eye", self.eye), point("target", self.target)
+        self.up = point("up", self.up)
         self.field = real("field", self.field, 1e-3, 3)
         if not np.linalg.norm(self.eye - self.target) > 0:
             raise ValueError(f"eye: {self.eye}; must be apart from the target")
@@ -26,9 +32,9 @@ class Camera:
         """3 x 3, rows: to the right, up, and back to the viewer."""
         back = self.eye - self.target
         back = back / np.linalg.norm(back)
-        right = np.cross([0.0, 0.0, 1.0], back)
+        right = np.cross(self.up, back)
         if np.linalg.norm(right) < 1e-6:
-            right = np.array([1.0, 0.0, 0.0])
+            right = np.cross([0.0, 1.0, 0.0] if abs(back[1]) < 0.9 else [0.0, 0.0, 1.0], back)
         right = right / np.linalg.norm(right)
         return np.stack([right, np.cross(back, right), back])
 
@@ -50,3 +56,29 @@ def looking_at(description: Any, azimuth: float = -60.0, elevation: float = 24.0
     distance = description.radius / np.tan(field / 2) * 0.95 / zoom
     target = np.array(description.centre)
     return Camera(target + distance * direction, target, field)
+
+
+def usual_camera(recording: Any) -> Camera:
+    """A camera that has in view what moves, where it is on average over a recording."""
+    from .description import extent_of
+
+    boxes = [extent_of(recording.description, *recording.poses(k))
+             for k in np.unique(np.linspace(0, len(recording.times) - 1, 9).astype(int))]
+    low, high = np.mean(boxes, axis=0)
+    return looking_at(replace(recording.description, centre=(low + high) / 2,
+                              radius=max(float(np.linalg.norm(high - low)) / 2, 1e-3)))
+
+
+def camera_of(loaded: Any, name: str) -> Camera:
+    """The camera of an MJCF file, where it is now. KeyError: the file has none of this name."""
+    if not isinstance(loaded, LoadedModel):
+        raise TypeError(f"camera: {name!r}; only MJCF files that were loaded have cameras with names")
+    source = loaded.source
+    names = [name_of(source, "camera", k) for k in range(source.ncam)]
+    if name not in names:
+        raise no_such_name("camera", name, names)
+    k = names.index(name)
+    place = mul(loaded.groups[int(source.cam_bodyid[k])].frame_in_world(int(source.cam_bodyid[k])),
+                pose(source.cam_pos[k], source.cam_quat[k]))
+    turn = q_matrix(place[1])
+    return Camera(place[0], place[0] - turn[:, 2], float(np.clip(np.radians(source.cam_fovy[k]), 1e-3, 3)), turn[:, 1])
