@@ -223,7 +223,7 @@ def test_what_the_page_says_is_done(view):
         until(lambda: view.session.world.settings.iterations == 33 and view.session.world.settings.method == "paper")
         client.set("measure the error", False)
         until(lambda: not view.session.world.settings.certify)
-        client.set("run", "Reset")
+        client.set("Reset", True)
         until(lambda: view.session.steps == 0)
         name = next(handle.name for group, handle in view._moving)
         client.send({**DRAG, "name": name})
@@ -250,7 +250,7 @@ def test_values_that_would_leave_it_unusable_are_dropped(view):
         name = view._moving[0][1].name
         view.session.running = False
         controls = {label: client.control(label)[1].value for label in (
-            "run", "iterations", "method", "backend", "measure the error", "contact forces", "steer", "lever, °")}
+            "Pause", "iterations", "method", "backend", "measure the error", "contact forces", "steer", "lever, °")}
         settings = view.session.world.settings
         for wrong in NUMBERS + [-1, 0, 2**31, 1.5e9, "no such"]:
             for label in controls:
@@ -259,7 +259,7 @@ def test_values_that_would_leave_it_unusable_are_dropped(view):
                 if label == "lever, °" and wrong in (-1, 0):
                     continue
                 client.set(label, wrong)
-        for uuid, _ in (client.control("speed"), client.control("run")):   # no other member of a control
+        for uuid, _ in (client.control("speed"), client.control("iterations")):   # no other member of a control
             for updates in ({"visible": False}, {"removed": True}, {"update_cb": []}, {"value": 1.0, "max": 2}, {}, [],
                             None):
                 client.send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates})
@@ -296,7 +296,7 @@ def test_whatever_is_said_the_view_goes_on(view):
     with Client(view) as client:
         name = view._moving[0][1].name
         uuids = [client.control(label)[0]
-                 for label in ("iterations", "run", "steer", "lever, °", "contact forces", "method")]
+                 for label in ("iterations", "Reset", "steer", "lever, °", "contact forces", "method")]
         values = [*NUMBERS, 0, 1, -1, 0.5, 1e-300, 1e9, 2**31, 2**53, "", "start", "Reset", "paper", "x" * 3000,
                   [0, 0, 1],
                   [1, 0, 0, 0], [math.nan] * 3, [1e8] * 3, False, {"value": 7}, {"value": math.nan}, {"value": "Step"}]
@@ -311,7 +311,7 @@ def test_whatever_is_said_the_view_goes_on(view):
         # Some connections are closed by what they say; others go on.
     view.session.release()
     with Client(view) as client:
-        client.set("run", "Reset")
+        client.set("Reset", True)
         client.set("method", "fast")
         assert works(view, client)
 
@@ -334,7 +334,7 @@ def test_a_step_that_fails_pauses_and_is_said(view):
     assert not view.session.running and "a step made no number" in view._said.content
     view.session.step = step
     with Client(view) as client:
-        client.set("run", "Reset")
+        client.set("Reset", True)
         until(lambda: view.session.steps == 0 and not view._wrong)
         assert works(view, client)
 

@@ -12,6 +12,10 @@ from ..importing.poses import mul, pose, q_matrix
 from ..objects import no_such_name
 
 
+_WIDER = 1.3    # pictures are, than high
+_FILLED = 0.9   # share of a picture that what moves may take
+
+
 @dataclass
 class Camera:
     """eye, target: m, world frame, apart; field: vertical angle of view, rad, in [0.001, 3]; up: what is up in the
@@ -53,9 +57,15 @@ def looking_at(description: Any, azimuth: float = -60.0, elevation: float = 24.0
     field = real("field", field, 1e-3, 3)
     across, up = np.radians([azimuth, elevation])
     direction = np.array([np.cos(across) * np.cos(up), np.sin(across) * np.cos(up), np.sin(up)])
-    distance = description.radius / np.tan(field / 2) * 0.95 / zoom
     target = np.array(description.centre)
-    return Camera(target + distance * direction, target, field)
+    distance = description.radius / np.tan(field / 2) * 0.95
+    if getattr(description, "half", None) is not None:
+        # All corners of the box are in a picture that is at least a little wider than high.
+        corners = description.half * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        view = corners @ Camera(target + direction, target, field).axes().T
+        across = np.maximum(np.abs(view[:, 1]), np.abs(view[:, 0]) / _WIDER)
+        distance = max(float((across / (_FILLED * np.tan(field / 2)) + view[:, 2]).max()), 0.3 * distance)
+    return Camera(target + distance / zoom * direction, target, field)
 
 
 def usual_camera(recording: Any) -> Camera:
@@ -65,7 +75,7 @@ def usual_camera(recording: Any) -> Camera:
     boxes = [extent_of(recording.description, *recording.poses(k))
              for k in np.unique(np.linspace(0, len(recording.times) - 1, 9).astype(int))]
     low, high = np.mean(boxes, axis=0)
-    return looking_at(replace(recording.description, centre=(low + high) / 2,
+    return looking_at(replace(recording.description, centre=(low + high) / 2, half=(high - low) / 2,
                               radius=max(float(np.linalg.norm(high - low)) / 2, 1e-3)))
 
 

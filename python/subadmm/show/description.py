@@ -47,15 +47,17 @@ class Group:
         turn = orientations[self.body]
         return positions[self.body] + rotate(turn, self.position), multiply(turn, self.orientation)
 
-    def reach(self):
-        """n: how far the mesh goes from its origin, m."""
+    def balls(self, positions, orientations):
+        """(middles n x 3, radii n): of balls around the instances at bodies' poses, m."""
         if "_reach" not in vars(self):
-            largest = np.empty(len(self.scale))
+            vertices = self.mesh.vertices
+            self._middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+            self._reach = np.empty(len(self.scale))
             for scale in np.unique(self.scale, axis=0):
                 of = (self.scale == scale).all(axis=1)
-                largest[of] = np.linalg.norm(self.mesh.vertices * scale, axis=1).max(initial=0)
-            self._reach = largest
-        return self._reach
+                self._reach[of] = np.linalg.norm((vertices - self._middle) * scale, axis=1).max(initial=0)
+        place, turn = self.poses(positions, orientations)
+        return place + rotate(turn, self.scale * self._middle), self._reach
 
     def tinted(self):
         """Colours n x 3 with what a texture makes of them on the whole, for what shows no textures."""
@@ -71,6 +73,7 @@ class Description:
     centre: np.ndarray
     radius: float
     floor: float              # m, the highest ground plane under it, or the lowest point
+    half: np.ndarray | None = None    # of a box around what moves, m; None: a ball
 
     def poses(self, state):
         """(positions, orientations) of the rows, of the array body_state of the world (n x 13)."""
@@ -88,7 +91,7 @@ class Description:
 @dataclass
 class Tiles(Description):
     """Copies of a Description. places: of each, m."""
-    places: np.ndarray
+    places: np.ndarray | None = None
 
     def poses(self, state):
         count = len(self.places)
@@ -214,7 +217,7 @@ def describe(world: Any, collision: bool = False, reach: float = 12.0) -> Descri
                                      (patch, patch, 1.0), own, opacity, name)], True))
         if normal[2] > 0.9:
             floor = float(foot[2])
-    return replace(whole, groups=groups, centre=centre, radius=radius, floor=floor)
+    return replace(whole, groups=groups, centre=centre, radius=radius, floor=floor, half=(high - low) / 2)
 
 
 def tiled(description, count):
@@ -240,7 +243,7 @@ def tiled(description, count):
                             [f"{name} ({copy})" for copy in range(count) for name in group.names]))
     radius = float(np.linalg.norm([pitch * (wide - 1) / 2] * 2)) + description.radius
     return Tiles(groups, rows * count, np.tile(description.dynamic, count), description.centre, radius, description.floor,
-                 places)
+                 places=places)
 
 
 def _group(mesh, parts, ground):
@@ -282,10 +285,9 @@ def _extent(groups, positions, turns, dynamic):
             use = which[group.body]
             if not use.any():
                 continue
-            place, _ = group.poses(positions, turns)
-            reach = group.reach()[:, None]
-            lows.append((place - reach)[use])
-            highs.append((place + reach)[use])
+            place, reach = group.balls(positions, turns)
+            lows.append((place - reach[:, None])[use])
+            highs.append((place + reach[:, None])[use])
         if lows:
             return np.quantile(np.concatenate(lows), 0.01, axis=0), np.quantile(np.concatenate(highs), 0.99, axis=0)
     return np.array([-1.0, -1, -1]), np.array([1.0, 1, 1])

@@ -110,7 +110,7 @@ def _described(source, world):
             centre, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-3)
             moved = np.linalg.norm(centre - description.drawn_at[0])
             if moved < description.drawn_at[1] and 0.5 < radius / description.drawn_at[1] < 2:
-                description.centre, description.radius = centre, radius
+                description.centre, description.radius, description.half = centre, radius, (high - low) / 2
                 return description
     description = describe(source)
     description.drawn_at = description.centre, description.radius

@@ -96,11 +96,11 @@ class View:
         with gui.add_folder("Plots", expand_by_default=True):
             for name in ("kinetic", "ms", "error"):
                 what, unit = MEASURES[name]
-                label = f"10^ {unit}" if name in _BY_POWER else unit
+                what = f"log10 of {what}" if name in _BY_POWER else what
                 self._plots[name] = gui.add_uplot(
                     _NO_CURVE,
-                    ({"label": "s"}, {"label": label, "stroke": "#0f766e", "width": 2}),
-                    title=f"{what}, {label}",
+                    ({"label": "s"}, {"label": unit, "stroke": "#0f766e", "width": 2}),
+                    title=f"{what}, {unit}",
                     scales={"x": {"time": False}, "y": {"auto": True}},
                     axes=({"label": "time, s", "labelSize": 16, "size": 30, "space": 50}, {"size": 52, "space": 28}),
                     legend={"show": False},
@@ -233,7 +233,7 @@ class View:
         # A sun with shadows, and less light from all around than viser has by itself, which makes colours pale.
         scene.configure_default_lights(False)
         scene.configure_environment_map("studio", environment_intensity=0.12)
-        scene.add_light_directional("/sun", color=(255, 244, 225), intensity=1.5, cast_shadow=True, position=tuple(
+        scene.add_light_directional("/sun", color=(255, 244, 225), intensity=3.0, cast_shadow=True, position=tuple(
             description.centre + 3 * radius * SUN))
         scene.add_light_hemisphere("/sky", sky_color=(220, 235, 255), ground_color=(200, 190, 180), intensity=0.5)
         # The sky goes over into the ground far away.
@@ -269,7 +269,7 @@ class View:
                 mesh = group.mesh.split()
                 handle = scene.add_batched_meshes_simple(
                     name, mesh.vertices, mesh.triangles, turn, place, batched_scales=group.scale,
-                    batched_colors=np.rint(np.clip(group.colour, 0, 1) * 255).astype(np.uint8),
+                    batched_colors=_linear(group.colour),
                     batched_opacities=group.opacity.astype(np.float32) if (group.opacity < 1).any() else None, lod="off",
                     cast_shadow=not group.is_ground, visible=visible)
             else:
@@ -374,12 +374,19 @@ class View:
                 if len(values) > 1 and np.isfinite(values).any():
                     values = np.nan_to_num(values)
                     if name in _BY_POWER:
-                        values = np.log10(np.maximum(values, 1e-20))
+                        # What is at rest is not shown far below: all else would be one line.
+                        values = np.log10(np.maximum(values, max(values.max() * 1e-9, 1e-16)))
                     handle.data = (times[use], values)
 
 
 #: Of a plot that has none.
 _NO_CURVE = (np.zeros(1), np.zeros(1))
+
+
+def _linear(colour):
+    """Colours n x 3 as the page takes those of instances: linear, where meshes and textures have sRGB. As sRGB they would
+    be pale."""
+    return np.rint(np.clip(colour, 0, 1) ** 2.2 * 255).astype(np.uint8)
 
 
 def _textured(group):

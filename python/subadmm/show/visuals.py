@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..importing.model import LoadedModel, LoadedStage, Report, name_of
-from ..importing.poses import inverse, mul, pose
+from ..importing.poses import inverse, mul, pose, q_matrix
 from .meshes import Mesh, form_of
 
 _VISIBLE = 3             # groups of geoms that MuJoCo shows: 0 to 2
@@ -97,9 +97,50 @@ def _geom_mesh(source, index, image):
     return Mesh(vertices, triangles, uv, None if uv is None else image)
 
 
-def _flat_plane(repeat, image):
-    base = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
-    return Mesh(base, np.array([[0, 1, 2], [0, 2, 3]], np.int32), repeat, image if repeat is not None else None)
+def _flat_plane(repeat, image, size=None):
+    """size: half its lengths, m; None: a plane without ends, whose uv is `repeat`."""
+    mesh = Mesh(np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    if size is not None:
+        mesh.vertices *= [*size, 1]
+    if repeat is not None:
+        mesh.uv, mesh.image = repeat if size is None else mesh.vertices[mesh.triangles][..., :2] * repeat, image
+    return mesh
+
+
+def _of_skins(loaded):
+    """Skins, in pieces: each triangle is on the body that has the largest part in it."""
+    source, out = loaded.source, []
+    for k in range(source.nskin):
+        rgba, material = np.array(source.skin_rgba[k], float), int(source.skin_matid[k])
+        if material >= 0:
+            image, _ = _texture_of(source, material)
+            rgba = np.array(source.mat_rgba[material], float)
+            rgba[:3] *= 1.0 if image is None else Mesh(None, None, None, image).tint
+        if not 0 <= source.skin_group[k] < _VISIBLE or rgba[3] < 0.03:
+            continue
+        first, count = int(source.skin_vertadr[k]), int(source.skin_vertnum[k])
+        begin = int(source.skin_faceadr[k])
+        vertices = np.array(source.skin_vert[first:first + count], float)
+        triangles = np.array(source.skin_face[begin:begin + source.skin_facenum[k]], np.int32)
+        largest, bone_of = np.zeros(count), np.full(count, -1)
+        bones = range(int(source.skin_boneadr[k]), int(source.skin_boneadr[k] + source.skin_bonenum[k]))
+        for bone in bones:
+            at = slice(int(source.skin_bonevertadr[bone]), int(source.skin_bonevertadr[bone] + source.skin_bonevertnum[bone]))
+            ids, weights = np.array(source.skin_bonevertid[at]), np.array(source.skin_bonevertweight[at])
+            more = weights > largest[ids]
+            largest[ids[more]], bone_of[ids[more]] = weights[more], bone
+        of = bone_of[triangles[:, 0]]
+        for bone in bones:
+            part = triangles[of == bone]
+            if not len(part):
+                continue
+            body = int(source.skin_bonebodyid[bone])
+            group = loaded.groups[body]
+            place = mul(group.frame_in_body(body), inverse(pose(source.skin_bonebindpos[bone],
+                                                                source.skin_bonebindquat[bone])))
+            out.append(Visual(f"skin {k}", None if group.kind == "static" else group.body, *place, ("skin", k, bone),
+                              lambda v=vertices, t=part: Mesh(v, t), np.ones(3), rgba[:3], float(rgba[3])))
+    return out
 
 
 def _of_geoms(loaded):
@@ -109,7 +150,7 @@ def _of_geoms(loaded):
     from ..importing.shapes import Shapes
 
     source, kinds = loaded.source, mujoco.mjtGeom
-    makes, out = Shapes(source), []
+    makes, out = Shapes(source), _of_skins(loaded)
     for index in range(source.ngeom):
         rgba, material = np.array(source.geom_rgba[index], float), int(source.geom_matid[index])
         said = tuple(np.float32(rgba)) != tuple(np.float32(_NO_COLOUR))
@@ -134,7 +175,12 @@ def _of_geoms(loaded):
                     size = np.array(source.geom_size[index, :2], float)
                     if not source.mat_texuniform[material]:
                         repeat = repeat / np.where(size > 0, size, 1)
-                key, make = ("floor", index), lambda r=repeat, i=mesh_image: _flat_plane(r, i)
+                # A floor goes on for ever; a wall is as large as the file has it drawn.
+                size = np.array(source.geom_size[index, :2], float)
+                frame = mul(group.frame_in_world(body), pose(source.geom_pos[index], source.geom_quat[index]))
+                plane = bool((size <= 0).any() or q_matrix(frame[1])[2, 2] > 0.9)
+                size = None if plane else size
+                key, make = ("plane", index), lambda r=repeat, i=mesh_image, z=size: _flat_plane(r, i, z)
                 used = repeat is not None
             elif kind in (kinds.mjGEOM_MESH, kinds.mjGEOM_SDF):
                 used = mesh_image is not None and source.mesh_texcoordadr[int(source.geom_dataid[index])] >= 0
@@ -294,7 +340,6 @@ def _is_drawn(prim):
 
 def _of_stage(loaded):
     from .. import Error
-    from ..importing.poses import q_matrix
     from ..importing.usd.colliders import _gprim
     from ..importing.usd.meshes import NoMesh, mesh_of
     from ..importing.usd.stage import Reader
