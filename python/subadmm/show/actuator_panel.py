@@ -38,7 +38,8 @@ class ActuatorPanel:
         if not upper > lower:
             return
         low, high = lower * factor, upper * factor
-        slider = gui.add_slider(f"{name}, {unit}" if unit else name, low, high, max((high - low) / 500, 1e-9),
+        label = name if not name.startswith("#") else f"{actuator.parts[0][0].name} ({name})"
+        slider = gui.add_slider(f"{label}, {unit}" if unit else label, low, high, max((high - low) / 500, 1e-9),
                                 actuator.control * factor, hint=f"control of a {actuator.kind} actuator")
         self._sliders[name] = slider, factor
 

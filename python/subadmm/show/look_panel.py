@@ -46,9 +46,9 @@ class LookPanel:
             turns.append(turn)
         self._rows = np.array(rows, dtype=int)
         self._places, self._turns = np.array(places, float).reshape(-1, 3), np.array(turns, float).reshape(-1, 4)
-        size = 0.08 * description.radius
+        size = 0.22 * description.radius
         self._frames = scene.add_batched_axes("/joints", self._turns, self._places, axes_length=size,
-                                              axes_radius=0.06 * size, visible=False)
+                                              axes_radius=0.035 * size, visible=False)
         cell = _nice(description.radius / 4)
         has_ground = any(group.is_ground and group.mesh.image is None for group in description.groups)
         self.grid.value = has_ground
