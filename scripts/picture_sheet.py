@@ -91,7 +91,8 @@ def cell(path, width, height, with_mujoco):
             try:
                 out.paste(Image.fromarray(by_mujoco(robot.source, robot, camera, width, height)), (width, BAR))
             except Exception as error:  # no OpenGL, in as many ways as there are libraries of it
-                pen.multiline_text((width + 6, BAR + 6), textwrap.fill(f"MuJoCo: {error}", width // 7), fill=(120, 120, 120))
+                text = textwrap.fill(f"MuJoCo: {error}", width // 7)
+                pen.multiline_text((width + 6, BAR + 6), text, fill=(120, 120, 120))
     except (subadmm.Error, ValueError, OSError, ImportError) as error:
         said = str(error)
         pen.multiline_text((6, BAR + 6), textwrap.fill(said, width // 7), fill=(180, 30, 30))

@@ -1,5 +1,5 @@
-// Pictures in software: triangles with a depth buffer, a sun with a shadow map, ambient occlusion. subadmm/show/picture.py
-// says what is drawn; here is what takes time.
+// Pictures in software: triangles with a depth buffer, a sun with a shadow map, ambient occlusion. What is drawn is
+// said in subadmm/show/picture.py; here is what takes time.
 //
 // Triangles are put into lists by bands of rows. A band belongs to one thread, which goes through its list in the
 // triangles' order: pictures do not depend on threads.
@@ -19,7 +19,8 @@ using doubles = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 using ints = nb::ndarray<const int32_t, nb::c_contig, nb::device::cpu>;
 using bytes8 = nb::ndarray<const uint8_t, nb::c_contig, nb::device::cpu>;
 
-namespace {
+namespace
+{
 
 struct v3 {
     float x, y, z;
@@ -102,10 +103,10 @@ struct flat_triangle {
 };
 // What all samples of a triangle have in common.
 struct shared {
-    v3 to_b, to_c;   // shares of corners b and c are these times a place, from corner a
-    float from_eye;  // of its plane, along its normal
-    float texels;    // of a texture, a length
-    bool even;       // all corners have one normal
+    v3 to_b, to_c;  // shares of corners b and c are these times a place, from corner a
+    float from_eye; // of its plane, along its normal
+    float texels;   // of a texture, a length
+    bool even;      // all corners have one normal
 };
 
 struct buffer {
@@ -132,10 +133,8 @@ template <class F> void each(size_t count, int threads, F f)
     p.next = 0, p.count = count, p.closure = &f;
     p.call = [](void *closure, size_t k) { (*(F *)closure)(k); };
     int with = sadmm_team_threads(nullptr, threads, std::min(count, (size_t)64));
-    if (with > 1)
-        sadmm_parallel_open(nullptr, with, &work, &p);
-    else
-        work(&p, 0, 1);
+    if (with > 1) sadmm_parallel_open(nullptr, with, &work, &p);
+    else work(&p, 0, 1);
 }
 
 void rasterise(const std::vector<flat_triangle> &all, const std::vector<uint8_t> &alpha, buffer &out, int threads)
@@ -172,16 +171,14 @@ void rasterise(const std::vector<flat_triangle> &all, const std::vector<uint8_t>
             for (int row = from; row <= to; ++row) {
                 double y = row + 0.5, low = 0, high = out.width;
                 // Columns between the edges: each share is affine along the row.
-                double value[3] = {b0 + by * y, c0 + cy * y, 1 - b0 - c0 - (by + cy) * y}, slope[3] = {bx, cx, -bx - cx};
+                double value[3] = {b0 + by * y, c0 + cy * y, 1 - b0 - c0 - (by + cy) * y},
+                       slope[3] = {bx, cx, -bx - cx};
                 bool none = false;
                 for (int k = 0; k < 3; ++k) {
                     double v = value[k] + 1e-9;
-                    if (slope[k] > 0)
-                        low = std::max(low, -v / slope[k]);
-                    else if (slope[k] < 0)
-                        high = std::min(high, -v / slope[k]);
-                    else if (v < 0)
-                        none = true;
+                    if (slope[k] > 0) low = std::max(low, -v / slope[k]);
+                    else if (slope[k] < 0) high = std::min(high, -v / slope[k]);
+                    else if (v < 0) none = true;
                 }
                 if (none || !(low <= high)) continue;
                 int first = (int)std::ceil(low - 0.5), last = std::min((int)std::floor(high - 0.5), out.width - 1);
@@ -205,6 +202,7 @@ void rasterise(const std::vector<flat_triangle> &all, const std::vector<uint8_t>
 struct shading {
     std::vector<v3> at, normal, colour, direct; // of each sample; direct: light of the sun
     std::vector<float> fade;                    // of the ground, into what is behind all
+    std::vector<float> open;                    // share of the sky
 };
 
 struct canvas {
@@ -224,14 +222,16 @@ template <class Array> void want(const Array &a, const char *name, size_t column
 {
     size_t size = 1;
     for (size_t k = 1; k < a.ndim(); ++k) size *= a.shape(k);
-    if (a.ndim() < 1 || size != columns) refuse_value(name, nb::none(), "must have " + std::to_string(columns) + " columns");
+    if (a.ndim() < 1 || size != columns)
+        refuse_value(name, nb::none(), "must have " + std::to_string(columns) + " columns");
 }
 
 void add(canvas &c, floats vertices, ints triangles, floats normals, ints body, doubles position, doubles orientation,
          doubles scale, floats colour, bool ground, nb::object uv, nb::object image)
 {
     want(vertices, "vertices", 3), want(triangles, "triangles", 3), want(normals, "normals", 9);
-    want(position, "position", 3), want(orientation, "orientation", 4), want(scale, "scale", 3), want(colour, "colour", 4);
+    want(position, "position", 3), want(orientation, "orientation", 4), want(scale, "scale", 3),
+        want(colour, "colour", 4);
     size_t n = body.shape(0);
     for (size_t size : {position.shape(0), orientation.shape(0), scale.shape(0), colour.shape(0)})
         if (size != n) refuse_value("body", nb::none(), "must be as many as poses");
@@ -267,7 +267,8 @@ void add(canvas &c, floats vertices, ints triangles, floats normals, ints body, 
                 for (int x = 0; x < half.width; ++x) {
                     v3 sum{0, 0, 0};
                     for (int k = 0; k < 4; ++k) {
-                        int i = std::min(2 * x + (k & 1), big.width - 1), j = std::min(2 * y + (k >> 1), big.height - 1);
+                        int i = std::min(2 * x + (k & 1), big.width - 1),
+                            j = std::min(2 * y + (k >> 1), big.height - 1);
                         sum = sum + 0.25f * big.at[(size_t)j * (size_t)big.width + (size_t)i];
                     }
                     half.at.push_back(sum);
@@ -289,15 +290,15 @@ void add(canvas &c, floats vertices, ints triangles, floats normals, ints body, 
 }
 
 struct view {
-    double centre[3];  // all of what follows is from here
+    double centre[3]; // all of what follows is from here
     v3 eye, right, up, back, target;
     float focal, near, radius;
     v3 sun, sun_light, sky_light, ground_light, backdrop;
     int width, height, smooth, shadow, neighbours, threads;
 };
 
-void place(canvas &c, const double *positions, const double *orientations, size_t bodies, const std::vector<uint8_t> &hidden,
-           const view &w)
+void place(canvas &c, const double *positions, const double *orientations, size_t bodies,
+           const std::vector<uint8_t> &hidden, const view &w)
 {
     c.drawn.clear(), c.alpha.clear();
     std::vector<v3> at, normal;
@@ -376,7 +377,7 @@ void project(canvas &c, const view &w)
             if ((depth[k] > w.near) != (depth[l] > w.near)) {
                 float s = (depth[k] - w.near) / (depth[k] - depth[l]);
                 const corner &a = d.c[k], &b = d.c[l];
-                cut[n++] = {a.at + s * (b.at - a.at) , unit(a.normal + s * (b.normal - a.normal)), a.u + s * (b.u - a.u),
+                cut[n++] = {a.at + s * (b.at - a.at), unit(a.normal + s * (b.normal - a.normal)), a.u + s * (b.u - a.u),
                             a.v + s * (b.v - a.v)};
             }
         }
@@ -441,7 +442,7 @@ void paint(canvas &c, const view &w, uint8_t *out)
     size_t samples = (size_t)wide * (size_t)high;
     shading &s = c.samples;
     for (std::vector<v3> *of : {&s.at, &s.normal, &s.colour, &s.direct}) of->resize(samples);
-    s.fade.resize(samples);
+    s.fade.resize(samples), s.open.resize(samples);
     std::vector<v3> &direct = s.direct;
     std::vector<float> &fade = s.fade;
     std::vector<v3> linear; // of each instance, form by form
@@ -450,7 +451,8 @@ void paint(canvas &c, const view &w, uint8_t *out)
         first.push_back(linear.size());
         for (size_t k = 0; k < f.body.size(); ++k)
             linear.push_back(power({std::clamp(f.colour[4 * k], 0.f, 1.f), std::clamp(f.colour[4 * k + 1], 0.f, 1.f),
-                                    std::clamp(f.colour[4 * k + 2], 0.f, 1.f)}, BRIGHT));
+                                    std::clamp(f.colour[4 * k + 2], 0.f, 1.f)},
+                                   BRIGHT));
     }
     each((size_t)((high + BAND - 1) / BAND), w.threads, [&](size_t band) {
         for (int row = (int)band * BAND; row < std::min(((int)band + 1) * BAND, high); ++row)
@@ -465,6 +467,15 @@ void paint(canvas &c, const view &w, uint8_t *out)
                          ((float)high / 2 - (float)row - 0.5f) / w.focal * w.up - w.back;
                 float tilt = dot(ray, d.flat), away = sh.from_eye / tilt;
                 v3 at = w.eye + away * ray, along = at - d.c[0].at;
+                if (f.ground) {
+                    float far = std::sqrt(at.x * at.x + at.y * at.y) / w.radius;
+                    fade[k] = std::clamp((far - 1.8f) / 5, 0.f, 1.f);
+                    fade[k] = std::sqrt(fade[k] * std::sqrt(fade[k]));
+                    if (fade[k] >= 1) { // nothing of it is left
+                        c.seen.which[k] = -1;
+                        continue;
+                    }
+                } else fade[k] = 0;
                 float sb = std::clamp(dot(along, sh.to_b), 0.f, 1.f), sc = std::clamp(dot(along, sh.to_c), 0.f, 1 - sb);
                 float sa = 1 - sb - sc;
                 v3 normal = d.c[0].normal;
@@ -479,7 +490,7 @@ void paint(canvas &c, const view &w, uint8_t *out)
                     float texels = sh.texels * std::sqrt((float)l.width * (float)l.height);
                     base = times(base, f.image.sample(u, v, texels * sample));
                 }
-                // Is it in the sun? The corners' normals say where the round surface is that the triangle is a piece of:
+                // Is it in the sun? The corners' normals say where the round surface is that the triangle is a part of:
                 // without that, its own flat sides would throw shadows on it.
                 float facing = dot(normal, w.sun), lit = 0;
                 if (facing > 0) {
@@ -491,12 +502,13 @@ void paint(canvas &c, const view &w, uint8_t *out)
                     }
                     float slope = std::clamp(1 / std::max(facing, 0.1f), 1.f, 6.f);
                     moved = moved + (1.3f * slope / scale) * (dot(d.flat, w.sun) > 0.1f ? d.flat : normal);
-                    float x = (float)size / 2 + scale * dot(moved, side), y = (float)size / 2 - scale * dot(moved, upward);
+                    float x = (float)size / 2 + scale * dot(moved, side),
+                          y = (float)size / 2 - scale * dot(moved, upward);
                     float mine = -dot(moved, w.sun);
-                    if (x < 2 || y < 2 || x > (float)size - 2 || y > (float)size - 2)
-                        lit = 1;
+                    if (x < 2 || y < 2 || x > (float)size - 2 || y > (float)size - 2) lit = 1;
                     else { // of 4 x 4 texels around
-                        const float *depth = &c.sun.depth[(size_t)(int)(y - 1.5f) * (size_t)size + (size_t)(int)(x - 1.5f)];
+                        const float *depth =
+                            &c.sun.depth[(size_t)(int)(y - 1.5f) * (size_t)size + (size_t)(int)(x - 1.5f)];
                         float above = mine - 0.5f / scale;
                         int count = 0;
                         for (int j = 0; j < 4; ++j, depth += size)
@@ -506,9 +518,6 @@ void paint(canvas &c, const view &w, uint8_t *out)
                 }
                 s.at[k] = at, s.normal[k] = normal, s.colour[k] = base;
                 direct[k] = std::max(facing, 0.f) * lit * w.sun_light;
-                float far = std::sqrt(at.x * at.x + at.y * at.y) / w.radius;
-                fade[k] = f.ground ? std::clamp((far - 1.8f) / 5, 0.f, 1.f) : 0;
-                fade[k] = std::sqrt(fade[k] * std::sqrt(fade[k]));
             }
     });
     // Neighbours in the picture cover sky as they stand above the tangent plane, the less the farther away they are. A
@@ -522,6 +531,26 @@ void paint(canvas &c, const view &w, uint8_t *out)
         dx.push_back((int)std::lround(far * std::cos(2.4f * (float)k)));
         dy.push_back((int)std::lround(far * std::sin(2.4f * (float)k)));
     }
+    // The share of the sky that is left at a sample. Of four samples side by side that are of one surface it is that of
+    // the first, which each thread has done before.
+    auto openness = [&](size_t k, int row, int column) {
+        v3 at = s.at[k], normal = s.normal[k];
+        float total = 0;
+        for (int n = 0; n < w.neighbours && fade[k] < 0.9f; ++n) {
+            int i = column + dx[(size_t)n], l = row + dy[(size_t)n];
+            if (i < 0 || l < 0 || i >= wide || l >= high) continue;
+            size_t other = (size_t)l * (size_t)wide + (size_t)i;
+            if (c.seen.which[other] < 0) continue;
+            v3 toward = s.at[other] - at;
+            float height = dot(toward, normal);
+            if (height <= 0) continue;
+            float square = dot(toward, toward) + 1e-6f * near * near;
+            if (square >= near * near) continue;
+            float above = height / std::sqrt(square) - 0.1f;
+            if (above > 0) total += above * (1 - square / (near * near));
+        }
+        return w.neighbours ? std::clamp(1 - 2.6f * total / (float)w.neighbours, 0.2f, 1.f) : 1.f;
+    };
     static const auto curve = [] {
         std::vector<uint8_t> table(4097);
         for (size_t k = 0; k < table.size(); ++k)
@@ -535,23 +564,15 @@ void paint(canvas &c, const view &w, uint8_t *out)
                 for (int j = 0; j < w.smooth * w.smooth; ++j) {
                     int row = y * w.smooth + j / w.smooth, column = x * w.smooth + j % w.smooth;
                     size_t k = (size_t)row * (size_t)wide + (size_t)column;
-                    // The backdrop is brighter at the horizon.
                     v3 colour = w.backdrop;
                     if (c.seen.which[k] >= 0) {
                         v3 at = s.at[k], normal = s.normal[k];
-                        float total = 0;
-                        for (int n = 0; n < w.neighbours; ++n) {
-                            int i = column + dx[(size_t)n], l = row + dy[(size_t)n];
-                            if (i < 0 || l < 0 || i >= wide || l >= high) continue;
-                            size_t other = (size_t)l * (size_t)wide + (size_t)i;
-                            if (c.seen.which[other] < 0) continue;
-                            v3 toward = s.at[other] - at;
-                            float square = dot(toward, toward) + 1e-6f * near * near;
-                            if (square >= near * near) continue;
-                            float above = dot(toward, normal) / std::sqrt(square) - 0.1f;
-                            if (above > 0) total += above * (1 - square / (near * near));
-                        }
-                        float open = w.neighbours ? std::clamp(1 - 2.6f * total / (float)w.neighbours, 0.2f, 1.f) : 1;
+                        size_t beside = (size_t)(row & ~1) * (size_t)wide + (size_t)(column & ~1);
+                        v3 away = s.at[beside] - at;
+                        bool same = beside != k && c.seen.which[beside] >= 0 && dot(s.normal[beside], normal) > 0.95f &&
+                                    dot(away, away) < 0.01f * near * near;
+                        float open = same ? s.open[beside] : openness(k, row, column);
+                        s.open[k] = open;
                         float sky = 0.5f + 0.5f * normal.z;
                         v3 light = direct[k] + open * (sky * w.sky_light + (1 - sky) * w.ground_light);
                         colour = times(s.colour[k], light);
@@ -574,10 +595,12 @@ nb::object draw(canvas &c, doubles positions, doubles orientations, bytes8 hidde
                 doubles axes, double focal, double near, double radius, vec3 sun, doubles light, int width, int height,
                 int smooth, int shadow, int neighbours, int threads)
 {
-    want(positions, "positions", 3), want(orientations, "orientations", 4), want(axes, "axes", 3), want(light, "light", 3);
+    want(positions, "positions", 3), want(orientations, "orientations", 4), want(axes, "axes", 3),
+        want(light, "light", 3);
     size_t instances = 0;
     for (const form &f : c.forms) instances += f.body.size();
-    if (hidden.shape(0) != instances || positions.shape(0) != orientations.shape(0) || axes.shape(0) != 3 || light.shape(0) != 4)
+    if (hidden.shape(0) != instances || positions.shape(0) != orientations.shape(0) || axes.shape(0) != 3 ||
+        light.shape(0) != 4)
         refuse_value("hidden", nb::none(), "must be as many as instances");
     if (width < 1 || height < 1 || smooth < 1 || shadow < 1 || neighbours < 0)
         refuse_value("width", nb::none(), "must be positive");
@@ -593,11 +616,13 @@ nb::object draw(canvas &c, doubles positions, doubles orientations, bytes8 hidde
     w.eye = local(eye), w.target = local(target);
     w.right = row(axes, 0), w.up = row(axes, 1), w.back = row(axes, 2);
     w.focal = (float)focal, w.near = (float)near, w.radius = (float)radius, w.sun = read_v3(sun);
-    w.sun_light = row(light, 0), w.sky_light = row(light, 1), w.ground_light = row(light, 2), w.backdrop = row(light, 3);
-    w.width = width, w.height = height, w.smooth = smooth, w.shadow = shadow, w.neighbours = neighbours, w.threads = threads;
+    w.sun_light = row(light, 0), w.sky_light = row(light, 1), w.ground_light = row(light, 2),
+    w.backdrop = row(light, 3);
+    w.width = width, w.height = height, w.smooth = smooth, w.shadow = shadow, w.neighbours = neighbours,
+    w.threads = threads;
     std::vector<uint8_t> out_of_view(hidden.data(), hidden.data() + instances);
     uint8_t *out = new uint8_t[3 * (size_t)width * (size_t)height];
-    nb::capsule owner(out, [](void *p) noexcept { delete[] (uint8_t *)p; });
+    nb::capsule owner(out, [](void *p) noexcept { delete[](uint8_t *) p; });
     {
         nb::gil_scoped_release released;
         std::lock_guard<std::mutex> one(c.guard);

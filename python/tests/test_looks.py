@@ -63,7 +63,8 @@ def test_worlds_render_and_follow_what_changes():
     before = world.render(64, 64, camera)
     ball.position = (0.8, 0, 0.3)
     moved = world.render(64, 64, camera).astype(int)
-    assert strongest(before[32, 32].astype(int)) == 0 and strongest(moved[32, 32]) == -1 and strongest(moved[32, 46]) == 0
+    assert strongest(before[32, 32].astype(int)) == 0
+    assert strongest(moved[32, 32]) == -1 and strongest(moved[32, 46]) == 0
     world.add_solid(subadmm.box(0.2, 0.2, 0.2), mass=1, position=(-0.8, 0, 0.2), name="blue")
     assert strongest(world.render(64, 64, camera)[32, 18].astype(int)) == 2
     world.settings.threads = 1
@@ -140,7 +141,8 @@ def test_mjcf_is_seen_by_its_visual_geoms_and_materials(robot):
 
 def test_textures_of_planes_are_repeated_as_the_file_says(tmp_path):
     pytest.importorskip("mujoco")
-    text = MJCF.replace('<geom name="post"', '<geom type="plane" size="0 0 1" pos="0 0 -1" material="tiles"/>\n<geom name="post"')
+    floor = '<geom type="plane" size="0 0 1" pos="0 0 -1" material="tiles"/>'
+    text = MJCF.replace('<geom name="post"', floor + '<geom name="post"')
     (tmp_path / "floor.xml").write_text(text)
     floor = subadmm.load(tmp_path / "floor.xml", backend="cpu")
     image = seen(floor, show.Camera((0.0, -0.001, 5), (0, 0, -1.0), 0.8))
@@ -168,7 +170,8 @@ def test_urdf_is_seen_by_its_visuals(tmp_path):
         <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>""")
     robot = subadmm.load(tmp_path / "robot.urdf", backend="cpu")
     image = seen(robot)
-    assert [strongest(image[40, column]) for column in (22, 48, 57, 66)] == [2, 0, 0, 0] and strongest(image[28, 57]) == -1
+    assert [strongest(image[40, column]) for column in (22, 48, 57, 66)] == [2, 0, 0, 0]
+    assert strongest(image[28, 57]) == -1
     assert any("is not shown" in note.reason for note in robot.report)
 
 
@@ -259,7 +262,8 @@ def test_recordings_are_stages(tmp_path, ending):
 def test_endings_say_what_they_need(tmp_path, monkeypatch):
     taken = show.record(subadmm.World(), 0.05)
     find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name in ("imageio_ffmpeg", "pxr") else find(name))
+    monkeypatch.setattr(importlib.util, "find_spec",
+                        lambda name: None if name in ("imageio_ffmpeg", "pxr") else find(name))
     for ending, said in (("mp4", r"subadmm\[video\]"), ("usda", r"subadmm\[usd\]")):
         with pytest.raises(ImportError, match=said):
             taken.save(tmp_path / f"a.{ending}")

@@ -83,8 +83,8 @@ def coloured(*triangles):
     """A picture, 32 x 32, straight down from 10 m on a square of 2 m, of triangles: (corners, colour)."""
     canvas, one = subadmm._core._Canvas(), np.ones((1, 3))
     for corners, colour in triangles:
-        canvas.add(np.array(corners, np.float32), np.array([[0, 1, 2]], np.int32), np.tile([0, 0, 1], (1, 3)).astype(np.float32),
-                   np.zeros(1, np.int32), np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), one,
+        canvas.add(np.array(corners, np.float32), np.array([[0, 1, 2]], np.int32),
+                   np.tile([0, 0, 1], (1, 3)).astype(np.float32), np.zeros(1, np.int32), np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), one,
                    np.array([[*colour, 1]], np.float32), False, None, None)
     light = np.array([[0.0, 0, 0], [1, 1, 1], [1, 1, 1], [0, 0, 0]])
     return canvas.draw(np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), np.zeros(len(triangles), np.uint8), [0.0] * 3,

@@ -113,7 +113,8 @@ def load(
     if overlaps not in ("ignore", "keep"):
         raise ValueError(f"overlaps: {overlaps!r} is neither 'ignore' nor 'keep'")
     report = Report()
-    source, links = (path, None) if isinstance(path, mujoco.MjModel) else compile_file(os.fspath(path), report, floating)
+    compiled = isinstance(path, mujoco.MjModel)
+    source, links = (path, None) if compiled else compile_file(os.fspath(path), report, floating)
     data = start_of(source, keyframe, qpos, qvel)
     from .. import World
 

@@ -14,8 +14,8 @@ KNOWN_MESHES = (".obj", ".stl", ".msh")
 
 @dataclass
 class LinkVisual:
-    """A <visual> of a URDF. place: in the link's frame; kind: 'box', 'sphere', 'cylinder', 'capsule' or 'mesh'; size: of
-    the shape (half extents; radius and half length), of a mesh its scale; rgba: None where the file says none."""
+    """A <visual> of a URDF. place: in the link's frame; kind: 'box', 'sphere', 'cylinder', 'capsule' or 'mesh'; size:
+    of the shape (half extents; radius and half length), of a mesh its scale; rgba: None where the file says none."""
 
     link: str
     place: tuple

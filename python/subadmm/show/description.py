@@ -242,8 +242,8 @@ def tiled(description, count):
         groups.append(Group(group.mesh, False, body.astype(np.int32), *again,
                             [f"{name} ({copy})" for copy in range(count) for name in group.names]))
     radius = float(np.linalg.norm([pitch * (wide - 1) / 2] * 2)) + description.radius
-    return Tiles(groups, rows * count, np.tile(description.dynamic, count), description.centre, radius, description.floor,
-                 places=places)
+    return Tiles(groups, rows * count, np.tile(description.dynamic, count), description.centre, radius,
+                 description.floor, places=places)
 
 
 def _group(mesh, parts, ground):

@@ -186,8 +186,8 @@ def wanted_of(control):
 
 
 def fits(message, control_of, refuse=lambda control, value: None):
-    """May the page say this, a dict? control_of(uuid): a control of it, or None. refuse(control, value): told of a value
-    of a control that does not fit."""
+    """May the page say this, a dict? control_of(uuid): a control of it, or None. refuse(control, value): told of a
+    value of a control that does not fit."""
     kind = message.get("type")
     fields = FIELDS.get(kind) if isinstance(kind, str) else None
     if kind == "SceneNodeDragMessage" and message.get("phase") == "end":   # it lets go, wherever that is
@@ -274,8 +274,8 @@ def _guarded(base, host, made):
 
 
 def tell_refused(server, tell):
-    """tell(label, why): called with each value of a control that the page sends and that is not let in. The page has the
-    old one again."""
+    """tell(label, why): called with each value of a control that the page sends and that is not let in. The page has
+    the old one again."""
     def refuse(control, value):
         shown = repr(value) if isinstance(value, (int, float, str)) else type(value).__name__
         tell(control.label, f"{shown[:60]}; {wanted_of(control)}")

@@ -1,5 +1,5 @@
-"""The part of the view's page that says what there is to see: visuals or shapes that collide, joint frames, grid, and what
-was picked."""
+"""The part of the view's page that says what there is to see: visuals or shapes that collide, joint frames, grid, and
+what was picked."""
 import numpy as np
 
 from ..rotations import multiply, rotate
@@ -54,8 +54,8 @@ class LookPanel:
         self.grid.value = has_ground
         self._grid = scene.add_grid(
             "/grid", infinite_grid=True, cell_size=cell, section_size=5 * cell, cell_color=(168, 174, 184),
-            section_color=(120, 128, 142), cell_thickness=0.8, section_thickness=1.2, fade_distance=14 * description.radius,
-            fade_from="origin", shadow_opacity=0.0, visible=has_ground,
+            section_color=(120, 128, 142), cell_thickness=0.8, section_thickness=1.2,
+            fade_distance=14 * description.radius, fade_from="origin", shadow_opacity=0.0, visible=has_ground,
             position=(0.0, 0.0, description.floor + 2e-3 * description.radius))
         self.joints.disabled = not len(self._rows)
         self._bodies = description.bodies
@@ -111,7 +111,8 @@ class LookPanel:
             if shapes:
                 kinds = sorted({shape.type for shape in shapes})
                 frictions = sorted({round(shape.friction, 4) for shape in shapes})
-                lines.append(f"{len(shapes)} × {', '.join(kinds)}; friction {', '.join(f'{f:g}' for f in frictions[:4])}")
+                slippery = ", ".join(f"{friction:g}" for friction in frictions[:4])
+                lines.append(f"{len(shapes)} × {', '.join(kinds)}; friction {slippery}")
             joints = [joint for joint in session.world.joints if body in (joint.body_a, joint.body_b)]
             if joints:
                 lines.append(", ".join(f"{joint.kind} joint" for joint in joints[:6]))

@@ -1,5 +1,5 @@
-"""Pictures of a world without a window or a GPU: triangles with a sun, its shadows and ambient occlusion. The work is done
-in module/draw.cpp."""
+"""Pictures of a world without a window or a GPU: triangles with a sun, its shadows and ambient occlusion. The work is
+done in module/draw.cpp."""
 from __future__ import annotations
 
 import weakref
@@ -19,7 +19,7 @@ SUN = np.array([-0.42, -0.5, 0.76]) / np.linalg.norm([-0.42, -0.5, 0.76])   # to
 _LIGHT = np.array([np.array([1.0, 0.95, 0.86]) * 0.82, np.array([0.86, 0.93, 1.0]) * 0.62,
                    np.array([0.92, 0.88, 0.82]) * 0.3, np.array([0.93, 0.945, 0.965]) ** 2.2])
 _FINE = {"smooth": 2, "shadow": 2048, "neighbours": 28}
-_QUICK = {"smooth": 1, "shadow": 1024, "neighbours": 10}
+_QUICK = {"smooth": 1, "shadow": 1024, "neighbours": 8}
 
 
 def check_size(width, height, prefix=""):
@@ -53,8 +53,8 @@ def drawn(description, positions, orientations, camera, width, height, *, smooth
     return _canvas_of(description).draw(
         np.ascontiguousarray(positions, float), np.ascontiguousarray(orientations, float),
         np.concatenate([np.zeros(0, bool), *hidden]).astype(np.uint8), description.centre.tolist(), camera.eye.tolist(),
-        camera.target.tolist(), np.ascontiguousarray(camera.axes()), focal, 1e-2 * description.radius, description.radius,
-        SUN.tolist(), _LIGHT, width, height, smooth, shadow, neighbours, threads)
+        camera.target.tolist(), np.ascontiguousarray(camera.axes()), focal, 1e-2 * description.radius,
+        description.radius, SUN.tolist(), _LIGHT, width, height, smooth, shadow, neighbours, threads)
 
 
 def _as_camera(source, camera, description):
@@ -72,8 +72,8 @@ def picture(world: Any, width: int = 960, height: int = 600, camera: Any = None,
     """A world, or what load() returned, as it is now: height x width x 3, uint8, sRGB. The same world gives the same
     picture.
 
-    width, height: in [16, 8192]; camera: Camera, or None: all that moves in view, or the name of a camera of a loaded MJCF
-    file; smooth: samples along a pixel's side, 1 to 4."""
+    width, height: in [16, 8192]; camera: Camera, or None: all that moves in view, or the name of a camera of a loaded
+    MJCF file; smooth: samples along a pixel's side, 1 to 4."""
     width, height = check_size(width, height)
     smooth = whole("smooth", smooth, 1, 4)
     description = description or describe(world)

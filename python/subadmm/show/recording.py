@@ -42,8 +42,8 @@ class Recording:
         return self.positions[frame] * self.position_step, turns / np.linalg.norm(turns, axis=1, keepdims=True)
 
     def save(self, path: Any, **options: Any) -> None:
-        """Write a file that its ending says: .html, a page that plays by itself; .glb, glTF with animation; .mp4, a video
-        (needs the extra `video`); .usd, .usda, .usdc, a stage with poses over time (needs the extra `usd`). It is
+        """Write a file that its ending says: .html, a page that plays by itself; .glb, glTF with animation; .mp4, a
+        video (needs the extra `video`); .usd, .usda, .usdc, a stage with poses over time (needs the extra `usd`). It is
         complete, or as it was.
 
         Of .mp4: width and height, even, pixels, in [16, 8192] (1280 x 720); camera: a Camera, or None: what moves in
@@ -116,7 +116,8 @@ def check_frames(fps, contacts, prefix=""):
 def record(world: Any, seconds: float, fps: float = 30.0, title: str = "", contacts: int = 0,
            after_frame: Callable[[int, int], None] | None = None) -> Recording:
     """Step a world, or what load() returned, for a time (s, simulated) and keep its poses `fps` times a second, at the
-    nearest step; the first frame is the world as it is. contacts: so many of the largest contact forces are kept a frame, with their errors
+    nearest step; the first frame is the world as it is. contacts: so many of the largest contact forces are
+    kept a frame, with their errors
     where settings ask for certificates. seconds: in (0, 1e9], fps: in (0, 1000], MOST_FRAMES frames at most.
     after_frame(frame, frames): called after each."""
     seconds = real("seconds", seconds, 0, 1e9, above=True)

@@ -1,4 +1,4 @@
-"""A world that runs at the speed of a clock, with its figures over time, its last minute, and a hand that pulls bodies."""
+"""A world that runs at the speed of a clock, with figures over time, its last minute, and a hand that pulls bodies."""
 import threading
 import time
 from collections import deque

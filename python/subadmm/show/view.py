@@ -270,8 +270,8 @@ class View:
                 handle = scene.add_batched_meshes_simple(
                     name, mesh.vertices, mesh.triangles, turn, place, batched_scales=group.scale,
                     batched_colors=_linear(group.colour),
-                    batched_opacities=group.opacity.astype(np.float32) if (group.opacity < 1).any() else None, lod="off",
-                    cast_shadow=not group.is_ground, visible=visible)
+                    batched_opacities=group.opacity.astype(np.float32) if (group.opacity < 1).any() else None,
+                    lod="off", cast_shadow=not group.is_ground, visible=visible)
             else:
                 handle = scene.add_batched_meshes_trimesh(
                     name, _textured(group), turn, place, batched_scales=group.scale, lod="off",
@@ -384,8 +384,8 @@ _NO_CURVE = (np.zeros(1), np.zeros(1))
 
 
 def _linear(colour):
-    """Colours n x 3 as the page takes those of instances: linear, where meshes and textures have sRGB. As sRGB they would
-    be pale."""
+    """Colours n x 3 as the page takes those of instances: linear, where meshes and textures have sRGB. As sRGB they
+    would be pale."""
     return np.rint(np.clip(colour, 0, 1) ** 2.2 * 255).astype(np.uint8)
 
 
@@ -412,8 +412,8 @@ def _backends():
 
 
 def serve(build, title="", host="127.0.0.1", port=8080):
-    """Show build(), a new world, what load() returned or Environments, at http://host:port until it is interrupted. host: an address or a name of this machine;
-    port: in [0, 65535], or the next one that is free; 0: any. Raises OSError where it cannot be served there."""
+    """Show build(), a new world, what load() returned or Environments, at http://host:port until it is interrupted.
+    host: an address or a name of this machine; port: in [0, 65535], or the next one that is free; 0: any. Raises OSError where it cannot be served there."""
     guard.free_port(host, whole("port", port, 0, 65535))     # before a world is built
     view = View(Session(build), title, host, port)
     print(f"{title}: {view.url}", flush=True)

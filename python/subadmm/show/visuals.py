@@ -55,7 +55,7 @@ def _scaled(mesh, linear):
     return Mesh(mesh.vertices @ np.asarray(linear).T, np.ascontiguousarray(triangles, np.int32), uv, mesh.image)
 
 
-# ---- MJCF --------------------------------------------------------------------------------------------------------------
+# ---- MJCF ------------------------------------------------------------------------------------------------------------
 
 
 def _image(source, texture):
@@ -99,7 +99,8 @@ def _geom_mesh(source, index, image):
 
 def _flat_plane(repeat, image, size=None):
     """size: half its lengths, m; None: a plane without ends, whose uv is `repeat`."""
-    mesh = Mesh(np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
+    mesh = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
     if size is not None:
         mesh.vertices *= [*size, 1]
     if repeat is not None:
@@ -125,7 +126,8 @@ def _of_skins(loaded):
         largest, bone_of = np.zeros(count), np.full(count, -1)
         bones = range(int(source.skin_boneadr[k]), int(source.skin_boneadr[k] + source.skin_bonenum[k]))
         for bone in bones:
-            at = slice(int(source.skin_bonevertadr[bone]), int(source.skin_bonevertadr[bone] + source.skin_bonevertnum[bone]))
+            begin = int(source.skin_bonevertadr[bone])
+            at = slice(begin, begin + int(source.skin_bonevertnum[bone]))
             ids, weights = np.array(source.skin_bonevertid[at]), np.array(source.skin_bonevertweight[at])
             more = weights > largest[ids]
             largest[ids[more]], bone_of[ids[more]] = weights[more], bone
@@ -193,12 +195,12 @@ def _of_geoms(loaded):
             continue
         if image is not None and not used:
             colour = colour * Mesh(None, None, None, image).tint
-        out.append(Visual(name_of(source, "geom", index), None if group.kind == "static" else group.body, *place, key, make,
-                          scale, colour if said else None, float(rgba[3]), plane))
+        out.append(Visual(name_of(source, "geom", index), None if group.kind == "static" else group.body, *place, key,
+                          make, scale, colour if said else None, float(rgba[3]), plane))
     return out
 
 
-# ---- URDF --------------------------------------------------------------------------------------------------------------
+# ---- URDF ------------------------------------------------------------------------------------------------------------
 
 
 def _parts_of_file(file):
@@ -271,7 +273,7 @@ def _of_links(loaded):
     return out
 
 
-# ---- USD ---------------------------------------------------------------------------------------------------------------
+# ---- USD -------------------------------------------------------------------------------------------------------------
 
 
 def _input(shader, name, depth=0):
