@@ -152,6 +152,21 @@ def test_textures_of_planes_are_repeated_as_the_file_says(tmp_path):
     assert set(row[41:int(40 + metre)]) == {2} and set(row[int(41 + metre):int(45 + metre)]) == {0}
 
 
+def test_boxes_have_the_sides_of_a_cube_texture(tmp_path):
+    pytest.importorskip("mujoco")
+    sides = {"right": (255, 0, 0), "front": (0, 255, 0), "back": (9, 9, 9), "left": (9, 9, 9), "up": (0, 0, 255)}
+    for name, colour in (*sides.items(), ("down", (9, 9, 9))):
+        (tmp_path / f"{name}.png").write_bytes(show.picture.__globals__["png_of"](np.full((16, 16, 3), colour, np.uint8)))
+    files = " ".join(f'file{name}="{name}.png"' for name in (*sides, "down"))
+    (tmp_path / "die.xml").write_text(f"""<mujoco><asset><texture name="die" type="cube" {files}/>
+      <material name="die" texture="die"/></asset>
+      <worldbody><body><freejoint/><geom type="box" size=".4 .4 .4" material="die"/></body></worldbody></mujoco>""")
+    die = subadmm.load(tmp_path / "die.xml", backend="cpu")
+    for eye, side in (((4, 0, 0.01), 0), ((0, 0.01, 4), 1), ((0, 4, 0.01), 2)):
+        image = seen(die, show.Camera(eye, (0, 0, 0), 0.3))
+        assert strongest(image[40, 40]) == side and strongest(image[14, 66]) == side
+
+
 def test_urdf_is_seen_by_its_visuals(tmp_path):
     pytest.importorskip("mujoco")
     trimesh = pytest.importorskip("trimesh")

@@ -20,8 +20,8 @@ _FILLED = 0.9   # share of a picture that what moves may take
 class Camera:
     """eye, target: m, world frame, apart; field: vertical angle of view, rad, in [0.001, 3]; up: what is up in the
     picture, world frame, as far as it can be."""
-    eye: np.ndarray
-    target: np.ndarray
+    eye: Any
+    target: Any
     field: float = 0.6
     up: Any = (0.0, 0.0, 1.0)
 

@@ -74,6 +74,12 @@ class Description:
     radius: float
     floor: float              # m, the highest ground plane under it, or the lowest point
     half: np.ndarray | None = None    # of a box around what moves, m; None: a ball
+    fixed: int = 0            # rows that are no body's, at the end
+
+    @property
+    def count(self):
+        """Bodies that there are."""
+        return self.bodies - self.fixed
 
     def poses(self, state):
         """(positions, orientations) of the rows, of the array body_state of the world (n x 13)."""
@@ -182,7 +188,7 @@ def describe(world: Any, collision: bool = False, reach: float = 12.0) -> Descri
     if fixed:
         dynamic.append(False)
     dynamic = np.array(dynamic, dtype=bool)
-    whole = Description([], count + fixed, dynamic, np.zeros(3), 1.0, 0.0)
+    whole = Description([], count + fixed, dynamic, np.zeros(3), 1.0, 0.0, fixed=int(fixed))
     positions, turns = whole.poses(state)
 
     # How large what moves is, from the shapes' meshes; planes come afterwards, with a patch that fits.
@@ -243,7 +249,7 @@ def tiled(description, count):
                             [f"{name} ({copy})" for copy in range(count) for name in group.names]))
     radius = float(np.linalg.norm([pitch * (wide - 1) / 2] * 2)) + description.radius
     return Tiles(groups, rows * count, np.tile(description.dynamic, count), description.centre, radius,
-                 description.floor, places=places)
+                 description.floor, fixed=count * description.fixed, places=places)
 
 
 def _group(mesh, parts, ground):

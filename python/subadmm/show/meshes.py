@@ -16,8 +16,8 @@ DETAIL = 24
 class Mesh:
     """vertices: n x 3, m; triangles: m x 3 indices. Vertices are shared by the triangles that meet there.
 
-    Where it has a texture: uv: m x 3 x 2, of the triangles' corners, v up; image: height x width x 3, uint8, sRGB, its
-    uppermost row first."""
+    Where it has a texture: uv: m x 3 x 2, of the triangles' corners, v down from the image's uppermost row;
+    image: height x width x 3, uint8, sRGB."""
     vertices: np.ndarray
     triangles: np.ndarray
     uv: np.ndarray | None = None

@@ -79,6 +79,7 @@ def page_of(recording) -> str:
     header = {
         "title": recording.title,
         "bodies": description.bodies,
+        "count": description.count,
         "frames": len(recording.times),
         "centre": list(map(float, description.centre)),
         "radius": description.radius,

@@ -413,7 +413,8 @@ def _backends():
 
 def serve(build, title="", host="127.0.0.1", port=8080):
     """Show build(), a new world, what load() returned or Environments, at http://host:port until it is interrupted.
-    host: an address or a name of this machine; port: in [0, 65535], or the next one that is free; 0: any. Raises OSError where it cannot be served there."""
+    host: an address or a name of this machine; port: in [0, 65535], or the next one that is
+    free; 0: any. Raises OSError where it cannot be served there."""
     guard.free_port(host, whole("port", port, 0, 65535))     # before a world is built
     view = View(Session(build), title, host, port)
     print(f"{title}: {view.url}", flush=True)

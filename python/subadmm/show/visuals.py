@@ -108,6 +108,35 @@ def _flat_plane(repeat, image, size=None):
     return mesh
 
 
+#: Of a cube's sides in the image, from the uppermost one on: the axis, its sign, and what is to the right and down.
+_SIDES = ((0, 1, (0, 0, -1), (0, -1, 0)), (0, -1, (0, 0, 1), (0, -1, 0)), (1, 1, (1, 0, 0), (0, 0, 1)),
+          (1, -1, (1, 0, 0), (0, 0, -1)), (2, 1, (1, 0, 0), (0, -1, 0)), (2, -1, (-1, 0, 0), (0, -1, 0)))
+
+
+def _boxed(image):
+    """A box of half extents 1 with the six sides of a cube's image on it."""
+    plain = form_of(_unit_box())[2]()
+    normals, corners = plain.triangle_normals(), plain.vertices[plain.triangles]
+    uv, inset = np.zeros((len(corners), 3, 2)), 1 - 1 / image.shape[1]
+    for side, (axis, sign, right, down) in enumerate(_SIDES):
+        of = normals[:, axis] * sign > 0.5
+        uv[of, :, 0] = (corners[of] @ np.array(right) * inset + 1) / 2
+        uv[of, :, 1] = (side + (corners[of] @ np.array(down) * inset + 1) / 2) / 6
+    return Mesh(plain.vertices, plain.triangles, uv, image)
+
+
+def _unit_box():
+    from .. import box
+
+    return box(1, 1, 1)
+
+
+def _papered(repeat, image):
+    """The same with a flat image, which is laid on it from above."""
+    plain = form_of(_unit_box())[2]()
+    return Mesh(plain.vertices, plain.triangles, plain.vertices[plain.triangles][..., :2] * repeat, image)
+
+
 def _of_skins(loaded):
     """Skins, in pieces: each triangle is on the body that has the largest part in it."""
     source, out = loaded.source, []
@@ -188,6 +217,13 @@ def _of_geoms(loaded):
                 used = mesh_image is not None and source.mesh_texcoordadr[int(source.geom_dataid[index])] >= 0
                 key = "geom", int(source.geom_dataid[index]), material if used else -1
                 make = lambda k=index, i=mesh_image if used else None: _geom_mesh(source, k, i)  # noqa: E731
+            elif kind == kinds.mjGEOM_BOX and image is not None and (flat or image.shape[0] == 6 * image.shape[1]):
+                scale, used = np.array(source.geom_size[index], float), True
+                repeat = np.array(source.mat_texrepeat[material], float) / 2
+                if source.mat_texuniform[material]:
+                    repeat = repeat * scale[:2]
+                key = "papered", material, tuple(repeat) if flat else ()
+                make = (lambda r=repeat, i=image: _papered(r, i)) if flat else (lambda i=image: _boxed(i))
             else:
                 shape, = makes.make(index, False)
                 (key, scale, make), used = form_of(shape), False
