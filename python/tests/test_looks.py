@@ -11,7 +11,8 @@ import subadmm
 from subadmm import show
 from subadmm.show.colours import NAMED, named_colour
 from subadmm.show.description import tiled
-from subadmm.show.picture import drawn
+from subadmm.show.picture import SUN, drawn
+from subadmm.show.png import png_of
 from subadmm.show.session import Session
 
 ABOVE = show.Camera((0.0, -0.001, 6), (0.0, 0, 0), 0.6)
@@ -82,8 +83,7 @@ def test_there_is_no_acne_on_what_the_sun_shines_on():
     world = subadmm.World(backend="cpu")
     world.add_ground()
     world.add_solid(subadmm.sphere(1.0), mass=1, position=(0, 0, 1), name="white")
-    sun = show.picture.__globals__["SUN"]
-    for camera in (show.Camera(6 * sun + (0, 0, 1), (0, 0, 1.0), 0.5), show.Camera((0.0, -6, 3), (0, 0, 1.0), 0.5)):
+    for camera in (show.Camera(6 * SUN + (0, 0, 1), (0, 0, 1.0), 0.5), show.Camera((0.0, -6, 3), (0, 0, 1.0), 0.5)):
         image = seen(world, camera).sum(axis=2) / 3
         # From the sun, and where the light is even, neighbours differ by the roundness only: no dark pixels in between.
         inner = image[25:55, 25:55]
@@ -156,7 +156,7 @@ def test_boxes_have_the_sides_of_a_cube_texture(tmp_path):
     pytest.importorskip("mujoco")
     sides = {"right": (255, 0, 0), "front": (0, 255, 0), "back": (9, 9, 9), "left": (9, 9, 9), "up": (0, 0, 255)}
     for name, colour in (*sides.items(), ("down", (9, 9, 9))):
-        (tmp_path / f"{name}.png").write_bytes(show.picture.__globals__["png_of"](np.full((16, 16, 3), colour, np.uint8)))
+        (tmp_path / f"{name}.png").write_bytes(png_of(np.full((16, 16, 3), colour, np.uint8)))
     files = " ".join(f'file{name}="{name}.png"' for name in (*sides, "down"))
     (tmp_path / "die.xml").write_text(f"""<mujoco><asset><texture name="die" type="cube" {files}/>
       <material name="die" texture="die"/></asset>

@@ -79,10 +79,9 @@ class View:
         speed = gui.add_slider("speed", 0.05, 2.0, 0.05, 1.0)
         self._time = TimePanel(self.server, session, self.title, self._describe, self._complain)
         self._layers = {}
-        self._look = None
+        self._look = LookPanel(self.server, session, self._layer_names())
         self._actuators = ActuatorPanel(self.server, session)
         self._steering = SteeringPanel(self.server, session, self._is_near)
-        self._look = LookPanel(self.server, session, self._layer_names())
         with gui.add_folder("Solver", expand_by_default=False):
             self._method = gui.add_dropdown("method", _names["method"], initial_value=settings.method)
             self._iterations = gui.add_number("iterations", settings.iterations, min=1, max=1000000, step=1)

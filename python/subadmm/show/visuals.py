@@ -413,7 +413,7 @@ def _of_stage(loaded):
                 key, scale, make = form_of(shape)
             if opacity >= 0.03:
                 out.append(Visual(str(prim.GetPath()), body, *place, key, make, scale, colour, opacity, plane))
-        except (Error, NoMesh, ValueError) as error:
+        except (Error, NoMesh, ValueError, OSError, ImportError, RuntimeError) as error:   # (USD's own are RuntimeErrors)
             loaded.report.add(reader.element(prim), f"is not shown: {error}")
     return out
 
