@@ -111,6 +111,7 @@ struct shared {
 
 struct buffer {
     int width, height;
+    bool keeps; // which triangles are seen, not only how far away
     std::vector<float> depth;
     std::vector<int32_t> which;
 };
@@ -141,7 +142,7 @@ void rasterise(const std::vector<flat_triangle> &all, const std::vector<uint8_t>
 {
     int bands = (out.height + BAND - 1) / BAND;
     out.depth.assign((size_t)out.width * (size_t)out.height, FAR);
-    out.which.assign(out.depth.size(), -1);
+    if (out.keeps) out.which.assign(out.depth.size(), -1);
     std::vector<std::vector<int32_t>> in((size_t)bands);
     for (size_t t = 0; t < all.size(); ++t) {
         const flat_triangle &f = all[t];
@@ -184,14 +185,15 @@ void rasterise(const std::vector<flat_triangle> &all, const std::vector<uint8_t>
                 int first = (int)std::ceil(low - 0.5), last = std::min((int)std::floor(high - 0.5), out.width - 1);
                 first = std::max(first, 0);
                 float *depth = &out.depth[(size_t)row * (size_t)out.width];
-                int32_t *which = &out.which[(size_t)row * (size_t)out.width];
+                int32_t *which = out.keeps ? &out.which[(size_t)row * (size_t)out.width] : nullptr;
                 double e1 = (double)f.d[1] - f.d[0], e2 = (double)f.d[2] - f.d[0];
                 double d = f.d[0] + value[0] * e1 + value[1] * e2, dx = bx * e1 + cx * e2;
                 for (int column = first; column <= last; ++column) {
                     float here = (float)(d + dx * (column + 0.5));
                     if (here < depth[column]) {
                         if (clear && bayer[(row & 3) * 4 + (column & 3)] >= alpha[(size_t)t]) continue;
-                        depth[column] = here, which[column] = t;
+                        depth[column] = here;
+                        if (which) which[column] = t;
                     }
                 }
             }
@@ -423,6 +425,7 @@ void paint(canvas &c, const view &w, uint8_t *out)
 {
     int wide = w.width * w.smooth, high = w.height * w.smooth, size = w.shadow;
     c.seen.width = wide, c.seen.height = high, c.sun.width = c.sun.height = size;
+    c.seen.keeps = true, c.sun.keeps = false;
     // The sun's picture: what it sees, along its light.
     v3 side = unit(cross({0, 1, 0}, w.sun)), upward = cross(w.sun, side);
     float reach = 1.7f * w.radius, scale = (float)size / (2 * reach);
@@ -561,30 +564,31 @@ void paint(canvas &c, const view &w, uint8_t *out)
         for (int y = (int)band * BAND; y < std::min(((int)band + 1) * BAND, w.height); ++y)
             for (int x = 0; x < w.width; ++x) {
                 v3 sum{0, 0, 0};
-                for (int j = 0; j < w.smooth * w.smooth; ++j) {
-                    int row = y * w.smooth + j / w.smooth, column = x * w.smooth + j % w.smooth;
-                    size_t k = (size_t)row * (size_t)wide + (size_t)column;
-                    v3 colour = w.backdrop;
-                    if (c.seen.which[k] >= 0) {
-                        v3 at = s.at[k], normal = s.normal[k];
-                        size_t beside = (size_t)(row & ~1) * (size_t)wide + (size_t)(column & ~1);
-                        v3 away = s.at[beside] - at;
-                        bool same = beside != k && c.seen.which[beside] >= 0 && dot(s.normal[beside], normal) > 0.95f &&
-                                    dot(away, away) < 0.01f * near * near;
-                        float open = same ? s.open[beside] : openness(k, row, column);
-                        s.open[k] = open;
-                        float sky = 0.5f + 0.5f * normal.z;
-                        v3 light = direct[k] + open * (sky * w.sky_light + (1 - sky) * w.ground_light);
-                        colour = times(s.colour[k], light);
-                        colour = colour + fade[k] * (w.backdrop - colour);
+                for (int j = 0; j < w.smooth; ++j)
+                    for (int i = 0; i < w.smooth; ++i) {
+                        int row = y * w.smooth + j, column = x * w.smooth + i;
+                        size_t k = (size_t)row * (size_t)wide + (size_t)column;
+                        v3 colour = w.backdrop;
+                        if (c.seen.which[k] >= 0) {
+                            v3 at = s.at[k], normal = s.normal[k];
+                            size_t beside = (size_t)(row & ~1) * (size_t)wide + (size_t)(column & ~1);
+                            v3 away = s.at[beside] - at;
+                            bool same = beside != k && c.seen.which[beside] >= 0 &&
+                                        dot(s.normal[beside], normal) > 0.95f && dot(away, away) < 0.01f * near * near;
+                            float open = same ? s.open[beside] : openness(k, row, column);
+                            s.open[k] = open;
+                            float sky = 0.5f + 0.5f * normal.z;
+                            v3 light = direct[k] + open * (sky * w.sky_light + (1 - sky) * w.ground_light);
+                            colour = times(s.colour[k], light);
+                            colour = colour + fade[k] * (w.backdrop - colour);
+                        }
+                        sum = sum + colour;
                     }
-                    sum = sum + colour;
-                }
                 float share = 4096 / (float)(w.smooth * w.smooth);
                 uint8_t *p = out + 3 * ((size_t)y * (size_t)w.width + (size_t)x);
-                p[0] = curve[(size_t)std::clamp(sum.x * share + 0.5f, 0.f, 4096.f)];
-                p[1] = curve[(size_t)std::clamp(sum.y * share + 0.5f, 0.f, 4096.f)];
-                p[2] = curve[(size_t)std::clamp(sum.z * share + 0.5f, 0.f, 4096.f)];
+                p[0] = curve[(size_t)(int)std::clamp(sum.x * share + 0.5f, 0.f, 4096.f)];
+                p[1] = curve[(size_t)(int)std::clamp(sum.y * share + 0.5f, 0.f, 4096.f)];
+                p[2] = curve[(size_t)(int)std::clamp(sum.z * share + 0.5f, 0.f, 4096.f)];
             }
     });
 }
