@@ -113,7 +113,7 @@ step_python() {
     python3 -m venv "$folder/environment" || return 1
     # One instruction set, no CUDA: the steps beside this one have the others. The command is built to compare with:
     # another instruction set rounds otherwise.
-    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "$project[test,import,usd,decompose,view,gym]" \
+    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "$project[test,import,usd,decompose,view,video,gym]" \
         -Csetup-args=-Dcuda=disabled -Csetup-args=-Dcpu_isas=avx2 -Csetup-args=-Dwerror=true \
         -Csetup-args=-Dcli=enabled \
         -Cbuild-dir="$folder/build" || return 1

@@ -365,3 +365,4 @@ void bind_queries(nb::class_<world> &w);
 void bind_events(nb::module_ &m, nb::class_<world> &w);
 void bind_scenes(nb::module_ &m, nb::class_<world> &w);
 void bind_environments(nb::module_ &m);
+void bind_draw(nb::module_ &m);

@@ -276,6 +276,18 @@ def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(
                            category, mask, from_inside, from_behind, sensors)
 
 
+def _render(self, width=640, height=480, camera=None):
+    """A picture of the world as it is now: height x width x 3, uint8, sRGB, in software, without a window or a GPU.
+
+    width, height: pixels, in [16, 8192]; camera: a show.Camera (eye and target in m, world frame; field in rad), or
+    None: all that moves in view. The same world gives the same picture. show.picture() is smoother, and takes longer. Raises
+    ValueError (out of range), TypeError (of another type)."""
+    from .show import render
+
+    return render(self, width, height, camera)
+
+
+World.render = _render
 World.to_json = _to_json
 World.cast_rays = _cast_rays
 World.add_ground = _add_ground

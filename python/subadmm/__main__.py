@@ -1,5 +1,6 @@
 """python -m subadmm view | record | picture SCENE: scenes to look at; convert FILE: robots as scene files."""
 import argparse
+import os
 import signal
 import sys
 import threading
@@ -19,7 +20,8 @@ def _arguments():
     commands = parser.add_subparsers(dest="command", required=True)
     view = commands.add_parser("view", help="open a page with the running scene (needs: pip install 'subadmm[view]')")
     record = commands.add_parser(
-        "record", help="run a scene into a page that plays by itself (.html) or a glTF file (.glb)"
+        "record", help="run a scene into a page that plays by itself (.html), glTF (.glb), a video (.mp4; needs: pip "
+                       "install 'subadmm[video]') or a stage (.usd, .usda, .usdc; needs: 'subadmm[usd]')"
     )
     picture = commands.add_parser("picture", help="run a scene and write a picture of its end (.png)")
     for command in (view, record, picture):
@@ -40,7 +42,9 @@ def _arguments():
     record.add_argument("--contacts", type=int, default=0, metavar="N",
                         help="keep the N largest contact forces of each frame, for arrows in the page (0)")
     record.add_argument("--certify", action="store_true", help="measure the true error of every step, for the plots")
+    record.add_argument("--size", default="1280x720", help="of .mp4, WIDTHxHEIGHT in pixels, even (1280x720)")
     picture.add_argument("--size", default="960x600", help="WIDTHxHEIGHT in pixels (960x600)")
+    picture.add_argument("--collision", action="store_true", help="of robots' files: the shapes that collide")
     picture.add_argument("--azimuth", type=float, default=-60, help="where the camera stands, degrees (-60)")
     picture.add_argument("--elevation", type=float, default=24, help="degrees (24)")
     picture.add_argument("--zoom", type=float, default=1, help="2: twice as near (1)")
@@ -55,6 +59,7 @@ def _arguments():
     convert.add_argument("--keyframe", help="MJCF: the keyframe to start from")
     convert.add_argument("--decompose", action="store_true",
                          help="several hulls for each mesh of a moving body (needs: pip install 'subadmm[decompose]')")
+    view.add_argument("--copies", type=int, default=1, help="so many environments, side by side (1)")
     view.add_argument("--host", default="127.0.0.1", help="address to serve at (127.0.0.1: this machine only)")
     view.add_argument("--port", type=int, default=8080, help="port to serve at (8080)")
     return parser
@@ -81,7 +86,7 @@ def _check_run(given):
 
 def _record(build, given):
     from subadmm import show
-    from subadmm.show.recording import check_ending, check_frames
+    from subadmm.show.recording import check_ending, check_frames, check_video
 
     check_ending("--output", given.output)
     check_frames(given.fps, given.contacts, "--")
@@ -96,15 +101,30 @@ def _record(build, given):
                 f"\rframe {frame + 1} of {frames}", end="\n" if frame + 1 == frames else "", file=sys.stderr, flush=True
             )
 
+    options = {}
+    if given.output.endswith(".mp4"):
+        width, height = _size(given.size)
+        options = {"width": width, "height": height}
+        check_video(**options)
     with Output("--output", given.output, read_by(given.scene)) as file:
-        world = build()
+        source = build()
+        world = getattr(source, "world", source)
         if given.certify:
             settings = world.settings
             settings.certify = True
             world.settings = settings
         seconds = _steps(world, given) * world.settings.dt
-        made = show.record(world, seconds, given.fps, title=given.scene, contacts=given.contacts, after_frame=progress)
-        file.write(made.data(given.output))
+        made = show.record(source, seconds, given.fps, title=given.scene, contacts=given.contacts, after_frame=progress)
+        file.write(made.data(given.output, **options))
+
+
+def _size(given):
+    """(width, height) of --size."""
+    try:
+        width, height = map(int, given.split("x"))
+    except ValueError:
+        raise ValueError(f"--size: {given}; must be WIDTHxHEIGHT, as 960x600") from None
+    return width, height
 
 
 def _picture(build, given):
@@ -115,25 +135,31 @@ def _picture(build, given):
 
     if not given.output.endswith(".png"):
         raise ValueError(f"--output: {given.output}; must end in .png")
-    try:
-        width, height = map(int, given.size.split("x"))
-    except ValueError:
-        raise ValueError(f"--size: {given.size}; must be WIDTHxHEIGHT, as 960x600") from None
+    width, height = _size(given.size)
     check_size(width, height, "--size: ")
     check_place(given.azimuth, given.elevation, given.zoom, "--")
     _check_run(given)
     with Output("--output", given.output, read_by(given.scene)) as file:
-        world = build()
+        source = build()
+        world = getattr(source, "world", source)
         world.step(_steps(world, given))
-        description = show.describe(world)
+        description = show.describe(source, collision=given.collision)
         camera = show.looking_at(description, given.azimuth, given.elevation, given.zoom)
-        file.write(png_of(show.picture(world, width, height, camera=camera, description=description)))
+        file.write(png_of(show.picture(source, width, height, camera=camera, description=description)))
 
 
 def _view(build, given):
     from subadmm.show.view import serve
 
-    serve(build, given.scene, host=given.host, port=whole("--port", given.port, 0, 65535))
+    copies, one = whole("--copies", given.copies, 1, 10000), build
+    if copies > 1:
+        def build():
+            source = one()
+            world = getattr(source, "world", source)
+            if world.has_script:
+                world.script = False
+            return subadmm.replicate(source, copies)
+    serve(build, os.path.basename(given.scene), host=given.host, port=whole("--port", given.port, 0, 65535))
 
 
 def _convert(given):
@@ -177,12 +203,12 @@ def main(arguments=None):
         settings = {name: getattr(given, name) for name in ("iterations", "threads")
                     if getattr(given, name) is not None}
         if given.scene.endswith(MODELS):
-            world = subadmm.load(given.scene, backend=given.backend, precision=given.precision or "f64").world
-            changed = world.settings
+            loaded = subadmm.load(given.scene, backend=given.backend, precision=given.precision or "f64")
+            changed = loaded.world.settings
             for name, value in {**settings, **({"method": given.method} if given.method else {})}.items():
                 setattr(changed, name, value)
-            world.settings = changed
-            return world
+            loaded.world.settings = changed
+            return loaded
         return subadmm.scene(given.scene, backend=given.backend, precision=given.precision, method=given.method,
                              settings=settings)
 

@@ -133,3 +133,33 @@ def test_steering_switches_in_the_page(shown):
         page.evaluate(f"document.getElementById({where}.htmlFor).click()")
         assert until(lambda: shown.session.steering.on)
         assert until(lambda: shown._steering._gizmos[0].visible) and page.errors == []
+
+
+def test_keys_run_step_and_reset(shown):
+    session = shown.session
+
+    def press(page, key, code, number):
+        for kind in ("keyDown", "keyUp"):
+            page.call("Input.dispatchKeyEvent", type=kind, key=key, code=code, windowsVirtualKeyCode=number,
+                      **({"text": key} if kind == "keyDown" and len(key) == 1 else {}))
+
+    with browser.Page(shown.url, 500, 300) as page:
+        page.wait_for("document.body.innerText.includes('contacts')", 60)
+        press(page, " ", "Space", 32)
+        assert until(lambda: not session.running)
+        steps = session.steps
+        time.sleep(0.3)
+        press(page, "ArrowRight", "ArrowRight", 39)
+        assert until(lambda: session.steps == steps + 1)
+        press(page, "r", "KeyR", 82)
+        assert until(lambda: session.steps == 0)
+        # The button has the focus after a click, and space would press it, too.
+        where = "[...document.querySelectorAll('button')].find((b) => b.textContent.trim() == 'Run')"
+        page.wait_for(f"!!{where}")
+        page.evaluate(f"{where}.focus(); {where}.click()")
+        assert until(lambda: session.running)
+        time.sleep(0.5)
+        press(page, " ", "Space", 32)
+        assert until(lambda: not session.running)
+        time.sleep(0.5)
+        assert not session.running and page.errors == []

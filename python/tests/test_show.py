@@ -13,7 +13,6 @@ from browser import decoded
 from subadmm import show
 from subadmm.__main__ import main
 from subadmm.show import packing, page, png, recording
-from subadmm.show.raster import rasterise
 from subadmm.show.session import Session
 
 try:
@@ -80,12 +79,25 @@ def test_sensors_are_not_drawn():
     assert len(groups) == 1 and len(groups[0].body) == 1 and groups[0].body[0] == body.index
 
 
+def coloured(*triangles):
+    """A picture, 32 x 32, straight down from 10 m on a square of 2 m, of triangles: (corners, colour)."""
+    canvas, one = subadmm._core._Canvas(), np.ones((1, 3))
+    for corners, colour in triangles:
+        canvas.add(np.array(corners, np.float32), np.array([[0, 1, 2]], np.int32),
+                   np.tile([0, 0, 1], (1, 3)).astype(np.float32), np.zeros(1, np.int32), np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), one,
+                   np.array([[*colour, 1]], np.float32), False, None, None)
+    light = np.array([[0.0, 0, 0], [1, 1, 1], [1, 1, 1], [0, 0, 0]])
+    return canvas.draw(np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), np.zeros(len(triangles), np.uint8), [0.0] * 3,
+                       [0.0, 0, 10], [0.0] * 3, np.eye(3), 160.0, 0.1, 2.0, [0.0, 0, 1], light, 32, 32, 1, 64, 0, 1)
+
+
 def test_the_nearest_triangle_is_seen_and_triangles_that_share_an_edge_leave_no_gap():
-    far = [[1, 1, 2.0], [1, 31, 2], [31, 31, 2]], [[1, 1, 2.0], [31, 31, 2], [31, 1, 2]]
-    near = [[8, 8, 1.0], [8, 24, 1], [24, 24, 1]]
-    seen, depth = rasterise(np.array([*far, near, near[::-1]]), 32, 32)
-    assert (seen[1:31, 1:31] >= 0).all() and (seen[0] == -1).all() and np.isinf(depth[0]).all()
-    assert seen[20, 12] == 2 and depth[20, 12] == 1 and depth[2, 20] == 2 and not (seen == 3).any()
+    far = [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[-1, -1, 0], [1, -1, 0], [1, 1, 0]]
+    near = [[-0.5, -0.5, 0.1], [0.5, 0.5, 0.1], [-0.5, 0.5, 0.1]]
+    red, green, blue = np.eye(3)
+    image = coloured((far[0], red), (near, green), (far[1], red), (near[::-1], blue))
+    assert ((image > 100).sum(axis=2) == 1).all() and not image[..., 2].any()     # from behind nothing is seen
+    assert image[8, 8, 0] == 0 and image[12, 10, 1] == 255 and image[24, 24, 0] == 255 and image[1, 30, 0] == 255
 
 
 def test_png_files_have_the_pixels():

@@ -223,7 +223,7 @@ def test_what_the_page_says_is_done(view):
         until(lambda: view.session.world.settings.iterations == 33 and view.session.world.settings.method == "paper")
         client.set("measure the error", False)
         until(lambda: not view.session.world.settings.certify)
-        client.set("run", "Reset")
+        client.set("Reset", True)
         until(lambda: view.session.steps == 0)
         name = next(handle.name for group, handle in view._moving)
         client.send({**DRAG, "name": name})
@@ -250,7 +250,7 @@ def test_values_that_would_leave_it_unusable_are_dropped(view):
         name = view._moving[0][1].name
         view.session.running = False
         controls = {label: client.control(label)[1].value for label in (
-            "run", "iterations", "method", "backend", "measure the error", "contact forces", "steer", "lever, °")}
+            "Pause", "iterations", "method", "backend", "measure the error", "contact forces", "steer", "lever, °")}
         settings = view.session.world.settings
         for wrong in NUMBERS + [-1, 0, 2**31, 1.5e9, "no such"]:
             for label in controls:
@@ -259,7 +259,7 @@ def test_values_that_would_leave_it_unusable_are_dropped(view):
                 if label == "lever, °" and wrong in (-1, 0):
                     continue
                 client.set(label, wrong)
-        for uuid, _ in (client.control("speed"), client.control("run")):   # no other member of a control
+        for uuid, _ in (client.control("speed"), client.control("iterations")):   # no other member of a control
             for updates in ({"visible": False}, {"removed": True}, {"update_cb": []}, {"value": 1.0, "max": 2}, {}, [],
                             None):
                 client.send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates})
@@ -296,7 +296,7 @@ def test_whatever_is_said_the_view_goes_on(view):
     with Client(view) as client:
         name = view._moving[0][1].name
         uuids = [client.control(label)[0]
-                 for label in ("iterations", "run", "steer", "lever, °", "contact forces", "method")]
+                 for label in ("iterations", "Reset", "steer", "lever, °", "contact forces", "method")]
         values = [*NUMBERS, 0, 1, -1, 0.5, 1e-300, 1e9, 2**31, 2**53, "", "start", "Reset", "paper", "x" * 3000,
                   [0, 0, 1],
                   [1, 0, 0, 0], [math.nan] * 3, [1e8] * 3, False, {"value": 7}, {"value": math.nan}, {"value": "Step"}]
@@ -311,7 +311,7 @@ def test_whatever_is_said_the_view_goes_on(view):
         # Some connections are closed by what they say; others go on.
     view.session.release()
     with Client(view) as client:
-        client.set("run", "Reset")
+        client.set("Reset", True)
         client.set("method", "fast")
         assert works(view, client)
 
@@ -334,9 +334,187 @@ def test_a_step_that_fails_pauses_and_is_said(view):
     assert not view.session.running and "a step made no number" in view._said.content
     view.session.step = step
     with Client(view) as client:
-        client.set("run", "Reset")
+        client.set("Reset", True)
         until(lambda: view.session.steps == 0 and not view._wrong)
         assert works(view, client)
+
+
+# ---- controls ------------------------------------------------------------------------------------------------------
+
+
+def command(view, label):
+    """The number by which the page asks for a command."""
+    return next(uuid for uuid, handle in view.server.gui._command_handle_from_uuid.items() if handle.label == label)
+
+
+def trigger(client, label):
+    client.send({"type": "CommandTriggerMessage", "uuid": command(client.view, label)})
+
+
+def test_one_control_runs_and_pauses_and_says_which(view):
+    hotkeys = {handle._impl.props.hotkey for handle in view.server.gui._command_handle_from_uuid.values()}
+    assert hotkeys == {"space", "arrowright", "R"}
+    with Client(view) as client:
+        assert works(view, client) and view._run.label == "Pause"
+        client.set("Pause", True)
+        until(lambda: not view.session.running and view._run.label == "Run")
+        steps = view.session.steps
+        time.sleep(2 * 0.15)
+        trigger(client, "One step")
+        until(lambda: view.session.steps == steps + 1)
+        trigger(client, "Run or pause")
+        until(lambda: view.session.running and view._run.label == "Pause")
+        trigger(client, "Reset")
+        until(lambda: view.session.steps == 0)
+        # Space on the button that has the focus: one press.
+        view._pressed = (0.0, "")
+        running = view.session.running
+        view._once("key", view._toggle)
+        view._once("button", view._toggle)
+        assert view.session.running != running
+        for wrong in ({"uuid": 3}, {"uuid": "none"}, {"uuid": None}):
+            client.send({"type": "CommandTriggerMessage", **wrong})
+        assert works(view, client)
+
+
+def test_values_that_are_refused_are_said(view):
+    with Client(view) as client:
+        assert works(view, client)
+        for label, value, said in (("iterations", 1e30, "iterations: 1e+30; must be a number in [1, 1e+06]"),
+                                   ("method", "none", "method: 'none'; must be one of"),
+                                   ("speed", -1, "speed: -1; must be a number in [0.05, 2]")):
+            client.set(label, value)
+            until(lambda: said in view._said.content)
+        before = view.session.world.settings.iterations
+        client.set("iterations", before + 1)
+        until(lambda: view.session.world.settings.iterations == before + 1 and not view._wrong)
+
+
+def test_the_last_minute_can_be_looked_at_again(view):
+    session = view.session
+    session.running = False
+    _, moving = view._moving[0]
+    session.world.bodies[1].linear_velocity = (0, 0, 3)
+    for _ in range(100):
+        session.step()
+    view.frame()
+    now = moving.batched_positions.copy()
+    with Client(view) as client:
+        client.set("time line, s", -0.4)
+        until(lambda: view._time.line.value == -0.4)
+        view.frame()
+        then = next(state for when, state in zip(session.tape.times, session.tape.states) if when > 0.09)
+        shown = [handle.batched_positions for _, handle in view._moving]
+        assert np.abs(shown[0] - now).max() > 1e-3
+        places = np.concatenate([group.poses(*view.description.poses(then.astype(float)))[0]
+                                 for group, _ in view._moving])
+        assert np.allclose(np.concatenate(shown), places, atol=2e-3)
+        view._toggle()
+        assert session.running and view._time.line.value == 0
+    # A minute is kept, thirty times a second.
+    tape, state = session.tape, session.state()
+    for k in range(3000):
+        tape.add(10 + k / 30, state)
+    assert tape.times[-1] - tape.times[0] == pytest.approx(60, abs=0.04) and 1799 <= len(tape.times) <= 1801
+
+
+def test_a_reset_clears_the_curves(view):
+    view.session.running = False
+    for _ in range(20):
+        view.session.step()
+    view._plotted = 0
+    view.frame()
+    assert len(view._plots["kinetic"].data[0]) > 1
+    view._reset()
+    assert all(len(plot.data[0]) == 1 for plot in view._plots.values()) and not view.session.history["time"]
+
+
+def test_a_recording_is_offered_as_a_file(view):
+    sent = []
+
+    class Client:
+        def send_file_download(self, name, data):
+            sent.append((name, data))
+
+    view.session.running = False
+    view._time._switch(Client())
+    for _ in range(60):
+        view.session.step()
+        view.frame()
+    assert view._time.recording and "recording" in view._said.content
+    view._time._switch(Client())
+    (name, data), = sent
+    assert name == "recording.html" and b"<!DOCTYPE html>" in data and not view._time.recording
+    view._time._switch(Client())
+    view._time._switch(Client())
+    assert len(sent) == 1 and "nothing was recorded" in view._said.content
+
+
+def test_what_is_picked_is_described(view):
+    lever = view.session.world["lever"]
+    group = next(group for group in view.description.groups if lever.index in group.body)
+    name = next(handle.name for of, handle in view._moving if of is group)
+    instance = group.body.tolist().index(lever.index)
+    with Client(view) as client:
+        click = {"type": "SceneNodeClickMessage", "name": name, "instance_index": instance, "ray_origin": [0, 0, 1],
+                 "ray_direction": [0, 0, -1], "screen_pos": [0.5, 0.5], "modifier": None, "owner": ""}
+        client.send({**click, "instance_index": 10**6}, {**click, "ray_origin": [math.nan] * 3}, click)
+        until(lambda: "lever" in view._look.said.content)
+    for said in ("**lever**, dynamic", "2 kg", "1 × box", "friction 0.5", "revolute joint"):
+        assert said in view._look.said.content
+
+
+def test_joint_frames_are_at_the_joints(view):
+    view._look.joints.value = True
+    view._look.grid.value = False
+    view.frame()
+    frames = view._look._frames
+    assert frames.visible and np.allclose(frames.batched_positions, [[1, 0, 0.5]]) and not view._look._grid.visible
+
+
+def test_actuators_have_sliders_and_layers_a_switch(tmp_path):
+    pytest.importorskip("mujoco")
+    from test_looks import MJCF
+
+    (tmp_path / "robot.xml").write_text(MJCF)
+    view = View(Session(lambda: subadmm.load(tmp_path / "robot.xml", backend="cpu")), port=0)
+    try:
+        with Client(view) as client:
+            _, motor = client.control("m")
+            assert (motor.min, motor.max) == (-2, 3)
+            client.set("m", 1.5)
+            until(lambda: view.session.loaded.actuators["m"].control == 1.5)
+            client.set("p, °", 90.0)
+            until(lambda: view.session.loaded.actuators["p"].control == pytest.approx(np.pi / 2))
+            view._reset()
+            assert view.session.loaded.actuators["m"].control == 0 and motor.value == 0
+            assert view.session.loaded is view.session.source and not view.session.steering.chains
+            shown = {name: [handle.visible for handle in handles] for name, handles in view._layers.items()}
+            assert shown == {"visuals": [True, True], "collision shapes": [False]}
+            client.set("shown", "collision shapes")
+            until(lambda: view._layers["collision shapes"][0].visible and not view._layers["visuals"][0].visible)
+            view.frame()
+    finally:
+        view.stop()
+
+
+def test_environments_are_shown_side_by_side():
+    from test_looks import two_balls
+
+    view = View(Session(two_balls), port=0)
+    try:
+        view.session.step(2)
+        view.frame()
+        view._plotted = 0
+        view.frame()
+        assert sum(len(handle.batched_positions) for _, handle in view._moving) == 4
+        assert "4 environments" in view._said.content
+        view._settle(iterations=12)
+        assert view.session.environments.settings.iterations == 12 and not view._wrong
+        view._settle(backend="cpu")
+        assert "environments stay" in view._said.content
+    finally:
+        view.stop()
 
 
 # ---- sessions ------------------------------------------------------------------------------------------------------

@@ -115,7 +115,7 @@ def check(path):
     row = {"model": path, "error": "", "notes": []}
     try:
         report = Report()
-        source = compile_file(path, report)
+        source, _ = compile_file(path, report)
     except (FileNotFoundError, ValueError, ImportError) as error:
         row["error"] = "not compiled: " + " ".join(str(error).split())
         return row

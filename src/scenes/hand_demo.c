@@ -84,6 +84,13 @@ static sadmm_status place_cube(sadmm_world *world, double x, double y, double z,
     return sadmm_place_box(world, sadmm_frame_moved(sadmm_frame_world(), x, y, z), &cube, NULL, error);
 }
 
+static sadmm_status place_golden(sadmm_world *world, struct sadmm_error *error)
+{
+    const struct sadmm_piece cube = {
+        .half_extents = {golden_half, golden_half, golden_half}, .mass = 1, .friction = 0.9, .name = "golden cube"};
+    return sadmm_place_box(world, on_table(sadmm_golden_task.at, golden_half), &cube, NULL, error);
+}
+
 /* 0.2 kg on four wheels of 40 g, whose bearings have a friction of 1 mN m each. */
 static sadmm_status place_car(sadmm_world *world, struct sadmm_error *error)
 {
@@ -158,14 +165,14 @@ static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, st
 {
     const struct sadmm_grip grip = sadmm_hand_motion(0);
     const struct sadmm_piece apple = {.half_extents = {0.035}, .mass = 0.15, .friction = 0.9};
-    const double apple_at[2] = {0.2, 0.45}, *golden = sadmm_golden_task.at, *stack = sadmm_stack_task.at;
+    const double apple_at[2] = {0.2, 0.45}, *stack = sadmm_stack_task.at;
     double centres[WALL_CUBES][3];
     (void)scene;
     const struct sadmm_frame ground = sadmm_frame_moved(sadmm_frame_world(), 0, 0, -table_height);
     sadmm_status status = sadmm_place_plane(world, ground, 0.8, error);
     if (status == SADMM_OK) status = place_table(world, error);
     if (status == SADMM_OK) status = sadmm_add_hand(world, &grip, error);
-    if (status == SADMM_OK) status = place_cube(world, golden[0], golden[1], golden_half, golden_half, 1, error);
+    if (status == SADMM_OK) status = place_golden(world, error);
     if (status == SADMM_OK) status = place_heavy(world, error);
     if (status == SADMM_OK) status = place_spoon(world, error);
     if (status == SADMM_OK) status = place_cube(world, stack[0], stack[1], cube_half, cube_half, 0.04, error);

@@ -65,6 +65,7 @@ sadmm_status sadmm_place_box(sadmm_world *world, struct sadmm_frame frame, const
     sadmm_body_def body = sadmm_body_def_default();
     sadmm_shape_def shape = sadmm_shape_def_default();
 
+    body.name = piece->name;
     body.mass = piece->mass;
     sadmm_box_inertia(piece->mass, piece->half_extents, body.inertia);
     shape.type = SADMM_SHAPE_BOX;
@@ -80,6 +81,7 @@ sadmm_status sadmm_place_sphere(sadmm_world *world, struct sadmm_frame frame, co
     sadmm_body_def body = sadmm_body_def_default();
     sadmm_shape_def shape = sadmm_shape_def_default();
 
+    body.name = piece->name;
     body.mass = piece->mass;
     sadmm_sphere_inertia(piece->mass, piece->half_extents[0], body.inertia);
     shape.type = SADMM_SHAPE_SPHERE;

@@ -22,6 +22,7 @@ struct sadmm_piece {
     double half_extents[3]; /* box, m; for spheres [0] is the radius */
     double mass;            /* kg */
     double friction, restitution;
+    const char *name; /* of the body; NULL: none */
 };
 
 /* A static half-space z <= 0 of the frame. */

@@ -113,7 +113,8 @@ def load(
     if overlaps not in ("ignore", "keep"):
         raise ValueError(f"overlaps: {overlaps!r} is neither 'ignore' nor 'keep'")
     report = Report()
-    source = path if isinstance(path, mujoco.MjModel) else compile_file(os.fspath(path), report, floating)
+    compiled = isinstance(path, mujoco.MjModel)
+    source, links = (path, None) if compiled else compile_file(os.fspath(path), report, floating)
     data = start_of(source, keyframe, qpos, qvel)
     from .. import World
 
@@ -125,6 +126,7 @@ def load(
     )
     _take_threads(world, threads)
     loaded = LoadedModel(world, source, report)
+    loaded.links = links or None
     report_options(source, report)
     add_tree(loaded, data, carrier_share)
     add_shapes(loaded, data, overlaps, threshold)

@@ -1,15 +1,32 @@
 """Files to MuJoCo's compiled models."""
 
 import xml.etree.ElementTree as tree
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
+import numpy as np
+
+from .poses import q_about, q_mul
 
 KNOWN_MESHES = (".obj", ".stl", ".msh")
 
 
+@dataclass
+class LinkVisual:
+    """A <visual> of a URDF. place: in the link's frame; kind: 'box', 'sphere', 'cylinder', 'capsule' or 'mesh'; size:
+    of the shape (half extents; radius and half length), of a mesh its scale; rgba: None where the file says none."""
+
+    link: str
+    place: tuple
+    kind: str
+    size: list
+    file: Path | None
+    rgba: list | None
+
+
 def compile_file(path, report, floating=False):
-    """The mujoco.MjModel of an MJCF or URDF file; floating: a URDF's base is free.
+    """(the mujoco.MjModel of an MJCF or URDF file, a URDF's visuals or None); floating: a URDF's base is free.
 
     Raises FileNotFoundError (also for a URDF's mesh), ValueError (with MuJoCo's message)."""
     path = Path(path)
@@ -22,10 +39,59 @@ def compile_file(path, report, floating=False):
     if root.tag == "mujoco":
         if floating:
             raise ValueError(f"floating: {path} is MJCF, which has free joints itself")
-        return mujoco.MjModel.from_xml_path(str(path))
+        return mujoco.MjModel.from_xml_path(str(path)), None
     if root.tag == "robot":
-        return _compile_urdf(root, path, report, floating)
+        visuals = _visuals_of(root, path, report)
+        return _compile_urdf(root, path, report, floating), visuals
     raise ValueError(f"path: {path} is neither MJCF nor URDF: its root is <{root.tag}>")
+
+
+def _values(element, name, default):
+    """Finite numbers of an attribute, as many as the default has."""
+    try:
+        out = [float(x) for x in element.get(name).split()] if element is not None and element.get(name) else default
+    except ValueError:
+        return default
+    return out if len(out) == len(default) and np.isfinite(out).all() else default
+
+
+def _form(geometry, folder):
+    """(kind, size, file) of a visual's <geometry>; None: of none that can be drawn."""
+    for kind in ("box", "sphere", "cylinder", "capsule", "mesh"):
+        found = geometry.find(kind) if geometry is not None else None
+        if found is None:
+            continue
+        if kind == "mesh":
+            file = _find(found.get("filename", ""), folder)
+            return (kind, _values(found, "scale", [1.0, 1, 1]), file) if file else None
+        if kind == "box":
+            size = [x / 2 for x in _values(found, "size", [0.0, 0, 0])]
+        else:
+            size = _values(found, "radius", [0.0])
+            size += [] if kind == "sphere" else [x / 2 for x in _values(found, "length", [0.0])]
+        return (kind, size, None) if min(size) > 0 else None
+    return None
+
+
+def _visuals_of(root, path, report):
+    """All <visual> of a URDF that can be drawn."""
+    colours = {m.get("name"): m.find("color") for m in root.findall("material") if m.find("color") is not None}
+    out = []
+    for link in root.findall("link"):
+        for visual in link.findall("visual"):
+            form = _form(visual.find("geometry"), path.parent)
+            if form is None:
+                report.add(f"visual of link '{link.get('name')}'", "is not shown: no shape or file that there is")
+                continue
+            origin, material, rgba = visual.find("origin"), visual.find("material"), None
+            if material is not None:
+                colour = material.find("color")
+                colour = colours.get(material.get("name")) if colour is None else colour
+                rgba = _values(colour, "rgba", [0.5, 0.5, 0.5, 1]) if colour is not None else None
+            roll, pitch, yaw = _values(origin, "rpy", [0.0, 0, 0])
+            turn = q_mul(q_about([0, 0, 1], yaw), q_mul(q_about([0, 1, 0], pitch), q_about([1, 0, 0], roll)))
+            out.append(LinkVisual(link.get("name"), (np.array(_values(origin, "xyz", [0.0, 0, 0])), turn), *form, rgba))
+    return out
 
 
 def _compile_urdf(root, path, report, floating):

@@ -185,6 +185,13 @@ class Loaded:
             raise ValueError(f"name = {name!r}: it is in {' and in '.join(found)}: take it from there")
         return getattr(self, found[0])[name]
 
+    def render(self, width: int = 640, height: int = 480, camera: Any = None) -> np.ndarray[Any, np.dtype[np.uint8]]:
+        """A picture of it as it is now, by the file's visuals and colours: height x width x 3, uint8, sRGB. As
+        World.render; camera: also the name of a camera of an MJCF file."""
+        from ..show import render
+
+        return render(self, width, height, camera)
+
     def __repr__(self):
         return (
             f"<subadmm model: {len(self.bodies)} bodies, {len(self.joints)} joints, {len(self.actuators)} actuators, "
@@ -206,6 +213,7 @@ class LoadedModel(Loaded):
         super().__init__(world, source, report)
         self.groups = []  # of tree.py, one a body of the file
         self.carriers = []  # bodies between several joints of one
+        self.links = None  # of a URDF: what there is to look at (LinkVisual of compile.py); None: the geoms
         self._start = None  # q, qd and ctrl, as they were loaded
 
     def frame(self, name: str) -> tuple[Any, Any]:

@@ -5,10 +5,10 @@
     show.save_picture("pile.png", world)
     show.record(world, seconds=5).save("pile.html")      # or .glb
 """
-from .camera import Camera, looking_at
+from .camera import Camera, camera_of, looking_at
 from .description import Description, Group, describe
 from .meshes import Mesh, mesh_of
-from .picture import picture, save_picture
+from .picture import picture, render, save_picture
 from .recording import Recording, record
 
 __all__ = [
@@ -17,10 +17,12 @@ __all__ = [
     "Group",
     "Mesh",
     "Recording",
+    "camera_of",
     "describe",
     "looking_at",
     "mesh_of",
     "picture",
     "record",
+    "render",
     "save_picture",
 ]

@@ -1,13 +1,18 @@
 """What there is to draw of a world: meshes with instances on bodies, their colours, and where to look from."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from .._core import World
+from ..given import real
+from ..importing.model import Loaded
 from ..rotations import multiply, rotate
+from .colours import named_colour
 from .meshes import Mesh, form_of
+from .visuals import visuals_of
 
 # sRGB, 0 to 1. Bodies that joints hold together share a colour.
 PALETTE = np.array([[217, 106, 74], [232, 176, 74], [110, 160, 98], [58, 140, 140], [78, 124, 186], [140, 104, 166],
@@ -21,48 +26,85 @@ class Group:
     """Instances of one mesh. A point p of it is at body(position + rotate(orientation, scale * p))."""
     mesh: Mesh
     is_ground: bool
-    body: np.ndarray          # n, rows of the world's arrays
+    body: np.ndarray          # n, rows of poses
     position: np.ndarray      # n x 3, m, in the body's frame
     orientation: np.ndarray   # n x 4, w x y z
     scale: np.ndarray         # n x 3
     colour: np.ndarray        # n x 3, sRGB, 0 to 1
     # n x 4: horizontal unit normal of a wall, away from the middle, and its place along it, m; 0: no wall
     wall: np.ndarray
+    opacity: np.ndarray       # n, 0 to 1
+    names: list               # n, of what it is in the file, or of the shape
 
     def part(self, which):
         """Some of the instances: n bool."""
+        names = [name for name, use in zip(self.names, which) if use]
         return Group(self.mesh, self.is_ground, *(values[which] for values in (
-            self.body, self.position, self.orientation, self.scale, self.colour, self.wall)))
+            self.body, self.position, self.orientation, self.scale, self.colour, self.wall, self.opacity)), names)
 
     def poses(self, positions, orientations):
         """(positions n x 3, orientations n x 4) in the world, of bodies' poses."""
         turn = orientations[self.body]
         return positions[self.body] + rotate(turn, self.position), multiply(turn, self.orientation)
 
-    def corners(self, positions, orientations):
-        """All triangles' corners in the world, n m x 3 x 3, and their normals."""
+    def balls(self, positions, orientations):
+        """(middles n x 3, radii n): of balls around the instances at bodies' poses, m."""
+        if "_reach" not in vars(self):
+            vertices = self.mesh.vertices
+            self._middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+            self._reach = np.empty(len(self.scale))
+            for scale in np.unique(self.scale, axis=0):
+                of = (self.scale == scale).all(axis=1)
+                self._reach[of] = np.linalg.norm((vertices - self._middle) * scale, axis=1).max(initial=0)
         place, turn = self.poses(positions, orientations)
-        local = self.mesh.vertices[self.mesh.triangles].reshape(-1, 3)
-        normal = self.mesh.corner_normals().reshape(-1, 3)
-        at = rotate(turn[:, None], self.scale[:, None] * local[None]) + place[:, None]
-        across = rotate(turn[:, None], normal[None] / self.scale[:, None])
-        across /= np.linalg.norm(across, axis=-1, keepdims=True)
-        return at.reshape(-1, 3, 3), across.reshape(-1, 3, 3)
+        return place + rotate(turn, self.scale * self._middle), self._reach
+
+    def tinted(self):
+        """Colours n x 3 with what a texture makes of them on the whole, for what shows no textures."""
+        return self.colour * self.mesh.tint
 
 
 @dataclass
 class Description:
     """groups: list of Group; centre, radius: of a ball around what moves, m."""
     groups: list
-    bodies: int
-    dynamic: np.ndarray       # which bodies, bool
+    bodies: int               # rows of poses: the world's bodies, and the world itself where something is fixed to it
+    dynamic: np.ndarray       # which of them, bool
     centre: np.ndarray
     radius: float
     floor: float              # m, the highest ground plane under it, or the lowest point
+    half: np.ndarray | None = None    # of a box around what moves, m; None: a ball
+    fixed: int = 0            # rows that are no body's, at the end
+
+    @property
+    def count(self):
+        """Bodies that there are."""
+        return self.bodies - self.fixed
+
+    def poses(self, state):
+        """(positions, orientations) of the rows, of the array body_state of the world (n x 13)."""
+        positions, orientations = state[:, :3], state[:, 3:7]
+        if self.bodies > len(state):
+            positions = np.concatenate([positions, np.zeros((1, 3))])
+            orientations = np.concatenate([orientations, [[1.0, 0, 0, 0]]])
+        return positions, orientations
 
     def hidden_from(self, eye):
         """For each group, n bool: walls between the eye and the middle, which a picture leaves out."""
         return [group.wall[:, :3].any(axis=1) & (group.wall[:, :3] @ eye > group.wall[:, 3]) for group in self.groups]
+
+
+@dataclass
+class Tiles(Description):
+    """Copies of a Description. places: of each, m."""
+    places: np.ndarray | None = None
+
+    def poses(self, state):
+        count = len(self.places)
+        each = state.reshape(count, -1, state.shape[-1])
+        parts = [Description([], self.bodies // count, None, None, 0, 0).poses(one) for one in each]
+        return (np.concatenate([positions + place for (positions, _), place in zip(parts, self.places)]),
+                np.concatenate([turns for _, turns in parts]))
 
 
 def _colours(world, bodies):
@@ -88,58 +130,134 @@ def _colours(world, bodies):
     own = (np.arange(len(bodies), dtype=np.uint64) * np.uint64(0xBF58476D1CE4E5B9)) >> np.uint64(48)
     colour = np.clip(colour * (0.92 + 0.16 * (own[:, None] / 65535.0)), 0, 1)
     colour[still] = STILL
+    for row, body in enumerate(bodies):
+        named = named_colour(body.name) if body.name else None
+        if named is not None:
+            colour[row] = named
     return colour
 
 
-def describe(world: Any) -> Description:
-    """What there is to draw of a world, as it is now."""
+def world_of(source):
+    """(the World of what is to be drawn, what load() returned or None). Raises TypeError."""
+    if isinstance(source, World):
+        return source, None
+    if isinstance(source, Loaded):
+        return source.world, source
+    raise TypeError(f"world: {source!r}; must be a subadmm.World or what subadmm.load returned")
+
+
+def describe(world: Any, collision: bool = False, reach: float = 12.0) -> Description:
+    """What there is to draw of a world as it is now, or of what load() returned: of its file the visuals, or, where the
+    file has none or with `collision`, the shapes that collide. reach: half the width of what is drawn of a plane, as a
+    multiple of the radius of what moves, in [1, 1000]."""
+    reach = real("reach", reach, 1, 1000)
+    world, loaded = world_of(world)
     bodies = world.bodies
     state = world.get("body_state")
-    positions, turns = state[:, :3], state[:, 3:7]
-    dynamic = np.array([body.type == "dynamic" for body in bodies], dtype=bool)
+    rows = {body: k for k, body in enumerate(bodies)}
     colour = _colours(world, bodies)
-    shapes = [(shape.body.index, shape.definition) for shape in world.shapes]
-    shapes = [(row, shape) for row, shape in shapes if not shape.sensor]  # nobody sees them
+    seen = visuals_of(loaded) if loaded is not None and not collision else []
+    of_file = set()
+    if seen:
+        of_file = {shape for shapes in loaded.shapes.values() for shape in shapes}
+    dynamic = [body.type == "dynamic" for body in bodies]
+    named = [f"{body.name or f'body {k}'}" for k, body in enumerate(bodies)]
+
+    # (key, make, plane?, row, position, orientation, scale, colour, opacity, name)
+    parts = []
+    for shape in world.shapes:
+        definition = shape.definition
+        if definition.sensor or shape in of_file:   # nobody sees sensors
+            continue
+        row = shape.body.index
+        key, scale, make = form_of(definition)
+        plane = definition.type == "plane"
+        parts.append((key, make, plane, row, definition.position, definition.orientation, scale,
+                      GROUND if plane else colour[row], 1.0, named[row]))
+    count, fixed = len(bodies), False
+    for one in seen:
+        if one.body is not None and one.body not in rows:    # it was removed
+            continue
+        row = count if one.body is None else rows[one.body]
+        fixed |= one.body is None
+        own = one.colour
+        if own is None:
+            own = GROUND if one.is_plane else STILL if one.body is None else colour[row]
+        parts.append((one.key, one.make, one.is_plane, row, one.position, one.orientation, one.scale, own, one.opacity,
+                      one.name))
+    if fixed:
+        dynamic.append(False)
+    dynamic = np.array(dynamic, dtype=bool)
+    whole = Description([], count + fixed, dynamic, np.zeros(3), 1.0, 0.0, fixed=int(fixed))
+    positions, turns = whole.poses(state)
 
     # How large what moves is, from the shapes' meshes; planes come afterwards, with a patch that fits.
     found = {}
-    for row, shape in shapes:
-        if shape.type != "plane":
-            key, scale, make = form_of(shape)
-            if key not in found:
-                found[key] = (make(), [])
-            found[key][1].append((row, shape.position, shape.orientation, scale))
-    groups = [_group(mesh, parts, colour, False) for mesh, parts in found.values()]
+    for part in parts:
+        if not part[2]:
+            if part[0] not in found:
+                found[part[0]] = part[1](), []
+            found[part[0]][1].append(part)
+    groups = [_group(mesh, of, False) for mesh, of in found.values()]
     low, high = _extent(groups, positions, turns, dynamic)
     centre = (low + high) / 2
     radius = max(float(np.linalg.norm(high - low)) / 2, 1e-3)
 
     _find_walls(groups, positions, turns, dynamic, centre, radius)
 
-    planes = [(row, shape) for row, shape in shapes if shape.type == "plane"]
     floor = float(low[2])
-    if planes:
-        patch = 12 * radius
-        parts = []
-        for row, shape in planes:
-            _, scale, make = form_of(shape, patch)
-            # The patch lies under what moves, wherever the plane's own origin is.
-            turn = multiply(turns[row], np.array(shape.orientation))
-            origin = positions[row] + rotate(turns[row], np.array(shape.position))
-            normal = rotate(turn, np.array([0.0, 0.0, 1.0]))
-            foot = centre - normal * np.dot(centre - origin, normal)
-            back = turns[row] * [1, -1, -1, -1]
-            parts.append((row, rotate(back, foot - positions[row]), shape.orientation, scale))
-            if normal[2] > 0.9:
-                floor = float(foot[2])
-        groups.append(_group(make(), parts, np.tile(GROUND, (len(bodies), 1)), True))
-    return Description(groups, len(bodies), dynamic, centre, radius, floor)
+    patch = reach * radius
+    for part in (part for part in parts if part[2]):
+        _, make, _, row, position, orientation, _, own, opacity, name = part
+        # The patch lies under what moves, wherever the plane's own origin is.
+        turn = multiply(turns[row], np.array(orientation))
+        origin = positions[row] + rotate(turns[row], np.array(position))
+        normal = rotate(turn, np.array([0.0, 0.0, 1.0]))
+        foot = centre - normal * np.dot(centre - origin, normal)
+        back = turns[row] * [1, -1, -1, -1]
+        mesh = make()
+        if mesh.uv is not None:      # of a plane: repetitions a metre, from its own origin
+            away = rotate(turn * [1, -1, -1, -1], foot - origin)
+            mesh = replace(mesh, uv=(mesh.vertices[mesh.triangles][..., :2] * patch + away[:2]) * mesh.uv)
+        groups.append(_group(mesh, [(None, None, True, row, rotate(back, foot - positions[row]), orientation,
+                                     (patch, patch, 1.0), own, opacity, name)], True))
+        if normal[2] > 0.9:
+            floor = float(foot[2])
+    return replace(whole, groups=groups, centre=centre, radius=radius, floor=floor, half=(high - low) / 2)
 
 
-def _group(mesh, parts, colour, ground):
-    body = np.array([part[0] for part in parts], dtype=np.int32)
-    position, orientation, scale = (np.array([part[k] for part in parts], dtype=float) for k in (1, 2, 3))
-    return Group(mesh, ground, body, position, orientation, scale, colour[body], np.zeros((len(parts), 4)))
+def tiled(description, count):
+    """`count` copies side by side in a square; rows of poses are those of the first copy, then of the second ... The
+    ground is there once. Its poses() puts each copy in its place."""
+    if count <= 1:
+        return description
+    rows = description.bodies
+    wide = int(np.ceil(np.sqrt(count)))
+    pitch = 2.2 * description.radius
+    k = np.arange(count)
+    places = pitch * np.stack([k % wide - (wide - 1) / 2, (wide - 1) / 2 - k // wide, 0 * k], axis=1)
+    groups = []
+    for group in description.groups:
+        if group.is_ground:
+            groups.append(group)
+            continue
+        n = len(group.body)
+        again = [np.tile(values, (count,) + (1,) * (values.ndim - 1)) for values in (
+            group.position, group.orientation, group.scale, group.colour, group.wall, group.opacity)]
+        body = np.tile(group.body, count) + rows * np.repeat(k, n).astype(np.int32)
+        groups.append(Group(group.mesh, False, body.astype(np.int32), *again,
+                            [f"{name} ({copy})" for copy in range(count) for name in group.names]))
+    radius = float(np.linalg.norm([pitch * (wide - 1) / 2] * 2)) + description.radius
+    return Tiles(groups, rows * count, np.tile(description.dynamic, count), description.centre, radius,
+                 description.floor, fixed=count * description.fixed, places=places)
+
+
+def _group(mesh, parts, ground):
+    body = np.array([part[3] for part in parts], dtype=np.int32)
+    position, orientation, scale, colour, opacity = (np.array([part[k] for part in parts], dtype=float)
+                                                     for k in (4, 5, 6, 7, 8))
+    return Group(mesh, ground, body, position, orientation, scale, colour, np.zeros((len(parts), 4)), opacity,
+                 [part[9] for part in parts])
 
 
 def _find_walls(groups, positions, turns, dynamic, centre, radius):
@@ -173,10 +291,9 @@ def _extent(groups, positions, turns, dynamic):
             use = which[group.body]
             if not use.any():
                 continue
-            place, _ = group.poses(positions, turns)
-            reach = np.linalg.norm(group.mesh.vertices[None] * group.scale[:, None], axis=-1).max(axis=1)[:, None]
-            lows.append((place - reach)[use])
-            highs.append((place + reach)[use])
+            place, reach = group.balls(positions, turns)
+            lows.append((place - reach[:, None])[use])
+            highs.append((place + reach[:, None])[use])
         if lows:
             return np.quantile(np.concatenate(lows), 0.01, axis=0), np.quantile(np.concatenate(highs), 0.99, axis=0)
     return np.array([-1.0, -1, -1]), np.array([1.0, 1, 1])

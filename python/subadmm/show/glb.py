@@ -41,13 +41,14 @@ def glb_of(recording) -> bytes:
         corners = group.mesh.vertices[group.mesh.triangles].reshape(-1, 3)
         attributes = {"POSITION": put(corners, _FLOAT, "VEC3", 34962, True),
                       "NORMAL": put(group.mesh.corner_normals().reshape(-1, 3), _FLOAT, "VEC3", 34962)}
-        of_colour = {}
+        of_colour, colours = {}, group.tinted()
         for k, body in enumerate(group.body):
-            colour = tuple(np.round(group.colour[k] ** 2.2, 3).tolist())
+            colour = *np.round(np.clip(colours[k], 0, 1) ** 2.2, 3).tolist(), float(np.round(group.opacity[k], 3))
             if colour not in material:
                 material[colour] = len(materials)
-                materials.append({"pbrMetallicRoughness": {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0,
-                                                           "roughnessFactor": 0.7}})
+                materials.append({"pbrMetallicRoughness": {"baseColorFactor": list(colour), "metallicFactor": 0.0,
+                                                           "roughnessFactor": 0.7},
+                                  **({"alphaMode": "BLEND"} if colour[3] < 1 else {})})
             if colour not in of_colour:
                 of_colour[colour] = len(meshes)
                 meshes.append({"primitives": [{"attributes": attributes, "material": material[colour]}]})

@@ -152,6 +152,11 @@ FIELDS = {
     "TransformControlsUpdateMessage": {"name": _is_text, "wxyz": _is_turn, "position": _numbers(3), "owner": _is_text},
     "TransformControlsDragStartMessage": {"name": _is_text, "owner": _is_text},
     "TransformControlsDragEndMessage": {"name": _is_text, "owner": _is_text},
+    "SceneNodeClickMessage": {
+        "name": _is_text, "instance_index": _is_index, "ray_origin": _numbers(3), "ray_direction": _numbers(3),
+        "screen_pos": _is_pair, "modifier": _is_modifier, "owner": _is_text,
+    },
+    "CommandTriggerMessage": {"uuid": _is_text},
     "GuiUpdateMessage": {"uuid": _is_text, "updates": lambda x: isinstance(x, dict) and x.keys() == {"value"}},
 }
 
@@ -170,8 +175,19 @@ def fits_control(control, value):
     return False
 
 
-def fits(message, control_of):
-    """May the page say this, a dict? control_of(uuid): a control of it, or None."""
+def wanted_of(control):
+    """What fits_control() lets in, in words."""
+    if isinstance(control.value, bool):
+        return "must be true or false"
+    if hasattr(control, "options"):
+        return f"must be one of {', '.join(control.options)}"
+    low, high = (getattr(control, name, None) for name in ("min", "max"))
+    return f"must be a number in [{-LARGEST if low is None else low:g}, {LARGEST if high is None else high:g}]"
+
+
+def fits(message, control_of, refuse=lambda control, value: None):
+    """May the page say this, a dict? control_of(uuid): a control of it, or None. refuse(control, value): told of a
+    value of a control that does not fit."""
     kind = message.get("type")
     fields = FIELDS.get(kind) if isinstance(kind, str) else None
     if kind == "SceneNodeDragMessage" and message.get("phase") == "end":   # it lets go, wherever that is
@@ -181,7 +197,12 @@ def fits(message, control_of):
     if kind != "GuiUpdateMessage":
         return True
     control = control_of(message["uuid"])
-    return control is not None and fits_control(control, message["updates"]["value"])
+    if control is None:
+        return False
+    fine = fits_control(control, message["updates"]["value"])
+    if not fine:
+        refuse(control, message["updates"]["value"])
+    return fine
 
 
 class _Dropped:
@@ -193,12 +214,13 @@ class _Filter:
 
     def __init__(self, messages):
         self.messages, self.control_of = messages, lambda uuid: None
+        self.refuse = lambda control, value: None
 
     def deserialize(self, data):
         import msgspec  # as viser does
 
         try:
-            if len(data) <= _MOST_BYTES and fits(msgspec.msgpack.decode(data), self.control_of):
+            if len(data) <= _MOST_BYTES and fits(msgspec.msgpack.decode(data), self.control_of, self.refuse):
                 return self.messages.deserialize(data)
         except Exception:  # whatever else the bytes are
             pass
@@ -251,6 +273,18 @@ def _guarded(base, host, made):
     return Server
 
 
+def tell_refused(server, tell):
+    """tell(label, why): called with each value of a control that the page sends and that is not let in. The page has
+    the old one again."""
+    def refuse(control, value):
+        shown = repr(value) if isinstance(value, (int, float, str)) else type(value).__name__
+        tell(control.label, f"{shown[:60]}; {wanted_of(control)}")
+        if not isinstance(control.value, bool):
+            control._queue_update("value", control.value)
+
+    server.filter.refuse = refuse
+
+
 def serve(viser, host, port):
     """A viser.ViserServer at host and port, or the first port after it that is free."""
     port = free_port(host, port)
@@ -280,5 +314,6 @@ def serve(viser, host, port):
     if not made or not made[0].guarded:
         server.stop()
         raise ImportError(f"the view cannot guard the server of viser {viser.__version__}: another version is needed")
-    made[0].filter.control_of = lambda uuid: server.gui._gui_input_handle_from_uuid.get(uuid)
+    server.filter = made[0].filter
+    server.filter.control_of = lambda uuid: server.gui._gui_input_handle_from_uuid.get(uuid)
     return server

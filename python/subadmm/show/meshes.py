@@ -1,4 +1,6 @@
 """Triangle meshes of shapes: closed, counter-clockwise seen from outside, in the frame of the shape, in m."""
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +14,25 @@ DETAIL = 24
 
 @dataclass
 class Mesh:
-    """vertices: n x 3, m; triangles: m x 3 indices. Vertices are shared by the triangles that meet there."""
+    """vertices: n x 3, m; triangles: m x 3 indices. Vertices are shared by the triangles that meet there.
+
+    Where it has a texture: uv: m x 3 x 2, of the triangles' corners, v down from the image's uppermost row;
+    image: height x width x 3, uint8, sRGB."""
     vertices: np.ndarray
     triangles: np.ndarray
+    uv: np.ndarray | None = None
+    image: np.ndarray | None = None
 
     def scaled(self, scale):
         """The same, its axes multiplied by three positive numbers."""
-        return Mesh(self.vertices * np.asarray(scale, float), self.triangles)
+        return Mesh(self.vertices * np.asarray(scale, float), self.triangles, self.uv, self.image)
+
+    @property
+    def tint(self):
+        """What a texture multiplies colours by, sRGB, 0 to 1, on the whole; 1 without one."""
+        if self.image is None:
+            return np.ones(3)
+        return ((self.image.reshape(-1, 3) / 255.0) ** 2.2).mean(axis=0) ** (1 / 2.2)
 
     def volume(self):
         """m^3, of a closed mesh."""

@@ -3,27 +3,15 @@ import base64
 import html
 import json
 import zlib
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from .camera import looking_at
-from .description import extent_of
+from .camera import usual_camera
 from .forces import COLOURS, SCALE, UNMEASURED, legend
 from .measures import MEASURES
 from .packing import TURN_STEP, packed
 from .picture import SUN
-
-
-def _usual_view(recording):
-    """The description with the middle and the radius of what moves that it has on average over the recording."""
-    boxes = [extent_of(recording.description, *recording.poses(k))
-             for k in np.unique(np.linspace(0, len(recording.times) - 1, 9).astype(int))]
-    low, high = np.mean(boxes, axis=0)
-    return replace(
-        recording.description, centre=(low + high) / 2, radius=max(float(np.linalg.norm(high - low)) / 2, 1e-3)
-    )
 
 
 def _forces(recording, put):
@@ -84,13 +72,14 @@ def page_of(recording) -> str:
             "place": put(group.position, "f32"),
             "turn": put(group.orientation, "f32"),
             "scale": put(group.scale, "f32"),
-            "colour": put(np.rint(group.colour * 255), "u8"),
+            "colour": put(np.rint(np.clip(group.tinted(), 0, 1) * 255), "u8"),
             "wall": put(group.wall, "f32"),
         })
-    camera = looking_at(_usual_view(recording))
+    camera = usual_camera(recording)
     header = {
         "title": recording.title,
         "bodies": description.bodies,
+        "count": description.count,
         "frames": len(recording.times),
         "centre": list(map(float, description.centre)),
         "radius": description.radius,

@@ -1,6 +1,7 @@
 """Recordings of a world: the poses of all bodies at times, kept as small whole numbers."""
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from .._core import World
 from ..given import real, whole
 from ..output import Output
-from .description import Description, describe
+from .camera import Camera
+from .description import Description, describe, world_of
 from .forces import forces_of
 from .measures import MEASURES, measure
 from .packing import TURN_STEP
@@ -40,26 +41,62 @@ class Recording:
         turns = self.orientations[frame] * TURN_STEP
         return self.positions[frame] * self.position_step, turns / np.linalg.norm(turns, axis=1, keepdims=True)
 
-    def save(self, path: Any) -> None:
-        """Write a file that its ending says: .html, a page that plays by itself, or .glb, glTF with animation. It is
-        complete, or as it was."""
-        check_ending("path", path)
-        with Output("path", path) as file:
-            file.write(self.data(path))
+    def save(self, path: Any, **options: Any) -> None:
+        """Write a file that its ending says: .html, a page that plays by itself; .glb, glTF with animation; .mp4, a
+        video (needs the extra `video`); .usd, .usda, .usdc, a stage with poses over time (needs the extra `usd`). It is
+        complete, or as it was.
 
-    def data(self, path: Any) -> bytes:
+        Of .mp4: width and height, even, pixels, in [16, 8192] (1280 x 720); camera: a Camera, or None: what moves in
+        view."""
+        data = self._maker(path, options)
+        with Output("path", path) as file:
+            file.write(data())
+
+    def data(self, path: Any, **options: Any) -> bytes:
         """What save() writes, text or bytes."""
-        if Path(path).suffix == ".html":
-            from .page import page_of as made_of
-        else:
-            from .glb import glb_of as made_of
-        return made_of(self)
+        return self._maker(path, options)()
+
+    def _maker(self, path, options):
+        check_ending("path", path)
+        ending = Path(path).suffix
+        if ending == ".mp4":
+            options = check_video(**options)
+            from .video import mp4_of
+            return lambda: mp4_of(self, **options)
+        if options:
+            raise ValueError(f"{next(iter(options))}: only .mp4 files have one")
+        if ending == ".html":
+            from .page import page_of
+            return lambda: page_of(self)
+        if ending == ".glb":
+            from .glb import glb_of
+            return lambda: glb_of(self)
+        from .usd_file import usd_of
+        return lambda: usd_of(self, ending)
+
+
+ENDINGS = (".html", ".glb", ".mp4", ".usd", ".usda", ".usdc")
 
 
 def check_ending(name, path):
-    """Is it the name of a file that a recording can be?"""
-    if Path(path).suffix not in (".html", ".glb"):
-        raise ValueError(f"{name}: {path}; must end in .html or .glb")
+    """Is it the name of a file that a recording can be, with what is there to write it?"""
+    ending = Path(path).suffix
+    if ending not in ENDINGS:
+        raise ValueError(f"{name}: {path}; must end in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}")
+    package, module, extra = {".mp4": ("imageio-ffmpeg", "imageio_ffmpeg", "video"), ".html": (None,) * 3,
+                              ".glb": (None,) * 3}.get(ending, ("usd-core", "pxr", "usd"))
+    if module and importlib.util.find_spec(module) is None:
+        raise ImportError(f"{name}: {path}; {ending} files need the package {package}: pip install 'subadmm[{extra}]'")
+
+
+def check_video(width=1280, height=720, camera=None):
+    """What mp4_of takes, or an error."""
+    for name, value in (("width", whole("width", width, 16, 8192)), ("height", whole("height", height, 16, 8192))):
+        if value % 2:
+            raise ValueError(f"{name}: {value}; must be even, as H.264 has it")
+    if camera is not None and not isinstance(camera, Camera):
+        raise TypeError(f"camera: {camera!r}; must be a Camera")
+    return {"width": width, "height": height, "camera": camera}
 
 
 def position_step(description):
@@ -76,21 +113,24 @@ def check_frames(fps, contacts, prefix=""):
     return real(f"{prefix}fps", fps, 0, 1000, above=True), whole(f"{prefix}contacts", contacts, 0, 2**31 - 1)
 
 
-def record(world: World, seconds: float, fps: float = 30.0, title: str = "", contacts: int = 0,
+def record(world: Any, seconds: float, fps: float = 30.0, title: str = "", contacts: int = 0,
            after_frame: Callable[[int, int], None] | None = None) -> Recording:
-    """Step a world for a time (s, simulated) and keep its poses `fps` times a second, at the nearest step; the first
-    frame is the world as it is. contacts: so many of the largest contact forces are kept a frame, with their errors
+    """Step a world, or what load() returned, for a time (s, simulated) and keep its poses `fps` times a second, at the
+    nearest step; the first frame is the world as it is. contacts: so many of the largest contact forces are
+    kept a frame, with their errors
     where settings ask for certificates. seconds: in (0, 1e9], fps: in (0, 1000], MOST_FRAMES frames at most.
     after_frame(frame, frames): called after each."""
     seconds = real("seconds", seconds, 0, 1e9, above=True)
     fps, contacts = check_frames(fps, contacts)
+    source = world
+    world, _ = world_of(source)
     dt = world.settings.dt
     frames = int(np.floor(seconds * fps + 1e-9)) + 1
     if frames > MOST_FRAMES:
         raise ValueError(f"seconds: {seconds:g}; with {fps:g} frames a second that is {frames} frames, and "
                          f"must be {MOST_FRAMES} at most")
     at = np.unique(np.rint(np.arange(frames) / (fps * dt)).astype(np.int64))
-    description = describe(world)
+    description = describe(source)
     step = position_step(description)
     inertia = world.get("body_inertia")
     shape = (len(at), description.bodies)
@@ -101,14 +141,14 @@ def record(world: World, seconds: float, fps: float = 30.0, title: str = "", con
         if k:
             world.step(int(steps - at[k - 1]))
         state = world.get("body_state")
-        place = np.rint(state[:, :3] / step)
+        place, turn = description.poses(state)
+        place = np.rint(place / step)
         if np.abs(place).max(initial=0) > 2 ** 30:
             raise ValueError(
                 f"world: a body is {np.abs(place).max() * step:.3g} m away, farther than a recording can tell; "
                 f"it must be less than {2**30 * step:.3g} m"
             )
         positions[k] = place
-        turn = state[:, 3:7]
         # q and -q are the same orientation; the one nearer to the last frame's makes small differences.
         turn = turn * np.where(np.einsum("ij,ij->i", turn, turn if before is None else before) < 0, -1, 1)[:, None]
         turns[k] = np.rint(turn / TURN_STEP)

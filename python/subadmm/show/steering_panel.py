@@ -40,7 +40,9 @@ class SteeringPanel:
                                        ("torque", "N m", "#c87a1e")) if steering.leads else ():
                 self._plots.append(gui.add_uplot(
                     (np.zeros(1),) * 2, ({"label": "s"}, {"label": unit, "stroke": colour, "width": 2}),
-                    title=f"reaction {part}, {unit}", height=120, scales={"x": {"time": False}, "y": {"auto": True}}))
+                    title=f"reaction {part}, {unit}", height=140, scales={"x": {"time": False}, "y": {"auto": True}},
+                    axes=({"label": "time, s", "labelSize": 16, "size": 30, "space": 50}, {"size": 52, "space": 28}),
+                    legend={"show": False}))
             if 0 < sum(len(chain.joints) for chain in steering.chains) <= _MOST:
                 with gui.add_folder("joints", expand_by_default=False):
                     for chain in steering.chains:
@@ -122,6 +124,8 @@ class SteeringPanel:
         if self.there:
             for kept in (self._time, self._force, self._torque):
                 kept.clear()
+            for plot in self._plots:
+                plot.data = (np.zeros(1),) * 2
             self._switch()
 
     # ---- the scene ---------------------------------------------------------------------------------------------------
