@@ -43,7 +43,7 @@ START_TEST(by_formula)
     const sadmm_shape_id low = add_shape(world, ground, &plane), round = add_shape(world, body, &ball);
     const double at[3] = {0, 0, 3}, aside[3] = {0, 0.9, 3}, off[3] = {0, 1.5 + 1e-6, 3}, on[3] = {0, 1.5 - 1e-6, 3};
     expect_hit(cast(world, &small, at, 1, 0, 0, INFINITY), round, 8.5, -1, 0, 0);
-    expect_hit(cast(world, &small, at, 2, 0, 0, 8.5), round, 8.5, -1, 0, 0); /* the length of the direction is nothing */
+    expect_hit(cast(world, &small, at, 2, 0, 0, 8.5), round, 8.5, -1, 0, 0); /* whatever its length */
     expect_nothing(cast(world, &small, at, 1, 0, 0, 8.499999));
     expect_hit(cast(world, &small, aside, 1, 0, 0, 20), round, 10 - sqrt(1.5 * 1.5 - 0.81), -sqrt(1 - 0.36), 0.6, 0);
     expect_nothing(cast(world, &small, off, 1, 0, 0, INFINITY));
