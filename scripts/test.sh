@@ -5,7 +5,7 @@ set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
 steps=(plain python docs asan tsan clang minimal cuda)
-slow_steps=(fuzz) # with --slow
+slow_steps=(fuzz wheel) # with --slow
 more_steps=(gpu)  # only when asked for
 
 usage() {
@@ -27,12 +27,14 @@ Installs what is missing (Debian and Ubuntu, as root or by sudo without a passwo
              where there is none. There it is compiled to PTX, and no further, since nothing runs it
 with --slow:
     fuzz     by clang: libFuzzer on each of tests/fuzz, a fixed number of inputs, the same ones every time
+    wheel    scripts/wheel.sh: the source package, and from it a wheel, which is tried without a compiler; left out where
+             what builds wheels cannot be installed
 and, when asked for by --only, on a machine with a GPU:
     gpu      the tests of suite 'gpu' under compute-sanitizer: memcheck, initcheck, synccheck, racecheck
 The last line sums up the checks of all steps. Exit status 0: nothing failed.
 
---slow       run the tests of suite 'slow' and those on the emulated CUDA device in both precisions (in step plain), and step
-             fuzz; compile CUDA for all architectures
+--slow       run the tests of suite 'slow' and those on the emulated CUDA device in both precisions (in step plain), and the
+             steps above; compile CUDA for all architectures
 --only STEP  this step only; may be given more than once
 JOBS=n       compile and test with n jobs instead of all cores
 
@@ -113,7 +115,7 @@ step_python() {
     python3 -m venv "$folder/environment" || return 1
     # One instruction set, no CUDA: the steps beside this one have the others. The command is built to compare with:
     # another instruction set rounds otherwise.
-    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "$project[test,import,usd,decompose,view,gym]" \
+    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "${project}[test,import,usd,decompose,view,gym]" \
         -Csetup-args=-Dcuda=disabled -Csetup-args=-Dcpu_isas=avx2 -Csetup-args=-Dwerror=true \
         -Csetup-args=-Dcli=enabled \
         -Cbuild-dir="$folder/build" || return 1
@@ -208,6 +210,16 @@ step_fuzz() {
     configure "$project/build-fuzz" --native-file "$project/presets/fuzz.ini" -Dtests=enabled -Dwerror=true || return 1
     local launcher=("${unrandomised[@]}") rebuild=()
     run_tests fuzz --suite fuzz
+}
+
+step_wheel() {
+    local status=0
+    say "wheel: the source package, and from it a wheel"
+    "$project/scripts/wheel.sh" --out "$project/build-wheel/tested" || status=$?
+    if ((status == 0)); then passed+=(wheel); fi
+    ((status == 77)) || return "$status"
+    echo "what builds wheels cannot be installed here"
+    left_out+=(wheel)
 }
 
 step_gpu() {
