@@ -1,6 +1,6 @@
 """A Panda arm picks up a cube: it reaches down, closes its fingers, and lifts the cube by friction alone.
 
-    pip install subadmm[import] gymnasium-robotics      # the arm's model is a part of that package
+    pip install mujoco gymnasium-robotics      # the arm's model is a part of gymnasium-robotics
     python arm_lifts_cube.py [--mass 0.2]
 
 The arm is led by velocities of its hand: what turns its joints so (the Jacobian, damped least squares) is added up to

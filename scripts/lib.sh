@@ -9,6 +9,9 @@ jobs=${JOBS:-$(nproc)}
 packages_to_run=(gcc=cc 'g++=c++' meson=meson ninja-build=ninja pkgconf=pkg-config libfcl-dev libqhull-dev libjansson-dev)
 packages_to_test=("${packages_to_run[@]}" git=git libhdf5-dev check clang=clang libclang-rt-dev libomp-dev util-linux=setarch
                   python3-dev python3-venv)
+packages_to_package=(gcc=cc 'g++=c++' pkgconf=pkg-config git=git binutils=size libqhull-dev libjansson-dev python3-dev
+                     python3-venv)
+packages_for_aarch64=(gcc-aarch64-linux-gnu g++-aarch64-linux-gnu qemu-user-static)
 # Used where the release offers it.
 packages_to_test_if_offered=(cmake=cmake libsiconos-numerics-dev python3-jsonschema chromium-headless-shell)
 

@@ -5,7 +5,7 @@ set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
 steps=(plain python docs asan tsan clang minimal cuda)
-slow_steps=(fuzz) # with --slow
+slow_steps=(fuzz wheel aarch64) # with --slow
 more_steps=(gpu)  # only when asked for
 
 usage() {
@@ -27,12 +27,16 @@ Installs what is missing (Debian and Ubuntu, as root or by sudo without a passwo
              where there is none. There it is compiled to PTX, and no further, since nothing runs it
 with --slow:
     fuzz     by clang: libFuzzer on each of tests/fuzz, a fixed number of inputs, the same ones every time
+    wheel    scripts/wheel.sh: the source package, and from it a wheel, which is tried without a compiler; left out where
+             what builds wheels cannot be installed
+    aarch64  the library by a cross compiler, and a few test programs on an emulator; left out where these, or Check for that
+             machine, cannot be installed
 and, when asked for by --only, on a machine with a GPU:
     gpu      the tests of suite 'gpu' under compute-sanitizer: memcheck, initcheck, synccheck, racecheck
 The last line sums up the checks of all steps. Exit status 0: nothing failed.
 
---slow       run the tests of suite 'slow' and those on the emulated CUDA device in both precisions (in step plain), and step
-             fuzz; compile CUDA for all architectures
+--slow       run the tests of suite 'slow' and those on the emulated CUDA device in both precisions (in step plain), and the
+             steps above; compile CUDA for all architectures
 --only STEP  this step only; may be given more than once
 JOBS=n       compile and test with n jobs instead of all cores
 
@@ -113,7 +117,7 @@ step_python() {
     python3 -m venv "$folder/environment" || return 1
     # One instruction set, no CUDA: the steps beside this one have the others. The command is built to compare with:
     # another instruction set rounds otherwise.
-    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "$project[test,import,usd,decompose,view,video,gym]" \
+    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "${project}[test,import,usd,decompose,view,video,gym]" \
         -Csetup-args=-Dcuda=disabled -Csetup-args=-Dcpu_isas=avx2 -Csetup-args=-Dwerror=true \
         -Csetup-args=-Dcli=enabled \
         -Cbuild-dir="$folder/build" || return 1
@@ -208,6 +212,49 @@ step_fuzz() {
     configure "$project/build-fuzz" --native-file "$project/presets/fuzz.ini" -Dtests=enabled -Dwerror=true || return 1
     local launcher=("${unrandomised[@]}") rebuild=()
     run_tests fuzz --suite fuzz
+}
+
+step_wheel() {
+    local status=0
+    say "wheel: the source package, and from it a wheel"
+    "$project/scripts/wheel.sh" --out "$project/build-wheel/tested" || status=$?
+    if ((status == 0)); then passed+=(wheel); fi
+    ((status == 77)) || return "$status"
+    echo "what builds wheels cannot be installed here"
+    left_out+=(wheel)
+}
+
+# Check for aarch64, unpacked into a folder: this machine's own packages stay what they are. False: there is none.
+unpack_check() {
+    local folder=$1 apt=(apt-get -qq)
+    [[ -e $folder/root/usr/include/check.h ]] && return
+    mkdir -p "$folder/lists/partial" "$folder/root"
+    apt+=(-o APT::Architecture=arm64 -o APT::Architectures=arm64 -o Dir::State::Lists="$folder/lists"
+          -o Dir::Cache::pkgcache= -o Dir::Cache::srcpkgcache= -o APT::Sandbox::User=root)
+    (cd "$folder" && "${apt[@]}" update && "${apt[@]}" download check libsubunit-dev) || return 1
+    for package in "$folder"/*.deb; do dpkg -x "$package" "$folder/root"; done
+}
+
+step_aarch64() {
+    local folder=$project/build-aarch64
+    say "aarch64: by a cross compiler, some tests on an emulator"
+    if [[ $(uname -m) == aarch64 ]] || ! install_packages_if_offered "${packages_for_aarch64[@]}" ||
+        ! command -v aarch64-linux-gnu-g++ >/dev/null || ! command -v qemu-aarch64-static >/dev/null ||
+        ! unpack_check "$folder/check"; then
+        echo "this is such a machine, or the compiler, the emulator or Check for it cannot be installed"
+        left_out+=(aarch64)
+        return
+    fi
+    local root=$folder/check/root rebuild=()
+    cat >"$folder/check.ini" <<TXT
+[properties]
+sys_root = '$root'
+pkg_config_libdir = '$root/usr/lib/aarch64-linux-gnu/pkgconfig'
+TXT
+    # Warnings stay warnings: which variables may be unset is another question for each machine's optimizer.
+    configure "$folder/build" --cross-file "$project/presets/aarch64.ini" --cross-file "$folder/check.ini" \
+        -Dauto_features=disabled -Dtests=enabled -Dscenes=enabled -Dopenmp=enabled || return 1
+    SADMM_TEST_SHORT=1 run_tests aarch64/build certificate mesh query_ray rows
 }
 
 step_gpu() {

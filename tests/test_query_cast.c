@@ -38,8 +38,10 @@ START_TEST(by_formula)
                         body = add_body(world, SADMM_BODY_DYNAMIC, 10, 0, 3);
     const sadmm_shape_def plane = shape_of(SADMM_SHAPE_PLANE, 0, 0, 0), ball = shape_of(SADMM_SHAPE_SPHERE, 1, 0, 0),
                           box = shape_of(SADMM_SHAPE_BOX, 1, 1, 1), small = shape_of(SADMM_SHAPE_SPHERE, 0.5, 0, 0),
-                          pill = shape_of(SADMM_SHAPE_CAPSULE, 0.5, 1, 0), can = shape_of(SADMM_SHAPE_CYLINDER, 0.5, 1, 0),
-                          cone = shape_of(SADMM_SHAPE_CONE, 0.5, 1, 0), egg = shape_of(SADMM_SHAPE_ELLIPSOID, 0.5, 0.5, 1);
+                          pill = shape_of(SADMM_SHAPE_CAPSULE, 0.5, 1, 0),
+                          can = shape_of(SADMM_SHAPE_CYLINDER, 0.5, 1, 0),
+                          cone = shape_of(SADMM_SHAPE_CONE, 0.5, 1, 0),
+                          egg = shape_of(SADMM_SHAPE_ELLIPSOID, 0.5, 0.5, 1);
     const sadmm_shape_id low = add_shape(world, ground, &plane), round = add_shape(world, body, &ball);
     const double at[3] = {0, 0, 3}, aside[3] = {0, 0.9, 3}, off[3] = {0, 1.5 + 1e-6, 3}, on[3] = {0, 1.5 - 1e-6, 3};
     expect_hit(cast(world, &small, at, 1, 0, 0, INFINITY), round, 8.5, -1, 0, 0);

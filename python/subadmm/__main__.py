@@ -18,10 +18,10 @@ def _arguments():
     parser = argparse.ArgumentParser(prog="python -m subadmm", description="Scenes to look at, and robots as scenes.")
     parser.add_argument("--version", action="version", version=f"subadmm {subadmm.__version__} ({subadmm.build_commit()})")
     commands = parser.add_subparsers(dest="command", required=True)
-    view = commands.add_parser("view", help="open a page with the running scene (needs: pip install 'subadmm[view]')")
+    view = commands.add_parser("view", help="open a page with the running scene (needs: pip install 'viser<2')")
     record = commands.add_parser(
         "record", help="run a scene into a page that plays by itself (.html), glTF (.glb), a video (.mp4; needs: pip "
-                       "install 'subadmm[video]') or a stage (.usd, .usda, .usdc; needs: 'subadmm[usd]')"
+                       "install imageio-ffmpeg) or a stage (.usd, .usda, .usdc; needs: pip install usd-core)"
     )
     picture = commands.add_parser("picture", help="run a scene and write a picture of its end (.png)")
     for command in (view, record, picture):
@@ -58,7 +58,7 @@ def _arguments():
     convert.add_argument("--floating", action="store_true", help="URDF: the base is free")
     convert.add_argument("--keyframe", help="MJCF: the keyframe to start from")
     convert.add_argument("--decompose", action="store_true",
-                         help="several hulls for each mesh of a moving body (needs: pip install 'subadmm[decompose]')")
+                         help="several hulls for each mesh of a moving body (needs: pip install coacd)")
     view.add_argument("--copies", type=int, default=1, help="so many environments, side by side (1)")
     view.add_argument("--host", default="127.0.0.1", help="address to serve at (127.0.0.1: this machine only)")
     view.add_argument("--port", type=int, default=8080, help="port to serve at (8080)")

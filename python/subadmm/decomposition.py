@@ -55,7 +55,7 @@ def volume_of(vertices, triangles):
 
 def decompose(mesh: Any, threshold: float = THRESHOLD, *, most: int | None = None, seed: int = 0,
               **options: Any) -> list[Any]:
-    """A mesh as a list of hull shapes that together are close to it, by coacd (pip install subadmm[decompose]).
+    """A mesh as a list of hull shapes that together are close to it, by coacd (pip install coacd).
 
     mesh: a Shape made by subadmm.mesh, a pair (vertices n x 3 in m, triangles m x 3), or an object with `vertices` and
     `faces` (trimesh). threshold: concavity that may remain, in [0.01, 1], as a share of the mesh's size; smaller ones
@@ -72,7 +72,7 @@ def decompose(mesh: Any, threshold: float = THRESHOLD, *, most: int | None = Non
     try:
         import coacd
     except ImportError as error:
-        raise ImportError("subadmm.decompose needs the package coacd: pip install subadmm[decompose]") from error
+        raise ImportError("subadmm.decompose needs the package coacd: pip install coacd") from error
     coacd.set_log_level("error")
     parts = coacd.run_coacd(
         coacd.Mesh(vertices, triangles), threshold=threshold, max_convex_hull=most, seed=seed

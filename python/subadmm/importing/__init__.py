@@ -65,13 +65,13 @@ def load(
     overlaps: str = "ignore",
     decompose: bool | float = False,
 ) -> Any:
-    """Build a world from an MJCF or URDF file, compiled by the package `mujoco` (pip install subadmm[import]), or
-    from a USD stage (.usd, .usda, .usdc, .usdz), read by `usd-core` (pip install subadmm[usd]).
+    """Build a world from an MJCF or URDF file, compiled by the package `mujoco` (pip install mujoco), or
+    from a USD stage (.usd, .usda, .usdc, .usdz), read by `usd-core` (pip install usd-core).
 
     path: the file; or a mujoco.MjModel that is compiled already, or a pxr.Usd.Stage that is open.
     settings: a subadmm.Settings; default: the file's time step and gravity. backend, precision, device: as of World.
     threads: in place of settings.threads.
-    decompose: True makes several hulls of each mesh of a body that moves, by coacd (pip install subadmm[decompose]); a
+    decompose: True makes several hulls of each mesh of a body that moves, by coacd (pip install coacd); a
         number in [0.01, 1] is the concavity that may remain (True: 0.05). Default: one hull, which is in the report
         where it is much larger than the mesh.
 
@@ -106,7 +106,7 @@ def load(
     try:
         import mujoco
     except ImportError as error:
-        raise ImportError("subadmm.load needs the package mujoco: pip install subadmm[import]") from error
+        raise ImportError("subadmm.load needs the package mujoco: pip install mujoco") from error
     from .compile import compile_file
 
     carrier_share = real("carrier_share", carrier_share, 1e-6, 1e-1)

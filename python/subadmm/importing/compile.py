@@ -169,5 +169,5 @@ def _mesh_of(file):
     try:
         import trimesh
     except ImportError as error:
-        raise ImportError(f"{file}: this format needs the package trimesh: pip install subadmm[import]") from error
+        raise ImportError(f"{file}: this format needs the package trimesh: pip install trimesh") from error
     return trimesh.load(file, force="mesh").export(file_type="stl"), ".stl"

@@ -83,10 +83,10 @@ def check_ending(name, path):
     ending = Path(path).suffix
     if ending not in ENDINGS:
         raise ValueError(f"{name}: {path}; must end in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}")
-    package, module, extra = {".mp4": ("imageio-ffmpeg", "imageio_ffmpeg", "video"), ".html": (None,) * 3,
-                              ".glb": (None,) * 3}.get(ending, ("usd-core", "pxr", "usd"))
+    package, module = {".mp4": ("imageio-ffmpeg", "imageio_ffmpeg"), ".html": (None, None),
+                       ".glb": (None, None)}.get(ending, ("usd-core", "pxr"))
     if module and importlib.util.find_spec(module) is None:
-        raise ImportError(f"{name}: {path}; {ending} files need the package {package}: pip install 'subadmm[{extra}]'")
+        raise ImportError(f"{name}: {path}; {ending} files need the package {package}: pip install {package}")
 
 
 def check_video(width=1280, height=720, camera=None):

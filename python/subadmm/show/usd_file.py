@@ -14,7 +14,7 @@ def usd_of(recording, ending: str) -> bytes:
     try:
         from pxr import Gf, Usd, UsdGeom, Vt
     except ImportError as error:
-        raise ImportError("USD files need the package usd-core: pip install 'subadmm[usd]'") from error
+        raise ImportError("USD files need the package usd-core: pip install usd-core") from error
     from .video import frames_per_second
 
     description, rate = recording.description, frames_per_second(recording.times)

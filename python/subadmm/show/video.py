@@ -21,7 +21,7 @@ def mp4_of(recording, width: int = WIDTH, height: int = HEIGHT, camera=None) -> 
     try:
         import imageio_ffmpeg
     except ImportError as error:
-        raise ImportError("MP4 files need the package imageio-ffmpeg: pip install 'subadmm[video]'") from error
+        raise ImportError("MP4 files need the package imageio-ffmpeg: pip install imageio-ffmpeg") from error
     camera = camera or usual_camera(recording)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "video.mp4"

@@ -35,7 +35,7 @@ def _viser():
     try:
         import viser
     except ImportError as error:
-        raise ImportError("the view needs viser: pip install 'subadmm[view]'") from error
+        raise ImportError("the view needs viser: pip install 'viser<2'") from error
     return viser
 
 

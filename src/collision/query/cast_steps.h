@@ -12,8 +12,8 @@
 /* Distances are exact to 1e-12 of the size: what is nearer touches. */
 #define SADMM_CAST_TOUCH 4e-12
 
-/* What touches where it begins is moved into if it moves by more than this share of its way along the normal; a triangle
- * that is met from its front faces the way by as much. */
+/* What touches where it begins is moved into if it moves by more than this share of its way along the normal. A
+ * triangle that is met from its front faces the way by as much. */
 #define SADMM_CAST_GRAZES 1e-9
 
 /* Does a box that moves by `limit` along d meet another one? *enter: not before it has moved so far. */

@@ -24,7 +24,7 @@ def open_stage(path):
     try:
         from pxr import Tf, Usd
     except ImportError as error:
-        raise ImportError("USD files need the package usd-core: pip install subadmm[usd]") from error
+        raise ImportError("USD files need the package usd-core: pip install usd-core") from error
     if isinstance(path, Usd.Stage):
         return path
     path = os.fspath(path)
