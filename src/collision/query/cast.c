@@ -20,7 +20,8 @@ static bool overlaps(const struct sadmm_cast *cast, const struct sadmm_placed *o
                      struct sadmm_cast_find *find)
 {
     struct sadmm_separation separation;
-    if (!sadmm_closest(cast->shape, other, 0, &separation) || !(separation.distance < -SADMM_CAST_TOUCH * size)) return false;
+    if (!sadmm_closest(cast->shape, other, 0, &separation) || !(separation.distance < -SADMM_CAST_TOUCH * size))
+        return false;
     *find = (struct sadmm_cast_find){0, separation.normal, separation.b, separation.triangle, true};
     return true;
 }

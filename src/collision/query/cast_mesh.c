@@ -118,7 +118,8 @@ static void search_heights(struct search *s)
         const double way[2] = {dx != 0 ? in * dx : 0, dx != 0 && !isinf(out) ? out * dx : 0},
                      left = s->box.lo[0] + min_of(way[0], way[1]) - m->spacing[0],
                      right = s->box.hi[0] + max_of(way[0], way[1]) + m->spacing[0];
-        for (int32_t c = mesh_cell(left, m->spacing[0], cells[0]); c <= mesh_cell(right, m->spacing[0], cells[0]); ++c) {
+        const int32_t end = mesh_cell(right, m->spacing[0], cells[0]);
+        for (int32_t c = mesh_cell(left, m->spacing[0], cells[0]); c <= end; ++c) {
             const int32_t cell = r * cells[0] + c;
             try_triangle(s, 2 * cell);
             try_triangle(s, 2 * cell + 1);

@@ -1,6 +1,6 @@
 /* The distance of two convex bodies is a convex function of the way that one of them moves: Newton's steps from where
- * it begins come to where they touch, and never beyond. It falls by the way times the way's share along the normal; once
- * it does not fall, it never will. */
+ * it begins come to where they touch, and never beyond. It falls by the way times the way's share along the normal;
+ * once it does not fall, it never will. */
 #ifndef SADMM_COLLISION_QUERY_CAST_STEPS_H
 #define SADMM_COLLISION_QUERY_CAST_STEPS_H
 
