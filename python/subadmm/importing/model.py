@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .. import _core
 from ..coordinates import Coordinates
 from ..given import point
 from ..namespace import NUMPY
@@ -188,9 +189,8 @@ class Loaded:
     def render(self, width: int = 640, height: int = 480, camera: Any = None) -> np.ndarray[Any, np.dtype[np.uint8]]:
         """A picture of it as it is now, by the file's visuals and colours: height x width x 3, uint8, sRGB. As
         World.render; camera: also the name of a camera of an MJCF file."""
-        from ..show import render
-
-        return render(self, width, height, camera)
+        draw: Any = _core.World.render  # draws either
+        return draw(self, width, height, camera)
 
     def __repr__(self):
         return (
