@@ -131,19 +131,11 @@ bool sadmm_cast_on_mesh(const struct sadmm_cast *cast, const struct sadmm_placed
                         struct sadmm_cast_find *find)
 {
     struct mesh mesh;
-    double R[9], extent[3];
     struct search s = {.cast = cast, .pose = sadmm_closest_pose(cast->shape, placed), .mesh = &mesh, .limit = limit};
-    const double x[3] = {s.pose.t.x, s.pose.t.y, s.pose.t.z};
     mesh_at(placed->blocks, placed->geometry.hull, &mesh);
     v3_store(placed_own(placed, v3_load(cast->direction)), s.direction);
     s.size = geometry_radius(&cast->shape->geometry) + geometry_radius(&placed->geometry) + v3_norm(s.pose.t);
-    for (int k = 0; k < 3; ++k) v3_store(s.pose.R.r[k], R + 3 * k);
-    geometry_extents(&cast->shape->geometry, R, extent);
-    for (int k = 0; k < 3; ++k) {
-        const double e = extent[k] + 16 * DBL_EPSILON * (fabs(x[0]) + fabs(x[1]) + fabs(x[2]) + extent[k]);
-        s.box.lo[k] = x[k] - e;
-        s.box.hi[k] = x[k] + e;
-    }
+    sadmm_closest_box(cast->shape, &s.pose, &s.box);
     if (mesh.kind == MESH_HEIGHTS) search_heights(&s);
     else search_tree(&s);
     if (!s.found) return false;

@@ -201,21 +201,26 @@ static void search_heights(struct search *s)
     }
 }
 
-bool sadmm_closest_on_mesh(const struct sadmm_placed *a, const struct sadmm_placed *b, const struct closest_pose *pose,
-                           double limit, struct sadmm_separation *separation)
+void sadmm_closest_box(const struct sadmm_placed *a, const struct closest_pose *pose, struct sadmm_box3 *box)
 {
-    struct mesh mesh;
-    double R[9], extent[3];
     const double x[3] = {pose->t.x, pose->t.y, pose->t.z};
-    mesh_at(b->blocks, b->geometry.hull, &mesh);
-    struct search s = {.a = a, .pose = pose, .mesh = &mesh, .limit = limit, .separation = separation};
+    double R[9], extent[3];
     for (int k = 0; k < 3; ++k) v3_store(pose->R.r[k], R + 3 * k);
     geometry_extents(&a->geometry, R, extent);
     for (int k = 0; k < 3; ++k) {
         const double e = extent[k] + 16 * DBL_EPSILON * (fabs(x[0]) + fabs(x[1]) + fabs(x[2]) + extent[k]);
-        s.box.lo[k] = x[k] - e;
-        s.box.hi[k] = x[k] + e;
+        box->lo[k] = x[k] - e;
+        box->hi[k] = x[k] + e;
     }
+}
+
+bool sadmm_closest_on_mesh(const struct sadmm_placed *a, const struct sadmm_placed *b, const struct closest_pose *pose,
+                           double limit, struct sadmm_separation *separation)
+{
+    struct mesh mesh;
+    mesh_at(b->blocks, b->geometry.hull, &mesh);
+    struct search s = {.a = a, .pose = pose, .mesh = &mesh, .limit = limit, .separation = separation};
+    sadmm_closest_box(a, pose, &s.box);
     if (mesh.kind == MESH_HEIGHTS) search_heights(&s);
     else search_tree(&s);
     return s.found;

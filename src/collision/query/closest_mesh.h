@@ -13,6 +13,8 @@ struct closest_pose {
     vec3 t;
 };
 struct closest_pose sadmm_closest_pose(const struct sadmm_placed *a, const struct sadmm_placed *b);
+/* Around a, in the frame of b; rounding makes it larger. */
+void sadmm_closest_box(const struct sadmm_placed *a, const struct closest_pose *pose, struct sadmm_box3 *box);
 /* a: not a plane; b: a mesh. In the frame of b. */
 bool sadmm_closest_on_mesh(const struct sadmm_placed *a, const struct sadmm_placed *b, const struct closest_pose *pose,
                            double limit, struct sadmm_separation *separation);

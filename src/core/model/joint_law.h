@@ -38,7 +38,7 @@ struct sadmm_joint_memory {
     double left[JOINT_COORDINATES];                    /* of locks: articulation_left of their rows; 0: not reported */
     double expected[JOINT_COORDINATES];                /* of locks and springs: e, and w of the step before, if */
     double missed[JOINT_COORDINATES];                  /* `followed`; */
-    double ahead[JOINT_COORDINATES];                   /* s of the step at hand (joint_foresee) */
+    double ahead[JOINT_COORDINATES];                   /* of locks: s of the step at hand (joint_foresee) */
     bool trapezoid_off;                                /* its bodies were moved by the velocities of the step's end */
     bool followed;                                     /* its bodies were left with what the laws make of them */
     bool broken;                                       /* it gave more than it bears */
@@ -393,7 +393,7 @@ SADMM_INLINE bool joint_turns_within(const struct joint_turn_bounds *bounds, int
  * with J v as solved for: a row that cannot follow its s would wind it up. s takes away the w of the step at hand,
  * foreseen from the last two. What is left is of higher order; as w is foreseen with some of its change to come, it
  * takes energy rather than giving it. */
-#define JOINT_FORESIGHT 1.25 /* three hinges at 2 ms: with 1 they gain 0.5 % in 300 s; 1.5 loses twice as much */
+#define JOINT_FORESIGHT 1.25 /* with 1 hinges gain in the long run, with 1.5 they lose twice as much (bench: stress) */
 
 /* More than this, of what rows turn by in a step, is no curvature of a motion: bodies have been struck or set
  * elsewhere. */
