@@ -204,6 +204,9 @@ static void on_shapes(void)
     ck_assert_int_eq(sadmm_world_shape_def(world, shape, &def, NULL), SADMM_OK); /* body may be NULL */
     REFUSES("world", sadmm_world_set_shape_material(NULL, shape, 0.5, 0));
     const double unit[4] = {1, 0, 0, 0};
+    REFUSES("world", sadmm_world_set_shape_surface_velocity(NULL, shape, unit));
+    REFUSES("velocity", sadmm_world_set_shape_surface_velocity(world, shape, NULL));
+    REFUSES("world", sadmm_world_set_manifold_callback(NULL, NULL, NULL));
     REFUSES("world", sadmm_world_set_shape_size(NULL, shape, unit));
     REFUSES("size", sadmm_world_set_shape_size(world, shape, NULL));
     REFUSES("world", sadmm_world_set_shape_frame(NULL, shape, unit, unit));
@@ -640,7 +643,8 @@ static const struct {
       W(body_pair_off_at)}},
     {on_shapes,
      {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def_sized), W(set_shape_material),
-      W(set_shape_size), W(set_shape_frame), W(set_pair_friction), W(pair_friction_count), W(pair_friction_at)}},
+      W(set_shape_surface_velocity), W(set_manifold_callback), W(set_shape_size), W(set_shape_frame),
+      W(set_pair_friction), W(pair_friction_count), W(pair_friction_at)}},
     {on_joints,
      {W(place_joint), W(add_joint), W(remove_joint), W(joint_count), W(joint_at), W(joint_def_sized),
       W(set_joint_enabled), W(set_joint_coordinate_sized), W(joint_state), W(set_joint_spring_table),

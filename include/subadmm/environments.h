@@ -39,7 +39,7 @@ typedef struct sadmm_environments sadmm_environments;
 /* `count` copies, in [1, 2^20], of the template `world` as it is now, impulses for warm starting included. The world
  * does not change, and may be destroyed. Errors: INVALID_ARGUMENT (count), OUT_OF_MEMORY, LIMIT (more objects than a
  * world holds, on CUDA); UNAVAILABLE (on CUDA: bodies of the template are in several environments of its own, and
- * others in -1); those of steps begun (world.h). The message is the world's. */
+ * others in -1; a shape has a surface velocity); those of steps begun (world.h). The message is the world's. */
 SADMM_API sadmm_status sadmm_world_replicate(sadmm_world *world, int32_t count, sadmm_environments **out);
 SADMM_API void sadmm_environments_destroy(sadmm_environments *environments); /* NULL is fine */
 /* The message of the last failed call, "" when none failed or environments is NULL; valid until the next call. */

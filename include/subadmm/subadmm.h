@@ -10,6 +10,7 @@
 #include "hull.h"
 #include "id.h"
 #include "joint.h"
+#include "manifold.h"
 #include "mass.h"
 #include "mesh.h"
 #include "mesh_file.h"

@@ -122,6 +122,9 @@ typedef struct sadmm_shape_def {
                                     it has shapes of it, so the caller may destroy it at once. Read back: the same
                                     pointer */
     const sadmm_mesh *mesh;      /* of MESH; likewise */
+    double surface_velocity[3];  /* how the surface moves, as a conveyor belt's does, while the shape stays: m/s, in the
+                                    shape's frame, |x| <= 1e6. Contacts see what of it is across their normal. 0 on a
+                                    dynamic body; default 0 */
 } sadmm_shape_def;
 
 /* The defaults named above. Thread-safe. */

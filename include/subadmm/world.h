@@ -71,7 +71,7 @@ SADMM_API sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id 
  * is as in the definition, and velocities are 0 for static bodies. Contacts lose accuracy beyond the ranges of the
  * definition. A new pose is a teleport: the contacts of the body start anew, without the memory of which side it came
  * from. To set velocities alone, pass the pose that was read. A kinematic body moves on with the velocity until it is
- * set again. For a conveyor belt, set the same pose and the velocity before every step. Errors: STALE_ID,
+ * set again. A conveyor belt is a shape with a surface velocity (sadmm_shape_def). Errors: STALE_ID,
  * INVALID_ARGUMENT (nothing changes). */
 SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
 /* Move a kinematic body to a pose (m, |x| <= 1e9; w x y z, as in the definition) within the next step, with the
@@ -167,6 +167,11 @@ static inline sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape
  * INVALID_ARGUMENT (range; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id id, double friction,
                                                       double restitution);
+/* Replace the surface velocity of a shape (m/s, in its frame; meaning and range as in the definition) from the next
+ * step on. Steps of a world with such a shape are made by the host, on CUDA too (docs/guide/contacts.md). Errors: STALE_ID,
+ * INVALID_ARGUMENT (range; other than 0 on a dynamic body; nothing changes), DEVICE. */
+SADMM_API sadmm_status sadmm_world_set_shape_surface_velocity(sadmm_world *world, sadmm_shape_id id,
+                                                              const double velocity[3]);
 /* Replace the sizes of a shape (m, meaning and range as in the definition; those that its type does not use must be 0)
  * from the next step on. Of a sphere, capsule, box, cylinder, cone or ellipsoid; planes, hulls and meshes have none.
  * The body keeps its mass, its inertia and its centre of mass: see sadmm_world_set_body_mass. Contacts of the shape

@@ -10,10 +10,12 @@
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <thread>
 
 #include "core/base/names.h"
 #include "scene_file/scene_file.h"
@@ -143,6 +145,9 @@ struct world {
     std::shared_ptr<sadmm_world> kept; // by arrays on a device as well, which hold no Python object
     sadmm_world *handle = nullptr;
     std::mutex mutex;
+    std::atomic<std::thread::id> by{}; // whose call is being made
+    nb::object decide;  // the callback for manifolds, and what it has raised
+    std::unique_ptr<nb::python_error> raised;
     bool scripted = false; // is there a script?
     bool script_on = true; // does it act?
     std::string spec;      // of the scene; of one from a text: none
@@ -162,6 +167,28 @@ struct world {
         kept.reset();
         sadmm_scene_close(&scene);
     }
+};
+
+// A call on a world: one at a time, and none from within another one, as a callback could make it.
+class world_lock {
+  public:
+    explicit world_lock(world &given) : w(given)
+    {
+        if (w.by.load() == std::this_thread::get_id())
+            throw std::runtime_error("a callback of a world must not call the world");
+        w.mutex.lock();
+        w.by = std::this_thread::get_id();
+    }
+    ~world_lock()
+    {
+        w.by = std::thread::id();
+        w.mutex.unlock();
+    }
+    world_lock(const world_lock &) = delete;
+    world_lock &operator=(const world_lock &) = delete;
+
+  private:
+    world &w;
 };
 
 // Settings: those of a world, as they were read, whose members are set there, too; or some of nobody.
@@ -184,7 +211,7 @@ template <class F> void call(world &w, F f)
     std::string message;
     {
         nb::gil_scoped_release release;
-        std::lock_guard<std::mutex> lock(w.mutex);
+        world_lock lock(w);
         status = f(w.handle);
         if (status != SADMM_OK) message = sadmm_world_message(w.handle);
     }
@@ -195,7 +222,7 @@ template <class F> void call(world &w, F f)
 template <class F> auto ask(world &w, F f)
 {
     nb::gil_scoped_release release;
-    std::lock_guard<std::mutex> lock(w.mutex);
+    world_lock lock(w);
     return f(w.handle);
 }
 
@@ -363,6 +390,9 @@ void bind_arrays(nb::module_ &m, nb::class_<world> &w);
 void bind_joints(nb::module_ &m, nb::class_<world> &w);
 void bind_queries(nb::class_<world> &w);
 void bind_events(nb::module_ &m, nb::class_<world> &w);
+void bind_manifold(nb::module_ &m, nb::class_<world> &w);
+// A world's callback may hold the world.
+nb::type_slots collected_world();
 void bind_scenes(nb::module_ &m, nb::class_<world> &w);
 void bind_environments(nb::module_ &m);
 void bind_draw(nb::module_ &m);

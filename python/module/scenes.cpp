@@ -67,7 +67,7 @@ static std::unique_ptr<world> clone_of(world &w)
     sadmm_status status;
     {
         nb::gil_scoped_release release;
-        std::lock_guard<std::mutex> lock(w.mutex);
+        world_lock lock(w);
         std::vector<char> bytes;
         size_t size = 0;
         sadmm_world *copy = nullptr;
@@ -111,7 +111,7 @@ static std::string to_json(world &w, const std::optional<std::string> &name,
     sadmm_status status;
     {
         nb::gil_scoped_release release;
-        std::lock_guard<std::mutex> lock(w.mutex);
+        world_lock lock(w);
         FILE *stream = open_memstream(&text, &size);
         if (!stream) {
             status = SADMM_ERROR_OUT_OF_MEMORY;

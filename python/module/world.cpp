@@ -1,5 +1,6 @@
 // Worlds: bodies, shapes, steps, saved states.
 #include <chrono>
+#include <utility>
 
 #include "fields.h"
 
@@ -77,7 +78,7 @@ static void step(world &w, const whole &steps, bool wait)
         std::string message;
         {
             nb::gil_scoped_release release;
-            std::lock_guard<std::mutex> lock(w.mutex);
+            world_lock lock(w);
             const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(50);
             do {
                 status = step_once(w, wait, message);
@@ -85,6 +86,7 @@ static void step(world &w, const whole &steps, bool wait)
                 if (wait && status == SADMM_OK) misses_tolerance(w, warning);
             } while (status == SADMM_OK && k < n && std::chrono::steady_clock::now() < end);
         }
+        if (w.raised) throw nb::python_error(*std::exchange(w.raised, nullptr));
         if (status != SADMM_OK) raise_status(status, message);
         if (!warning.empty() && PyErr_WarnEx(PyExc_RuntimeWarning, warning.c_str(), 1) < 0) throw nb::python_error();
         warning.clear();
@@ -121,7 +123,7 @@ static body add_body(nb::handle_t<world> self, const std::string &name SADMM_BOD
     sadmm_status status;
     {
         nb::gil_scoped_release release;
-        std::lock_guard<std::mutex> lock(w.mutex);
+        world_lock lock(w);
         status = sadmm_world_add_body(w.handle, &def, &out.id);
         const bool added = status == SADMM_OK;
         if (added) status = add_shapes(w.handle, out.id, parts, message);
@@ -331,6 +333,13 @@ static void bind_body(nb::module_ &m)
                 call(s.in(), [&](sadmm_world *h) { return sadmm_world_set_shape_material(h, s.id, mu, e); });
             },
             "friction"_a, "restitution"_a = 0.0)
+        .def(
+            "set_surface_velocity",
+            [](const shape &s, numbers<3> velocity) {
+                const vec3 v = velocity.as("velocity");
+                call(s.in(), [&](sadmm_world *h) { return sadmm_world_set_shape_surface_velocity(h, s.id, v.data()); });
+            },
+            "velocity"_a, "How its surface moves while it stays, as a belt's, in its own frame, m/s.")
         .def(
             "set_size",
             [](const shape &s, nb::object size) {

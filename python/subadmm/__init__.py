@@ -40,6 +40,7 @@ from ._core import (
     InvalidArgument,
     Joint,
     LimitExceeded,
+    Manifold,
     Mass,
     NonFinite,
     OutOfMemory,
@@ -73,7 +74,7 @@ __all__ = [
     "decompose", "load",
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Environments", "Error", "FileError",
     "Gear",
-    "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Robots",
+    "InvalidArgument", "Joint", "LimitExceeded", "Manifold", "Mass", "NonFinite", "OutOfMemory", "Report", "Robots",
     "Settings", "Shape",
     "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
@@ -90,7 +91,8 @@ __all__ = [
 
 def _with(shape: Shape, options: dict[str, Any]) -> Shape:
     for name in options:
-        if name not in ("position", "orientation", "friction", "restitution", "category", "mask", "sensor"):
+        if name not in ("position", "orientation", "friction", "restitution", "category", "mask", "sensor",
+                        "surface_velocity"):
             raise TypeError(f"{name}: no such option of a shape")
     _core._set_members(shape, options)
     return shape
@@ -99,7 +101,8 @@ def _with(shape: Shape, options: dict[str, Any]) -> Shape:
 def plane(**options: Any) -> Shape:
     """Half-space z <= 0 of the shape's frame, for static bodies. Options of this and all shapes: position and
     orientation in the body's frame, friction (0.5), restitution (0), category, mask, sensor (False; a sensor has no
-    contacts and reports overlaps)."""
+    contacts and reports overlaps), surface_velocity (0: how the surface moves while the shape stays, as a conveyor
+    belt's, m/s, in the shape's frame)."""
     return _with(Shape("plane"), options)
 
 

@@ -17,6 +17,7 @@
 #include "world/resident/resident.h"
 #include "world/state/report.h"
 #include "world/step/coupling_step.h"
+#include "world/step/decide.h"
 #include "world/step/gather.h"
 #include "world/step/hits.h"
 #include "world/step/integrate.h"
@@ -153,6 +154,7 @@ static void commit(sadmm_world *world)
     sadmm_world_moved(world);
     sadmm_world_commit_joints(world);
     sadmm_world_commit_couplings(world, world->def.settings.substeps);
+    sadmm_decider_turn(&world->decider);
     world->stepped = true;
     world->contacts_readable = true;
 }
@@ -314,7 +316,7 @@ static sadmm_status find(struct host_step *step)
     TRY(find_contacts(world, step->stages.substep));
     sadmm_world_open_separations(world);
     step->found = true;
-    return SADMM_OK;
+    return sadmm_world_decide(world);
 }
 
 static sadmm_status make_plan(struct host_step *step)

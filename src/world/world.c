@@ -98,8 +98,10 @@ void sadmm_world_destroy(sadmm_world *world)
     for (size_t i = 0; i < sizeof ids / sizeof *ids; ++i) sadmm_ids_free(ids[i]);
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; ++i) sadmm_pair_table_free(pairs[i]);
     sadmm_world_free_hits(world);
+    sadmm_decider_free(&world->decider);
     void *blocks[] = {world->bodies, world->shapes, world->geometries, world->block_shapes,
-                      world->shape_links, world->filtered_pairs, world->joints, world->couplings, world->gears,
+                      world->shape_links, world->surfaces, world->filtered_pairs,
+                      world->joints, world->couplings, world->gears,
                       world->joint_sources, world->joint_load, world->stiffening, world->stiffened,
                       world->opened, world->folding, world->row_left, world->closing_costs, world->closing_slots,
                       world->openings,

@@ -148,7 +148,9 @@ inline bool run_blocks(const std::function<void()> &body, unsigned first, unsign
         for (size_t i = 0; i < l.fibers.size(); i += WARP_SIZE) release(&l, i, i + WARP_SIZE, AT_WARP);
         for (size_t i = 0; i < l.fibers.size(); i += threads) release(&l, i, i + threads, AT_BLOCK);
         release(&l, 0, l.fibers.size(), AT_ALL);
-        if (!moved) return false;
+        if (moved) continue;
+        for (size_t i = 0; i < l.fibers.size(); ++i) flow_abandon(stacks[i].get(), STACK);
+        return false;
     }
     return true;
 }

@@ -51,6 +51,10 @@ struct flow {
 #endif
 };
 
+/* On a stack whose last fiber came to its end only the frames of that are left; a whole stack takes the sanitizer
+ * longer than most threads run. */
+enum { LAST_FRAMES = 4096 };
+
 /* Make one that begins with entry(), which must not return, on a stack that nothing uses any more. */
 inline void flow_prepare(flow *f, char *stack, size_t bytes, void (*entry)(void))
 {
@@ -76,8 +80,19 @@ inline void flow_prepare(flow *f, char *stack, size_t bytes, void (*entry)(void)
     f->bottom = stack;
     f->bytes = bytes;
     f->frames = nullptr;
-    __asan_unpoison_memory_region(stack, bytes); /* of frames that were left */
+    __asan_unpoison_memory_region(stack + bytes - LAST_FRAMES, LAST_FRAMES);
 #endif
+#endif
+}
+
+/* A stack whose fiber will not come to its end. */
+inline void flow_abandon(char *stack, size_t bytes)
+{
+#if defined FIBER_WATCHED && !defined FIBER_PORTABLE
+    __asan_unpoison_memory_region(stack, bytes);
+#else
+    (void)stack;
+    (void)bytes;
 #endif
 }
 

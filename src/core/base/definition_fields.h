@@ -43,7 +43,9 @@ extern "C" {
     F(X, FLAG, PLAIN, sensor, false, 0, 1, ANY,                                                            \
       "A sensor has no contacts and reports overlaps: World.record_events, World.sensor_overlaps.")        \
     F(X, OTHER, OWN, hull, NULL, 0, 0, ANY, "")                                                            \
-    F(X, OTHER, OWN, mesh, NULL, 0, 0, ANY, "")
+    F(X, OTHER, OWN, mesh, NULL, 0, 0, ANY, "")                                                            \
+    F(X, VECTOR, PLAIN, surface_velocity, SADMM_NUMBERS(0, 0, 0), -1e6, 1e6, CLOSED,                       \
+      "How its surface moves while it stays, as a belt's, in its own frame, m/s.")
 
 /* m and N; of rotations rad and N m. */
 #define SADMM_COORDINATE_FIELDS(F, X)                                                                \

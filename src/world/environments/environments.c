@@ -125,6 +125,10 @@ sadmm_status sadmm_world_replicate(sadmm_world *world, int32_t count, sadmm_envi
     if (count < 1 || count > MOST_ENVIRONMENTS)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "count = %d: must be in [1, %d]", count,
                           (int)MOST_ENVIRONMENTS);
+    if (is_kept(world) && world->moving_surfaces > 0)
+        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
+                          "environments on CUDA: a world with surfaces that move (surface_velocity of %d shapes) is "
+                          "stepped by the host", world->moving_surfaces);
     unsigned char *bytes;
     size_t size;
     sadmm_status status = save_template(world, &bytes, &size);

@@ -14,6 +14,7 @@
 #include "shape.h"
 #include "world/resident/resident.h"
 #include "world/state/ids.h"
+#include "world/state/shape_form.h"
 #include "world/state/report.h"
 
 enum owner { OF_BODY, OF_SHAPE, OF_JOINT, OF_COUPLING, OF_WORLD };

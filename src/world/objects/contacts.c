@@ -1,12 +1,11 @@
 /* What a world gives out of its last step: contacts and the frozen problem. */
 #include <string.h>
 
-#include "collision/mesh/mesh.h"
-#include "contacts.h"
 #include "core/base/check.h"
 #include "core/base/memory.h"
 #include "core/model/system_math.h"
 #include "world/resident/resident.h"
+#include "world/state/contact_place.h"
 #include "world/state/ids.h"
 
 static int32_t readable_contacts(const sadmm_world *world)
@@ -37,33 +36,6 @@ static size_t pair_of(const struct sadmm_contact_set *contacts, int32_t point)
     return low;
 }
 
-/* As the caller numbers them. shape: b of the pair. */
-static int32_t triangle_of(const sadmm_world *world, int32_t shape, uint32_t subshape)
-{
-    if (world->geometries[world->shapes[shape].geometry].type != SADMM_SHAPE_MESH) return -1;
-    const int32_t *source = world->block_shapes[shape].mesh->source;
-    return source ? source[subshape] : (int32_t)subshape;
-}
-
-void sadmm_world_contact_position(const sadmm_world *world, const struct sadmm_contact_pair *pair,
-                                  const struct sadmm_contact_point *point, double position[3])
-{
-    const int32_t body = pair->body_b >= 0 ? pair->body_b : pair->body_a;
-    const double *arm = pair->body_b >= 0 ? point->arm_b : point->arm_a;
-    for (int k = 0; k < 3; ++k) position[k] = world->start.rigid[body].position[k] + arm[k];
-}
-
-double sadmm_world_contact_speed(const sadmm_world *world, const struct sadmm_contact_pair *pair,
-                                 const struct sadmm_contact_point *point)
-{
-    const struct sadmm_system system = {.kinematic = world->start.kinematic,
-                                        .kinematic_count = world->start.kinematic_count};
-    vec3 x = sadmm_kinematic_part(&system, pair, point);
-    if (pair->body_b >= 0) x = v3_add(x, sadmm_velocity_at(world->start.rigid[pair->body_b].velocity, point->arm_b));
-    if (pair->body_a >= 0) x = v3_sub(x, sadmm_velocity_at(world->start.rigid[pair->body_a].velocity, point->arm_a));
-    return -v3_dot(x, v3_load(pair->normal));
-}
-
 static void read_common(const sadmm_world *world, int32_t shape_a, int32_t shape_b, const double normal[3],
                         const double impulse[3], double dt, sadmm_contact *out)
 {
@@ -85,7 +57,7 @@ static void read_hit(const sadmm_world *world, const struct sadmm_world_hit *hit
     out->separation = 0;
     out->friction = hit->friction;
     out->feature = hit->feature;
-    out->triangle = triangle_of(world, hit->shape_b, hit->subshape);
+    out->triangle = sadmm_world_contact_triangle(world, hit->shape_b, hit->subshape);
 }
 
 static void read_contact(const sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t index,
@@ -97,7 +69,7 @@ static void read_contact(const sadmm_world *world, const struct sadmm_contact_pa
     out->separation = point->separation;
     out->friction = pair->friction;
     out->feature = point->feature;
-    out->triangle = triangle_of(world, pair->shape_b, pair->subshape);
+    out->triangle = sadmm_world_contact_triangle(world, pair->shape_b, pair->subshape);
 }
 
 static sadmm_status check_range(sadmm_world *world, int32_t first, int32_t count)

@@ -3,12 +3,12 @@
 
 #include <string.h>
 
-#include "contacts.h"
 #include "core/base/check.h"
 #include "core/base/memory.h"
 #include "events.h"
 #include "sensor.h"
 #include "world/resident/resident.h"
+#include "world/state/contact_place.h"
 #include "world/state/ids.h"
 
 enum { MOST_EVENTS = 1 << 24 };

@@ -40,6 +40,12 @@ static void explain_kinematic(struct text *t, int32_t count)
     if (count > 0) line(t, "kinematic    %d bodies\n", count);
 }
 
+static void explain_decisions(struct text *t, const sadmm_world *world)
+{
+    if (world->moving_surfaces > 0) line(t, "surfaces     %d move\n", world->moving_surfaces);
+    if (world->decider.call) line(t, "manifolds    go through a callback\n");
+}
+
 static void explain_options(struct text *t, const struct sadmm_plan *plan, const sadmm_settings *s)
 {
     line(t, plan->gyroscopic
@@ -91,6 +97,7 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
              settings.substeps, settings.dt, settings.iterations);
     explain_constraints(&t, plan, world->report.joints, world->report.couplings);
     explain_kinematic(&t, world->kinematic_count);
+    explain_decisions(&t, world);
     explain_options(&t, plan, &settings);
     line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, settings.iterations * settings.substeps,
          world->report.iterations == settings.substeps && !plan->points ? ": without constraints Step 1 is exact" : "");

@@ -15,6 +15,19 @@
 #include "world/state/ids.h"
 #include "world/state/shape_form.h"
 
+static bool is_zero(const double v[3]) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
+
+static sadmm_status check_surface(const char *name, const struct sadmm_world_body *body, const double velocity[3],
+                                  struct sadmm_error *error)
+{
+    TRY(sadmm_check_vector(name, velocity, 3, SADMM_SHAPE_FIELD(surface_velocity)->hi, error));
+    if (body->type == SADMM_BODY_DYNAMIC && !is_zero(velocity))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "%s = (%g, %g, %g): must be 0 on a dynamic body", name, velocity[0], velocity[1],
+                          velocity[2]);
+    return SADMM_OK;
+}
+
 static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_shape_def *def, double orientation[4],
                               struct sadmm_error *error)
 {
@@ -29,7 +42,8 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
                           "def->sensor = true: must be false where def->type is %d, a mesh, which has no inside",
                           (int)def->type);
     TRY(sadmm_field_check(SADMM_SHAPE_FIELD(friction), def, "def->", error));
-    return sadmm_field_check(SADMM_SHAPE_FIELD(restitution), def, "def->", error);
+    TRY(sadmm_field_check(SADMM_SHAPE_FIELD(restitution), def, "def->", error));
+    return check_surface("def->surface_velocity", body, def->surface_velocity, error);
 }
 
 static bool has_block(int type)
@@ -79,7 +93,7 @@ static bool reserve(sadmm_world *world, size_t slots)
 {
     const size_t used = world->shape_ids.slots;
     return SADMM_GROW(world->shapes, used, slots) && SADMM_GROW(world->geometries, used, slots) &&
-           SADMM_GROW(world->shape_links, used, slots);
+           SADMM_GROW(world->shape_links, used, slots) && SADMM_GROW(world->surfaces, 3 * used, 3 * slots);
 }
 
 sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body_slot, const sadmm_shape_def *def,
@@ -111,6 +125,8 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     shape->formed = ++world->shape_changes;
     world->sensor_count += def->sensor;
     world->bouncing_count += def->restitution > 0;
+    memcpy(world->surfaces + 3 * slot, def->surface_velocity, sizeof def->surface_velocity);
+    world->moving_surfaces += !is_zero(def->surface_velocity);
     sadmm_world_reshaped(world);
     sadmm_link_add(world, link_at, &body->first_shape, (uint32_t)slot + 1);
     return SADMM_OK;
@@ -155,6 +171,8 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
     sadmm_world_reshaped(world);
     world->sensor_count -= world->shapes[slot].sensor;
     world->bouncing_count -= world->shapes[slot].restitution > 0;
+    world->moving_surfaces -= !is_zero(world->surfaces + 3 * slot);
+    sadmm_decider_forget(&world->decider, (uint32_t)slot);
     sadmm_link_remove(world, link_at, &world->bodies[world->shapes[slot].body].first_shape, (uint32_t)slot + 1);
     sadmm_ids_release(&world->shape_ids, slot);
     sadmm_pair_table_forget(&world->friction_pairs, (uint32_t)slot);
@@ -184,6 +202,7 @@ sadmm_status sadmm_world_shape_def_sized(sadmm_world *world, sadmm_shape_id id, 
                            .category = shape->category,
                            .mask = shape->mask,
                            .sensor = shape->sensor};
+    memcpy(def.surface_velocity, world->surfaces + 3 * (id.slot - 1), sizeof def.surface_velocity);
     memcpy(def.size, geometry->size, sizeof def.size);
     memcpy(def.position, shape->position, sizeof def.position);
     memcpy(def.orientation, shape->orientation, sizeof def.orientation);
@@ -212,6 +231,22 @@ sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id i
     shape->friction = friction;
     shape->restitution = restitution;
     ++world->shape_changes;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_shape_surface_velocity(sadmm_world *world, sadmm_shape_id id, const double velocity[3])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
+    if (!shape) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(velocity, "velocity", error));
+    TRY(check_surface("velocity", &world->bodies[shape->body], velocity, error));
+    double *own = world->surfaces + 3 * (size_t)(id.slot - 1);
+    if (memcmp(own, velocity, 3 * sizeof *own) == 0) return SADMM_OK;
+    TRY(sadmm_world_detach(world));
+    world->moving_surfaces += !is_zero(velocity) - !is_zero(own);
+    memcpy(own, velocity, 3 * sizeof *own);
     return SADMM_OK;
 }
 
@@ -286,14 +321,6 @@ sadmm_status sadmm_world_set_shape_size(sadmm_world *world, sadmm_shape_id id, c
     memcpy(own, size, bytes);
     reform(world, slot, before);
     return SADMM_OK;
-}
-
-void sadmm_world_read_shape_frame(const sadmm_world *world, size_t slot, double frame[7])
-{
-    const struct sadmm_shape *shape = &world->shapes[slot];
-    const bool block = has_block(world->geometries[shape->geometry].type);
-    memcpy(frame, block ? world->block_shapes[slot].position : shape->position, 3 * sizeof *frame);
-    memcpy(frame + 3, block ? world->block_shapes[slot].orientation : shape->orientation, 4 * sizeof *frame);
 }
 
 /* One that is of unit length to rounding stays as it is, so that what was read can be set again. */

@@ -14,8 +14,7 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
 void sadmm_world_read_shape_size(const sadmm_world *world, size_t slot, double size[3]);
 sadmm_status sadmm_world_check_shape_size(const sadmm_world *world, size_t slot, const double size[3],
                                           struct sadmm_error *error);
-/* Position and orientation in the body's frame, as in the definition; may they be set? */
-void sadmm_world_read_shape_frame(const sadmm_world *world, size_t slot, double frame[7]);
+/* May position and orientation in the body's frame be set? */
 sadmm_status sadmm_world_check_shape_frame(const double position[3], const double orientation[4],
                                            struct sadmm_error *error);
 

@@ -20,6 +20,7 @@
 #include "resident_joints.h"
 #include "resident_kinematic.h"
 #include "world/state/report.h"
+#include "world/step/decide.h"
 #include "world/step/gather.h"
 #include "world/step/hits.h"
 #include "world/step/kinematic.h"
@@ -36,6 +37,7 @@ bool sadmm_world_may_reside(const sadmm_world *world)
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
     if (fast && !world->stepped) return false;
+    if (sadmm_world_decides(world)) return false; /* between finding and solving, by the host */
     return world->kernels->resident && s->residual_tolerance <= 0 && (s->tolerance <= 0 || (fast && few_checks));
 }
 

@@ -13,7 +13,7 @@
 #include "world/resident/resident.h"
 
 /* Raised with every change of what is written. */
-enum { FORMAT = 7 };
+enum { FORMAT = 8 };
 
 struct header {
     char magic[8];
@@ -155,6 +155,7 @@ static void exchange(sadmm_world *world, sadmm_world *fresh)
     fresh->def.tasks = world->def.tasks;
     fresh->team = world->team;
     sadmm_world_hand_events_on(world, fresh);
+    sadmm_decider_hand_on(&world->decider, &fresh->decider);
     if (fresh->kernels && fresh->kernels == world->kernels && fresh->def.device == world->def.device) {
         fresh->context = world->context;
         world->context = NULL;

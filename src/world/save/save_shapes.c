@@ -106,6 +106,7 @@ static struct kept_shape keep_shape(const sadmm_world *world, size_t slot, const
                               .revision = shape->revision,
                               .body = shape->body};
     const bool owned = has_owner(world, slot);
+    memcpy(kept.def.surface_velocity, world->surfaces + 3 * slot, sizeof kept.def.surface_velocity);
     memcpy(kept.def.size, geometry->size, sizeof kept.def.size);
     memcpy(kept.position, shape->position, sizeof kept.position);
     memcpy(kept.orientation, shape->orientation, sizeof kept.orientation);
@@ -174,7 +175,8 @@ void sadmm_archive_shapes(struct sadmm_archive *archive, sadmm_world *world)
     if (sadmm_archive_ids(archive, &world->shape_ids, &world->shapes, sizeof *world->shapes) &&
         (!archive->reading ||
          (sadmm_archive_room(archive, &world->geometries, ids->slots, sizeof *world->geometries) &&
-          sadmm_archive_room(archive, &world->shape_links, ids->slots, sizeof *world->shape_links))))
+          sadmm_archive_room(archive, &world->shape_links, ids->slots, sizeof *world->shape_links) &&
+          sadmm_archive_room(archive, &world->surfaces, 3 * ids->slots, sizeof *world->surfaces))))
         for (SADMM_OBJECTS(slot, ids))
             if (archive->status == SADMM_OK) archive_shape(archive, world, slot, &owners);
     SADMM_ARCHIVE(archive, world->shape_revisions);

@@ -61,3 +61,12 @@ void sadmm_shape_form_place(const sadmm_shape_def *def, const double orientation
     v3_store(v3_add(v3_load(def->position), m3_mul(q_matrix(turn), v3_load(middle))), position_of_geometry);
     q_store(q_normalize(q_mul(turn, q_load(axes))), orientation_of_geometry);
 }
+
+void sadmm_world_read_shape_frame(const sadmm_world *world, size_t slot, double frame[7])
+{
+    const struct sadmm_shape *shape = &world->shapes[slot];
+    const int32_t type = world->geometries[shape->geometry].type;
+    const bool block = type == SADMM_SHAPE_HULL || type == SADMM_SHAPE_MESH;
+    memcpy(frame, block ? world->block_shapes[slot].position : shape->position, 3 * sizeof *frame);
+    memcpy(frame + 3, block ? world->block_shapes[slot].orientation : shape->orientation, 4 * sizeof *frame);
+}

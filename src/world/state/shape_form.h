@@ -6,6 +6,7 @@
 #include "core/base/error.h"
 #include "core/base/growing.h"
 #include "subadmm/types.h"
+#include "world_state.h"
 
 extern const struct sadmm_growing sadmm_growing_shape;
 
@@ -16,5 +17,8 @@ sadmm_status sadmm_shape_form_check(const sadmm_shape_def *def, double orientati
 struct sadmm_geometry sadmm_shape_form_geometry(const sadmm_shape_def *def);
 void sadmm_shape_form_place(const sadmm_shape_def *def, const double orientation[4], double position_of_geometry[3],
                             double orientation_of_geometry[4]);
+
+/* Of a shape of a world: position and orientation in the body's frame, as in the definition. */
+void sadmm_world_read_shape_frame(const sadmm_world *world, size_t slot, double frame[7]);
 
 #endif

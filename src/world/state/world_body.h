@@ -40,6 +40,7 @@ struct sadmm_world_block_shape {
 /* A kinematic body in a step. */
 struct sadmm_world_kinematic {
     int32_t slot;
+    int32_t bearer;                 /* whose wrench has what it feels: its own number, or -1: that of no one */
     struct sadmm_rigid rigid, next; /* as the (sub-)step begins and ends */
     double wrench[6];               /* of contacts, of the sub-steps made so far */
 };

@@ -14,6 +14,7 @@
 #include "core/solve/push.h"
 #include "core/solve/schedule.h"
 #include "id_pool.h"
+#include "decider.h"
 #include "pair_table.h"
 #include "shape_data.h"
 #include "step_start.h"
@@ -50,6 +51,9 @@ struct sadmm_world {
     struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */
     int32_t sensor_count;              /* shapes that are sensors */
     int32_t bouncing_count;            /* shapes with restitution */
+    double *surfaces;                  /* (x 3) by slot: how a shape's surface moves, in its frame, m/s; */
+    int32_t moving_surfaces;           /* shapes where that is not 0 */
+    struct sadmm_decider decider;      /* what the caller decides of contacts */
     struct sadmm_link *shape_links; /* by slot: the shapes of a body */
     uint32_t shape_revisions, shape_changes; /* counts: new shapes; these, and new sizes, places and materials */
     struct sadmm_shape_data shape_data;
@@ -101,7 +105,7 @@ struct sadmm_world {
     struct sadmm_rigid *next;                      /* dynamic bodies after the step */
     double *velocity, *wrench;                     /* dynamic bodies x 6 */
     struct sadmm_extrapolation *extrapolation;     /* dynamic bodies, after the sub-steps made so far */
-    struct sadmm_world_kinematic *kinematic;       /* in slot order */
+    struct sadmm_world_kinematic *kinematic;       /* in slot order; then surfaces that move (step/decide.c) */
     double *support_motion;                        /* dynamic bodies x 6: of their support */
     int32_t *supports, *support_labels;            /* islands, and at their labels what supports them */
     double *wrench_sum;                            /* dynamic bodies x 6, of these; both only where there are several */

@@ -24,6 +24,7 @@
 #include "collision/flight/swept_body.h"
 #include "core/base/definition_fields.h"
 #include "core/base/memory.h"
+#include "decide.h"
 #include "gather.h"
 #include "hits.h"
 
@@ -53,6 +54,7 @@ struct taking {
     struct sadmm_hits *hits;
     struct sadmm_collision_input input;
     sadmm_settings settings;
+    sadmm_status refused; /* what went wrong, where that is not the want of memory; SADMM_OK: nothing */
 };
 
 /* ---- the queue --------------------------------------------------------------------------------------------------- */
@@ -224,6 +226,12 @@ static bool take_hit(struct taking *t, struct foreseen item, bool last)
     sadmm_collision_pair_law(t->world->collision, &t->input, item.key, &hit.friction, &hit.restitution);
     swept_bodies_hit(of, &item.touch, t->settings.restitution_threshold, pose, &hit);
     if (last) swept_bodies_hit_centre(of, pose, &item.touch, &hit);
+    if (sadmm_world_decides(t->world)) {
+        struct sadmm_hit_decision decision = {item.key, item.subshape, (const double (*)[3])item.touch.point, true};
+        t->refused = sadmm_world_decide_hit(t->world, &decision, &hit);
+        if (t->refused != SADMM_OK) return false;
+        if (!decision.enabled) return true;
+    }
     hit_solve(&hit);
     if (!record(t, &item, &hit)) return false;
     swept_bodies_part(f, &t->settings, item.touch.time, pose, &hit);
@@ -398,7 +406,7 @@ static sadmm_status take_most(struct taking *t)
         if (times == 0) mark_bodies(t);
         if (!take_all(t)) {
             sadmm_collision_drop_candidates(world->collision);
-            return sadmm_fail_memory(&world->error, "hits");
+            return t->refused != SADMM_OK ? t->refused : sadmm_fail_memory(&world->error, "hits");
         }
         if (!leave_out(t)) {
             write_back(t);

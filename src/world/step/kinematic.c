@@ -51,6 +51,7 @@ sadmm_status sadmm_world_gather_kinematic(sadmm_world *world)
         double *velocity = start->kinematic + 6 * k;
         body->system_body = world->collision_bodies[slot].system_body = sadmm_kinematic((int32_t)k);
         kinematic->slot = slot;
+        kinematic->bearer = (int32_t)k;
         kinematic->rigid = kinematic->next = body->rigid;
         memset(kinematic->wrench, 0, sizeof kinematic->wrench);
         if (body->target.set)
@@ -134,7 +135,7 @@ void sadmm_world_leave_support_frame(sadmm_world *world, const struct sadmm_syst
 
 sadmm_status sadmm_world_move_kinematic(sadmm_world *world, const sadmm_settings *settings)
 {
-    for (int32_t k = 0; k < world->start.kinematic_count; ++k) {
+    for (int32_t k = 0; k < world->kinematic_count; ++k) {
         struct sadmm_world_kinematic *kinematic = &world->kinematic[k];
         if (!kinematic_move(&kinematic->rigid, settings->dt, &kinematic->next))
             return sadmm_world_slot_not_finite(world, kinematic->slot);
@@ -144,7 +145,7 @@ sadmm_status sadmm_world_move_kinematic(sadmm_world *world, const sadmm_settings
 
 void sadmm_world_turn_kinematic(sadmm_world *world)
 {
-    for (int32_t k = 0; k < world->start.kinematic_count; ++k) {
+    for (int32_t k = 0; k < world->kinematic_count; ++k) {
         struct sadmm_world_kinematic *kinematic = &world->kinematic[k];
         struct sadmm_collision_body *out = &world->collision_bodies[kinematic->slot];
         kinematic->rigid = kinematic->next;
@@ -155,14 +156,15 @@ void sadmm_world_turn_kinematic(sadmm_world *world)
 
 void sadmm_world_add_kinematic_wrenches(sadmm_world *world, const sadmm_settings *settings)
 {
-    if (world->start.kinematic_count == 0) return;
+    if (world->kinematic_count == 0) return;
     const double share = 1 / (settings->dt * settings->substeps); /* of their mean over the sub-steps */
     for (size_t p = 0; p < world->contacts.pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
         const bool on_b = sadmm_body_is_kinematic(pair->body_b);
         if (!on_b && !sadmm_body_is_kinematic(pair->body_a)) continue;
-        struct sadmm_world_kinematic *kinematic =
-            &world->kinematic[sadmm_kinematic(on_b ? pair->body_b : pair->body_a)];
+        const int32_t bearer = world->kinematic[sadmm_kinematic(on_b ? pair->body_b : pair->body_a)].bearer;
+        if (bearer < 0) continue;
+        struct sadmm_world_kinematic *kinematic = &world->kinematic[bearer];
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             const struct sadmm_contact_point *point = &world->contacts.points[k];
             for (int j = 0; j < 6; ++j)
@@ -174,7 +176,7 @@ void sadmm_world_add_kinematic_wrenches(sadmm_world *world, const sadmm_settings
 
 void sadmm_world_commit_kinematic(sadmm_world *world)
 {
-    for (int32_t k = 0; k < world->start.kinematic_count; ++k) {
+    for (int32_t k = 0; k < world->kinematic_count; ++k) {
         const struct sadmm_world_kinematic *kinematic = &world->kinematic[k];
         struct sadmm_world_body *body = &world->bodies[kinematic->slot];
         body->rigid = kinematic->next;
