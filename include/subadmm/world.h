@@ -168,8 +168,8 @@ static inline sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape
 SADMM_API sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id id, double friction,
                                                       double restitution);
 /* Replace the surface velocity of a shape (m/s, in its frame; meaning and range as in the definition) from the next
- * step on. Steps of a world with such a shape are made by the host, on CUDA too (docs/guide/contacts.md). Errors: STALE_ID,
- * INVALID_ARGUMENT (range; other than 0 on a dynamic body; nothing changes), DEVICE. */
+ * step on. Steps of a world with such a shape are made by the host, on CUDA too (docs/guide/contacts.md). Errors:
+ * STALE_ID, INVALID_ARGUMENT (range; other than 0 on a dynamic body; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_shape_surface_velocity(sadmm_world *world, sadmm_shape_id id,
                                                               const double velocity[3]);
 /* Replace the sizes of a shape (m, meaning and range as in the definition; those that its type does not use must be 0)
