@@ -17,7 +17,8 @@ Installs what is missing (Debian and Ubuntu, as root or by sudo without a passwo
     python   the Python package: pip install into an environment of its own, and its tests
     docs     the documents as web pages, with the reference made from headers and docstrings: warnings are errors; left out
              where Doxygen or Sphinx cannot be installed
-    asan     address and undefined-behaviour sanitizers, the whole suite, also on the emulated CUDA device (single precision)
+    asan     address and undefined-behaviour sanitizers, the whole suite; on the emulated CUDA device (single precision) only
+             with --slow
     tsan     thread sanitizer, the tests of suite 'threads'
     clang    by clang with LLVM's OpenMP, test_threads only
     minimal  by clang, no optional feature, no instruction set beyond the compiler's default, the whole suite without the
@@ -140,8 +141,11 @@ step_docs() {
 
 step_asan() {
     say "asan: address and undefined-behaviour sanitizers"
-    # Only what the tests need is built: slow tests take a tenth of it.
-    configure "$project/build-asan" --native-file "$project/presets/asan.ini" "${features[@]}" -Dcpu_isas=avx2 || return 1
+    # Only what the tests need is built. The emulated device takes half of this step.
+    local emulated=disabled
+    $slow && emulated=enabled
+    configure "$project/build-asan" --native-file "$project/presets/asan.ini" "${features[@]}" -Dcpu_isas=avx2 \
+        -Demulated_cuda=$emulated || return 1
     local launcher=("${unrandomised[@]}") rebuild=()
     run_tests asan --no-suite slow
 }

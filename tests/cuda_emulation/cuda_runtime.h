@@ -64,7 +64,7 @@ struct fiber {
     flow own;
     unsigned block, thread;
     waiting at;
-    bool done;
+    bool begun, done;
     unsigned long long shuffled[2]; /* in turn: a lane may write the next value before all have read the last */
     unsigned shuffles;
 };
@@ -73,6 +73,7 @@ struct launch_state {
     std::vector<fiber> fibers;
     std::vector<std::unique_ptr<unsigned char, void (*)(void *)>> shared; /* by block */
     unsigned threads, first_block;
+    size_t next, left, stacks; /* the next one, in order, that has not begun; that are not done; stacks in use */
     flow scheduler;
     fiber *current;
     const std::function<void()> *body;
@@ -88,12 +89,44 @@ inline void give_way(waiting at)
     flow_switch(&self->own, &running->scheduler);
 }
 
+inline fiber *fiber_at(launch_state *l, size_t k)
+{
+    return &l->fibers[cuda_emulation_descending ? l->fibers.size() - 1 - k : k];
+}
+
+/* It is that one's turn. */
+inline void turn_to(launch_state *l, fiber *f)
+{
+    l->current = f;
+    threadIdx.x = f->thread;
+    blockIdx.x = f->block;
+}
+
+/* The turn of the next one that has not begun; false: all have. */
+inline bool begin_next(launch_state *l)
+{
+    if (l->next == l->fibers.size()) return false;
+    fiber *f = fiber_at(l, l->next++);
+    f->begun = true;
+    turn_to(l, f);
+    return true;
+}
+
+/* A thread that comes to its end without a barrier leaves its stack to the next one, whose turn it is: most threads of
+ * most launches do, and need no change of stacks. */
 inline void fiber_main(void)
 {
-    flow_begin(&running->scheduler);
-    (*running->body)();
-    running->current->done = true;
-    flow_switch(&running->current->own, &running->scheduler, true);
+    launch_state *l = running;
+    flow_begin(&l->scheduler);
+    for (fiber *last;;) {
+        (*l->body)();
+        last = l->current;
+        last->done = true;
+        --l->left;
+        if (!begin_next(l)) break;
+        flow_hand_over(&last->own, &l->current->own);
+    }
+    flow_switch(&l->current->own, &l->scheduler, true);
 }
 
 /* Memory begins where a device's does: structures ask for up to 32 bytes. */
@@ -125,31 +158,30 @@ inline bool run_blocks(const std::function<void()> &body, unsigned first, unsign
     l.body = &body;
     running = &l;
     for (unsigned i = 0; i < blocks; ++i) l.shared.emplace_back(poisoned(shared), free);
-    while (stacks.size() < l.fibers.size()) stacks.emplace_back(new char[STACK]);
     for (size_t i = 0; i < l.fibers.size(); ++i) {
-        fiber &f = l.fibers[i];
-        f.block = first + (unsigned)(i / threads);
-        f.thread = (unsigned)(i % threads);
-        flow_prepare(&f.own, stacks[i].get(), STACK, fiber_main);
+        l.fibers[i].block = first + (unsigned)(i / threads);
+        l.fibers[i].thread = (unsigned)(i % threads);
     }
-    size_t left = l.fibers.size();
-    while (left > 0) {
+    l.next = l.stacks = 0;
+    l.left = l.fibers.size();
+    while (l.left > 0) {
         bool moved = false;
         for (size_t k = 0; k < l.fibers.size(); ++k) {
-            fiber &f = l.fibers[cuda_emulation_descending ? l.fibers.size() - 1 - k : k];
-            if (f.done || f.at != NOT) continue;
-            l.current = &f;
-            threadIdx.x = f.thread;
-            blockIdx.x = f.block;
-            flow_switch(&l.scheduler, &f.own);
+            fiber *f = fiber_at(&l, k);
+            if (f->done || f->at != NOT) continue;
+            if (!f->begun) {
+                if (l.stacks == stacks.size()) stacks.emplace_back(new char[STACK]);
+                flow_prepare(&f->own, stacks[l.stacks++].get(), STACK, fiber_main);
+                begin_next(&l); /* it is this one: those before it have begun */
+            } else turn_to(&l, f);
+            flow_switch(&l.scheduler, &f->own);
             moved = true;
-            if (f.done) --left;
         }
         for (size_t i = 0; i < l.fibers.size(); i += WARP_SIZE) release(&l, i, i + WARP_SIZE, AT_WARP);
         for (size_t i = 0; i < l.fibers.size(); i += threads) release(&l, i, i + threads, AT_BLOCK);
         release(&l, 0, l.fibers.size(), AT_ALL);
         if (moved) continue;
-        for (size_t i = 0; i < l.fibers.size(); ++i) flow_abandon(stacks[i].get(), STACK);
+        for (size_t i = 0; i < l.stacks; ++i) flow_abandon(stacks[i].get(), STACK);
         return false;
     }
     return true;

@@ -85,6 +85,18 @@ inline void flow_prepare(flow *f, char *stack, size_t bytes, void (*entry)(void)
 #endif
 }
 
+/* What ran on this stack has come to its end, and another one goes on there. */
+inline void flow_hand_over(const flow *last, flow *next)
+{
+#if defined FIBER_WATCHED && !defined FIBER_PORTABLE
+    next->bottom = last->bottom;
+    next->bytes = last->bytes;
+#else
+    (void)last;
+    (void)next;
+#endif
+}
+
 /* A stack whose fiber will not come to its end. */
 inline void flow_abandon(char *stack, size_t bytes)
 {
