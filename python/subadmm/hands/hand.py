@@ -69,7 +69,8 @@ class Hand:
         try:
             for k, part in enumerate(PARTS):
                 pose = {"position": places[k].tolist(), "orientation": turns[k].tolist()}
-                body = world.add_solid(tip if k else palm, mass=_TIP_MASS if k else _PALM_MASS, name=f"{side} {part}", **pose)
+                body = world.add_solid(tip if k else palm, mass=_TIP_MASS if k else _PALM_MASS, name=f"{side} {part}",
+                                       gravity_scale=0, **pose)     # the user bears the hand's own weight
                 self.bodies.append(body)
                 for other in self.bodies[:-1]:
                     body.ignore(other)
@@ -113,6 +114,11 @@ class Hand:
             body.linear_velocity = body.angular_velocity = (0.0, 0.0, 0.0)
             coupling.set_target(place, turn)
 
+    def is_far(self, joints: Any, distance: float) -> bool:
+        """Is the palm farther (m) than that from where these joints have it? Raises as go()."""
+        places, _ = parts_of(joints, self.side)
+        return bool(np.linalg.norm(places[0] - self.bodies[0].position) > distance)
+
     def before_step(self) -> None:
         """Bring the targets on by a step of the world. Call it before every step."""
         self._set(*self._follower.step(self.world.settings.dt))
@@ -150,6 +156,6 @@ class Hand:
 
     @property
     def reactions(self) -> np.ndarray:
-        """6 x 3, N, world: of the couplings on the user, their parts' weight and inertia included; the mean over the
-        last step."""
+        """6 x 3, N, world: of the couplings on the user, which have the parts' inertia in them; the mean over the last
+        step. The parts have no weight: that of the hand is the user's own."""
         return np.array([coupling.reaction_force for coupling in self.couplings])
