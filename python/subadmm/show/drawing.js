@@ -142,17 +142,19 @@ function program(gl, vertex, fragment) {
 // ---- drawing ------------------------------------------------------------------------------------------------------
 
 // texels: 8 numbers a body, x y z 0 and w x y z, to be set before something is drawn. draw(camera, arrows): on the
-// canvas, by a camera of orbit(). For other views: prepare(eye), then view(...) for each.
+// canvas, by a camera of orbit(). For other views: prepare(eye), then view(...) for each. free(): another
+// renderer takes its place.
 function renderer(canvas, head, buffer) {
   const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
   if (!gl) throw new Error("this browser has no WebGL 2");
+  const owned = [], made = (kind) => { owned.push([kind, gl["create" + kind]()]); return owned[owned.length - 1][1]; };
   const main = program(gl, vertexText, fragmentText), dark = program(gl, vertexText, emptyText);
 
   const groups = head.groups.map((group) => {
-    const array = gl.createVertexArray();
+    const array = made("VertexArray");
     gl.bindVertexArray(array);
     const put = (location, values, size, type, normal, divisor) => {
-      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+      gl.bindBuffer(gl.ARRAY_BUFFER, made("Buffer"));
       gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
       gl.enableVertexAttribArray(location);
       gl.vertexAttribPointer(location, size, type, normal, 0, 0);
@@ -170,8 +172,8 @@ function renderer(canvas, head, buffer) {
     return { array, corners: corners.length / 3, instances: group.body[2], ground: group.ground };
   });
 
-  const arrow = program(gl, arrowText, arrowColourText), arrowArray = gl.createVertexArray(),
-    arrowData = gl.createBuffer();
+  const arrow = program(gl, arrowText, arrowColourText), arrowArray = made("VertexArray"),
+    arrowData = made("Buffer");
   const arrowCorners = [];
   for (let k = 0; k < 8; ++k) {
     const [a, b] = [k, k + 1].map((i) => [Math.cos(i * Math.PI / 4), Math.sin(i * Math.PI / 4)]);
@@ -179,7 +181,7 @@ function renderer(canvas, head, buffer) {
     arrowCorners.push(...a, 2.5, 1, ...b, 2.5, 1, ...a, 0, 2);
   }
   gl.bindVertexArray(arrowArray);
-  gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+  gl.bindBuffer(gl.ARRAY_BUFFER, made("Buffer"));
   gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(arrowCorners), gl.STATIC_DRAW);
   gl.enableVertexAttribArray(0);
   gl.vertexAttribPointer(0, 4, gl.FLOAT, false, 0, 0);
@@ -191,19 +193,19 @@ function renderer(canvas, head, buffer) {
   }
 
   const rows = Math.max(Math.ceil(2 * head.bodies / 1024), 1), texels = new Float32Array(rows * 1024 * 4);
-  const poses = gl.createTexture();
+  const poses = made("Texture");
   gl.bindTexture(gl.TEXTURE_2D, poses);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, 1024, rows, 0, gl.RGBA, gl.FLOAT, null);
   for (const which of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, which,
     gl.NEAREST);
 
-  const shadow = gl.createTexture();
+  const shadow = made("Texture");
   gl.bindTexture(gl.TEXTURE_2D, shadow);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.DEPTH_COMPONENT24, 2048, 2048, 0, gl.DEPTH_COMPONENT, gl.UNSIGNED_INT, null);
   for (const which of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, which, gl.LINEAR);
   for (const which of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, which, gl.CLAMP_TO_EDGE);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_COMPARE_MODE, gl.COMPARE_REF_TO_TEXTURE);
-  const frame = gl.createFramebuffer();
+  const frame = made("Framebuffer");
   gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
   gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, shadow, 0);
 
@@ -284,6 +286,10 @@ function renderer(canvas, head, buffer) {
 
   return {
     gl, texels, prepare, begin, view,
+    free() {
+      for (const [kind, one] of owned) gl["delete" + kind](one);
+      for (const one of [main, dark, arrow]) gl.deleteProgram(one.made);
+    },
     draw(camera, arrows) {
       const ratio = Math.min(window.devicePixelRatio || 1, 2);
       const width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
