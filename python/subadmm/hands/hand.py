@@ -15,8 +15,10 @@ from .motion import Motion
 
 _PALM_HALF = (0.035, 0.035, 0.01)    # m
 _PALM_MASS, _TIP_MASS = 0.25, 0.02   # kg
-_PALM = {"linear_stiffness": 2000.0, "linear_damping": 45.0, "angular_stiffness": 10.0, "angular_damping": 0.1}
-_TIP = {"linear_stiffness": 800.0, "linear_damping": 8.0, "angular_stiffness": 0.05, "angular_damping": 5e-4}
+_PALM: dict[str, Any] = {
+    "linear_stiffness": 2000.0, "linear_damping": 45.0, "angular_stiffness": 10.0, "angular_damping": 0.1}
+_TIP: dict[str, Any] = {
+    "linear_stiffness": 800.0, "linear_damping": 8.0, "angular_stiffness": 0.05, "angular_damping": 5e-4}
 _PALM_TORQUE, _TIP_TORQUE = 3.0, 0.2  # N m, at most
 #: Radius of a fingertip and half length of its axis, m.
 TIP_RADIUS, TIP_HALF = 0.008, 0.005
@@ -127,9 +129,10 @@ class Hand:
         """In the place of before_step(): the targets of the next step are those of a Motion at `time`, s, with the
         velocities to where they are a step later. Raises ValueError (joints that parts_of() refuses)."""
         dt = self.world.settings.dt
-        now, then = (self._targets(parts_of(motion.at(t), self.side)) for t in (time, time + dt))
-        self._set(*now, velocity_between(*now, *then, dt))
-        self._follower.put(*then)
+        places, turns = self._targets(parts_of(motion.at(time), self.side))
+        then, turned = self._targets(parts_of(motion.at(time + dt), self.side))
+        self._set(places, turns, velocity_between(places, turns, then, turned, dt))
+        self._follower.put(then, turned)
 
     def _set(self, places, turns, velocities):
         for coupling, place, turn, velocity in zip(self.couplings, places.tolist(), turns.tolist(),

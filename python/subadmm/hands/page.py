@@ -94,7 +94,9 @@ class HandPage:
         free_port(host, whole("port", port, 0, 65535))     # before a world is built
         self.title = title or "subadmm"
         self._build, self._given, self._options = build, (stand, yaw, scale), options
-        self._said, self._speaker, self._hearing = None, None, threading.Lock()
+        self._said: Any = None
+        self._speaker: Client | None = None
+        self._hearing = threading.Lock()
         self._asked: list[str] = []
         self._wrong = ""         # why it has stopped
         self.session = Session(self._with_hands)
