@@ -206,6 +206,30 @@ def test_a_recorded_hand_lifts_a_cube_by_friction(lifting, side, mass, tmp_path,
     assert "the cube weighs" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+def test_a_world_that_is_restored_makes_the_same_steps_with_its_hand(lifting, precision):
+    motion = lifting.record()
+    world = subadmm.World(backend="cpu", precision=precision, settings=subadmm.Settings(dt=0.004, threads=1))
+    world.add_ground(friction=0.8)
+    world.add_solid(subadmm.box(*[lifting.HALF] * 3, friction=1), mass=0.3, position=(0, 0, lifting.HALF), name="cube")
+    hand = hands.Hand(world, "right", motion.at(0))
+
+    def run(first, last):
+        for k in range(first, last):
+            hand.follow(motion, k * 0.004)
+            world.step()
+            hand.after_step()
+        return world.positions, hand.forces
+
+    run(0, 350)
+    saved = world.save()
+    positions, forces = run(350, 500)
+    assert world["cube"].position[2] > lifting.HALF + 0.1
+    world.restore(saved)
+    again, felt = run(350, 500)
+    assert (again == positions).all() and (felt == forces).all()
+
+
 def test_what_friction_cannot_hold_stays_on_the_ground(lifting):
     """The thumb presses with 7.7 N: friction holds 15.3 N at most."""
     cube, forces = lifting.lift(lifting.record(), mass=3)
