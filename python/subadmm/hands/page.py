@@ -56,7 +56,7 @@ class Place:
 
 def usual_stand(description):
     """Where a user stands who has what moves in front of the chest: on the floor of the world, or lower."""
-    away = float(np.clip(0.8 * description.radius, 0.45, 3.0))
+    away = float(np.clip(description.radius + 0.2, 0.45, 3.0))
     centre = description.centre
     return np.array([centre[0] - away, centre[1], min(description.floor, centre[2] - 1.0)])
 
