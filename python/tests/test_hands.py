@@ -87,7 +87,7 @@ def test_joints_that_are_none_are_refused_and_change_nothing(change, error, said
 def test_other_arguments_are_refused():
     world, joints = world_of(), hands.grasping("right", (0, 0, 0.3))
     for wrong, said in (({"side": "up"}, "side: 'up'"), ({"friction": -1}, "friction: -1"),
-                        ({"tip_force": 0}, "tip_force: 0"), ({"palm_force": float("nan")}, "palm_force: nan")):
+                        ({"tip_force": 0}, "tip_force: 0"), ({"size": 0}, "size: 0"), ({"palm_force": float("nan")}, "palm_force: nan")):
         with pytest.raises(ValueError, match=said):
             hands.Hand(world, **{"side": "right", "joints": joints, **wrong})
     with pytest.raises(TypeError, match="world"):
@@ -157,6 +157,26 @@ def test_a_tip_presses_with_its_bounded_force_and_touches_are_told():
         assert [touch.begun for touch in of] == [True, False] and of[0].side == "right"
         assert of[0].force[0] < -0.05 and (of[1].force == 0).all()
     assert not any(touch.part == "thumb" for touch in touches)
+
+
+def test_a_hand_of_another_size_moves_alike():
+    """All lengths, its way too, are eight times as large, and forces 4096 times."""
+    seen = []
+    for size in (1, 8):
+        world = world_of(gravity=(0, 0, 0))
+        world.add_solid(subadmm.box(0.02 * size, 0.5 * size, 0.5 * size), mass=1, type="static",
+                        position=(0.1 * size, 0, 0.3 * size))
+        hand = hands.Hand(world, "left", size * hands.grasping("left", (0, 0, 0.3), opening=0.05), size=size)
+        touches = []
+        for k in range(150):
+            hand.go(size * hands.grasping("left", (0.1 * min(k / 100, 1), 0, 0.3), opening=0.05))
+            hand.before_step()
+            world.step()
+            touches += [(k, touch.part, touch.begun) for touch in hand.after_step()]
+        seen.append((world.positions / size, hand.forces / size ** 4, touches))
+    # 1e-4 m, N: of the position correction's speed and slop, which are lengths that do not grow.
+    assert np.allclose(seen[0][0], seen[1][0], atol=1e-4) and np.allclose(seen[0][1], seen[1][1], atol=0.1)
+    assert np.abs(seen[0][1][2:, 0]).min() > 5 and seen[0][2] == seen[1][2]
 
 
 def test_a_hand_is_placed_at_once():

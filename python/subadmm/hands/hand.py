@@ -41,9 +41,11 @@ class Hand:
     """A palm and five fingertips of a hand in a world, each a small body on a coupling.
 
     world: subadmm.World; side: 'left' or 'right'; joints: where it begins, 21 or 25 joints (parts_of), m, world. They
-    are free of each other and meet all other shapes. friction: of their shapes, >= 0; palm_force, tip_force: the
-    largest force of a coupling along each of its target's axes, N, in (0, 1e6]; on_touch: called by after_step() with
-    each Touch. Not thread-safe, as its world.
+    are free of each other and meet all other shapes. friction: of their shapes, in [0, 1e6]; size: of the hand, in
+    [0.01, 100], 1: a usual one; lengths of the bodies grow with it, masses with its third power, forces with its fourth,
+    so that it moves alike; palm_force, tip_force: the largest force of a coupling along each of its target's axes, N, in
+    (0, 1e9], default 60 and 15 times size^4; on_touch: called by after_step() with each Touch. Not thread-safe, as its
+    world.
 
     go() leads it, as a tracked hand does, and follow() as a Motion has it. Each step has before_step() or follow()
     before it, and after_step() after it where forces are wanted:
@@ -54,31 +56,36 @@ class Hand:
         touches = hand.after_step()
     """
 
-    def __init__(self, world: Any, side: str, joints: Any, *, friction: float = 1.0, palm_force: float = 60.0,
-                 tip_force: float = 15.0, on_touch: Callable[[Touch], Any] | None = None):
+    def __init__(self, world: Any, side: str, joints: Any, *, friction: float = 1.0, size: float = 1.0,
+                 palm_force: float | None = None, tip_force: float | None = None,
+                 on_touch: Callable[[Touch], Any] | None = None):
         if not isinstance(world, World):
             raise TypeError(f"world: {world!r}; must be a subadmm.World")
         self.world, self.side, self.on_touch = world, check_side(side), on_touch
+        friction, size = real("friction", friction, 0, 1e6), real("size", size, 0.01, 100)
+        self.size, self._strong = size, size ** 4
+        heavy, strong = size ** 3, size ** 4
         places, turns = self._targets(parts_of(joints, side))
-        friction = real("friction", friction, 0, 1e6)
-        most = [real("palm_force", palm_force, 0, 1e6, above=True)] + \
-            [real("tip_force", tip_force, 0, 1e6, above=True)] * len(FINGERS)
-        palm = box(*_PALM_HALF, friction=friction)
+        most = [real("palm_force", 60.0 * strong if palm_force is None else palm_force, 0, 1e9, above=True)] + \
+            [real("tip_force", 15.0 * strong if tip_force is None else tip_force, 0, 1e9, above=True)] * len(FINGERS)
+        palm = box(*(size * half for half in _PALM_HALF), friction=friction)
         along_x = (0.5 ** 0.5, 0, 0.5 ** 0.5, 0)
-        tip = capsule(TIP_RADIUS, TIP_HALF, friction=friction, orientation=along_x)
+        tip = capsule(size * TIP_RADIUS, size * TIP_HALF, friction=friction, orientation=along_x)
         #: The bodies and their couplings, in the order of PARTS.
         self.bodies, self.couplings = [], []
         try:
             for k, part in enumerate(PARTS):
                 pose = {"position": places[k].tolist(), "orientation": turns[k].tolist()}
-                body = world.add_solid(tip if k else palm, mass=_TIP_MASS if k else _PALM_MASS, name=f"{side} {part}",
+                body = world.add_solid(tip if k else palm, mass=(_TIP_MASS if k else _PALM_MASS) * heavy, name=f"{side} {part}",
                                        gravity_scale=0, **pose)     # the user bears the hand's own weight
                 self.bodies.append(body)
                 for other in self.bodies[:-1]:
                     body.ignore(other)
                 self.couplings.append(world.add_coupling(
                     body, target_position=pose["position"], target_orientation=pose["orientation"],
-                    max_force=most[k], max_torque=_TIP_TORQUE if k else _PALM_TORQUE, **(_TIP if k else _PALM)))
+                    max_force=most[k], max_torque=(_TIP_TORQUE if k else _PALM_TORQUE) * size * strong,
+                    **{name: value * heavy * (size ** 2 if name.startswith("angular") else 1)
+                       for name, value in (_TIP if k else _PALM).items()}))
         except Exception:
             self.remove()
             raise
@@ -87,11 +94,10 @@ class Hand:
         #: 6 x 3, N, world: what the contacts of the last step did to each part, in the order of PARTS. Of after_step().
         self.forces = np.zeros((len(PARTS), 3))
 
-    @staticmethod
-    def _targets(parts):
+    def _targets(self, parts):
         """(positions, orientations) of the bodies' middles."""
         places, turns = parts
-        back = np.array([[0.0, 0, 0]] + [[-_BACK, 0, 0]] * len(FINGERS))
+        back = self.size * np.array([[0.0, 0, 0]] + [[-_BACK, 0, 0]] * len(FINGERS))
         return places + rotate(turns, back), turns
 
     def remove(self) -> None:
@@ -143,15 +149,15 @@ class Hand:
 
     def after_step(self) -> list[Touch]:
         """Read `forces`. Gives what has begun or ended to be touched in the last step, and tells on_touch. A touch
-        begins at 0.05 N and ends below 0.02 N. Raises subadmm.Unavailable where settings.recover_wrenches is false."""
+        begins at 0.05 N and ends below 0.02 N, times size^4. Raises subadmm.Unavailable where settings.recover_wrenches is false."""
         self.forces = np.array([body.contact_wrench[:3] for body in self.bodies])
         touches = []
-        for k, size in enumerate(np.linalg.norm(self.forces, axis=1)):
-            touching = bool(size > (_ENDS if self._touching[k] else _BEGINS))
+        for k, force in enumerate(np.linalg.norm(self.forces, axis=1)):
+            touching = bool(force > self._strong * (_ENDS if self._touching[k] else _BEGINS))
             if touching != self._touching[k]:
                 self._touching[k] = touching
-                force = self.forces[k].copy() if touching else np.zeros(3)
-                touches.append(Touch(self.side, PARTS[k], touching, force))
+                felt = self.forces[k].copy() if touching else np.zeros(3)
+                touches.append(Touch(self.side, PARTS[k], touching, felt))
         if self.on_touch is not None:
             for touch in touches:
                 self.on_touch(touch)

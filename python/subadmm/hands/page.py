@@ -31,6 +31,7 @@ _LOST = 0.5              # s: a hand that comes back after so long is put to whe
 _JUMP = 0.15             # m: and one that has been seen so far from where it was
 _ASIDE = 0.25            # m: hands wait so far to the left and right, before they are tracked ...
 _WAITING = 1.3           # ... and so high above the user's floor
+_FULL = 5.0              # N: controllers pulse as hard as they can from there on; of a hand of the usual size
 _EYES = 1.4              # m: over the floor; where a browser has no floor
 
 
@@ -84,7 +85,8 @@ class HandPage:
 
     build(): a new World, or what load() returned. The page sends both hands' 25 joints, or controllers, and is told
     what fingers feel. stand, yaw, scale: Place; stand None: usual_stand(). certificate, key: PEM files; browsers have
-    WebXR on localhost, and elsewhere by them only. on_touch: called with each Touch, from frame(). options: of Hand.
+    WebXR on localhost, and elsewhere by them only. on_touch: called with each Touch, from frame(). options: of Hand, whose size is
+    `scale` if nothing else is said.
     Raises OSError where it cannot be served, ImportError without the package websockets."""
 
     def __init__(self, build: Callable[[], Any], title: str = "", host: str = "127.0.0.1", port: int = 8081, *,
@@ -127,7 +129,7 @@ class HandPage:
         for side, across in zip(SIDES, (-_ASIDE, _ASIDE)):
             waiting = grasping(side, (0, -across, _WAITING))      # as a user of the world's axes has them
             joints = self.place(waiting[:, [1, 2, 0]] * [-1, 1, -1])
-            self._felt[side] = _Felt(Hand(world, side, joints, **self._options))
+            self._felt[side] = _Felt(Hand(world, side, joints, **{"size": self.place.scale, **self._options}))
         return source
 
     def _begin(self):
@@ -138,6 +140,7 @@ class HandPage:
         header = {
             **drawing_of(description, looking_at(description), blob.put), "type": "scene", "title": self.title,
             "count": description.count, "toWorld": self.place.matrix().T.ravel().tolist(), "eyes": _EYES,
+            "full": _FULL * self.place.scale ** 4,
             "joints": XR_JOINTS, "parts": PARTS,
         }
         self._description = description
