@@ -87,11 +87,14 @@ def test_joints_that_are_none_are_refused_and_change_nothing(change, error, said
 def test_other_arguments_are_refused():
     world, joints = world_of(), hands.grasping("right", (0, 0, 0.3))
     for wrong, said in (({"side": "up"}, "side: 'up'"), ({"friction": -1}, "friction: -1"),
-                        ({"tip_force": 0}, "tip_force: 0"), ({"size": 0}, "size: 0"), ({"palm_force": float("nan")}, "palm_force: nan")):
+                        ({"tip_force": 0}, "tip_force: 0"), ({"size": 0}, "size: 0"),
+                        ({"palm_force": float("nan")}, "palm_force: nan")):
         with pytest.raises(ValueError, match=said):
             hands.Hand(world, **{"side": "right", "joints": joints, **wrong})
     with pytest.raises(TypeError, match="world"):
         hands.Hand(None, "right", joints)
+    with pytest.raises(ValueError, match="motion: is of the left hand"):
+        hands.Hand(world_of(), "right", joints).follow(hands.Motion([0], joints[None], "left"), 0)
     with pytest.raises(ValueError, match="opening: 0.2"):
         hands.grasping("right", (0, 0, 0), opening=0.2)
     with pytest.raises(ValueError, match="orientation"):

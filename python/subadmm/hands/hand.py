@@ -38,14 +38,16 @@ class Touch:
 
 
 class Hand:
-    """A palm and five fingertips of a hand in a world, each a small body on a coupling.
+    """A palm and five fingertips of a hand in a world, each a small body on a coupling. They have no weight, which is
+    the user's to bear.
 
     world: subadmm.World; side: 'left' or 'right'; joints: where it begins, 21 or 25 joints (parts_of), m, world. They
     are free of each other and meet all other shapes. friction: of their shapes, in [0, 1e6]; size: of the hand, in
-    [0.01, 100], 1: a usual one; lengths of the bodies grow with it, masses with its third power, forces with its fourth,
-    so that it moves alike; palm_force, tip_force: the largest force of a coupling along each of its target's axes, N, in
-    (0, 1e9], default 60 and 15 times size^4; on_touch: called by after_step() with each Touch. Not thread-safe, as its
-    world.
+    [0.01, 100], 1: a usual one; lengths of the bodies grow with it, masses with its third power, forces with its
+    fourth, so that it moves alike; palm_force, tip_force: the largest force of a coupling along each of its target's
+    axes, N, in (0, 1e9], default 60 and 15 times size^4; on_touch: called by after_step() with each Touch. Not
+    thread-safe, as its world. Raises TypeError, ValueError (an argument that is none), subadmm.Error; nothing is added
+    then.
 
     go() leads it, as a tracked hand does, and follow() as a Motion has it. Each step has before_step() or follow()
     before it, and after_step() after it where forces are wanted:
@@ -76,8 +78,8 @@ class Hand:
         try:
             for k, part in enumerate(PARTS):
                 pose = {"position": places[k].tolist(), "orientation": turns[k].tolist()}
-                body = world.add_solid(tip if k else palm, mass=(_TIP_MASS if k else _PALM_MASS) * heavy, name=f"{side} {part}",
-                                       gravity_scale=0, **pose)     # the user bears the hand's own weight
+                mass = (_TIP_MASS if k else _PALM_MASS) * heavy
+                body = world.add_solid(tip if k else palm, mass=mass, name=f"{side} {part}", gravity_scale=0, **pose)
                 self.bodies.append(body)
                 for other in self.bodies[:-1]:
                     body.ignore(other)
@@ -133,7 +135,10 @@ class Hand:
 
     def follow(self, motion: Motion, time: float) -> None:
         """In the place of before_step(): the targets of the next step are those of a Motion at `time`, s, with the
-        velocities to where they are a step later. Raises ValueError (joints that parts_of() refuses)."""
+        velocities to where they are a step later. Raises ValueError (a motion of the other hand; joints that parts_of()
+        refuses)."""
+        if motion.side != self.side:
+            raise ValueError(f"motion: is of the {motion.side} hand; this is the {self.side} one")
         dt = self.world.settings.dt
         places, turns = self._targets(parts_of(motion.at(time), self.side))
         then, turned = self._targets(parts_of(motion.at(time + dt), self.side))
@@ -149,7 +154,8 @@ class Hand:
 
     def after_step(self) -> list[Touch]:
         """Read `forces`. Gives what has begun or ended to be touched in the last step, and tells on_touch. A touch
-        begins at 0.05 N and ends below 0.02 N, times size^4. Raises subadmm.Unavailable where settings.recover_wrenches is false."""
+        begins at 0.05 N and ends below 0.02 N, times size^4. Raises subadmm.Unavailable where settings.recover_wrenches
+        is false."""
         self.forces = np.array([body.contact_wrench[:3] for body in self.bodies])
         touches = []
         for k, force in enumerate(np.linalg.norm(self.forces, axis=1)):

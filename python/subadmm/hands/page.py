@@ -85,9 +85,9 @@ class HandPage:
 
     build(): a new World, or what load() returned. The page sends both hands' 25 joints, or controllers, and is told
     what fingers feel. stand, yaw, scale: Place; stand None: usual_stand(). certificate, key: PEM files; browsers have
-    WebXR on localhost, and elsewhere by them only. on_touch: called with each Touch, from frame(). options: of Hand, whose size is
-    `scale` if nothing else is said.
-    Raises OSError where it cannot be served, ImportError without the package websockets."""
+    WebXR on localhost, and elsewhere by them only. options: of Hand; its size is `scale` if none is given, and
+    on_touch is called from frame(). Raises TypeError, ValueError (an argument that is none), OSError where it cannot
+    be served, ImportError without the package websockets."""
 
     def __init__(self, build: Callable[[], Any], title: str = "", host: str = "127.0.0.1", port: int = 8081, *,
                  certificate: Any = None, key: Any = None, stand: Any = None, yaw: float = 0.0, scale: float = 1.0,
