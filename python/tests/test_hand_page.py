@@ -7,6 +7,7 @@ import socket
 import ssl
 import struct
 import subprocess
+import sys
 import threading
 import time
 
@@ -404,6 +405,18 @@ def test_the_command(monkeypatch, capsys):
                   ["--host", "no.such.host.invalid"]):
         assert main(["hands", "pyramid:2", *wrong]) == 1
         assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_command_ends_cleanly_after_it_was_asked():
+    """Also where lines of pages are still being closed: nothing keeps the world."""
+    process = subprocess.Popen([sys.executable, "-m", "subadmm", "hands", "pyramid:2", "--port", "0"], text=True,
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    port = int(process.stdout.readline().rpartition(":")[2])
+    assert status(port, f"127.0.0.1:{port}", "/", upgrade=False) == 200
+    assert status(port, "evil.example", "/", upgrade=False) == 403
+    process.terminate()
+    _, complaints = process.communicate(timeout=60)
+    assert process.returncode == 143 and complaints == ""
 
 
 # ---- in a browser --------------------------------------------------------------------------------------------------

@@ -161,3 +161,5 @@ class Server:
         for client in self.everybody():
             client.line.close()
         self._thread.join(5)
+        # Threads of lines that are still being closed keep this object, and should keep no world.
+        self._hear = self._greet = self._gone = lambda *_: None
