@@ -154,8 +154,8 @@ class Hand:
 
     def after_step(self) -> list[Touch]:
         """Read `forces`. Gives what has begun or ended to be touched in the last step, and tells on_touch. A touch
-        begins at 0.05 N and ends below 0.02 N, times size^4. Raises subadmm.Unavailable where settings.recover_wrenches
-        is false."""
+        begins at 0.05 N and ends below 0.02 N, times size^4. Raises subadmm.Unavailable before the first step, and
+        where settings.recover_wrenches is false."""
         self.forces = np.array([body.contact_wrench[:3] for body in self.bodies])
         touches = []
         for k, force in enumerate(np.linalg.norm(self.forces, axis=1)):
