@@ -1,5 +1,6 @@
-"""python -m subadmm view | record | picture SCENE: scenes to look at; convert FILE: robots as scene files."""
+"""python -m subadmm view | hands | record | picture SCENE: scenes to look at; convert FILE: robots as scene files."""
 import argparse
+import math
 import os
 import signal
 import sys
@@ -23,8 +24,11 @@ def _arguments():
         "record", help="run a scene into a page that plays by itself (.html), glTF (.glb), a video (.mp4; needs: pip "
                        "install imageio-ffmpeg) or a stage (.usd, .usda, .usdc; needs: pip install usd-core)"
     )
+    hands = commands.add_parser(
+        "hands", help="open a page (WebXR) by which a user's hands are in the running scene (needs: pip install "
+                      "'websockets>=13')")
     picture = commands.add_parser("picture", help="run a scene and write a picture of its end (.png)")
-    for command in (view, record, picture):
+    for command in (view, hands, record, picture):
         command.add_argument("scene",
                              help="as 'pile:300', the names: subadmm.scenes(); or a file, .json, .xml, .urdf or "
                                   ".usd...")
@@ -60,8 +64,15 @@ def _arguments():
     convert.add_argument("--decompose", action="store_true",
                          help="several hulls for each mesh of a moving body (needs: pip install coacd)")
     view.add_argument("--copies", type=int, default=1, help="so many environments, side by side (1)")
-    view.add_argument("--host", default="127.0.0.1", help="address to serve at (127.0.0.1: this machine only)")
-    view.add_argument("--port", type=int, default=8080, help="port to serve at (8080)")
+    for command, port in ((view, 8080), (hands, 8081)):
+        command.add_argument("--host", default="127.0.0.1", help="address to serve at (127.0.0.1: this machine only)")
+        command.add_argument("--port", type=int, default=port, help=f"port to serve at ({port})")
+    hands.add_argument("--certificate", metavar="FILE", help="PEM; browsers have WebXR on other machines by https only")
+    hands.add_argument("--key", metavar="FILE", help="PEM, of the certificate")
+    hands.add_argument("--stand", type=float, nargs=3, metavar=("X", "Y", "Z"),
+                       help="where the middle of your floor is, m, world (default: what moves is before your chest)")
+    hands.add_argument("--yaw", type=float, default=0, help="where you look: about z from x, degrees (0)")
+    hands.add_argument("--scale", type=float, default=1, help="metres of the world to one of yours (1)")
     return parser
 
 
@@ -162,6 +173,14 @@ def _view(build, given):
     serve(build, os.path.basename(given.scene), host=given.host, port=whole("--port", given.port, 0, 65535))
 
 
+def _hands(build, given):
+    from .hands.page import serve
+
+    serve(build, os.path.basename(given.scene), host=given.host, port=whole("--port", given.port, 0, 65535),
+          certificate=given.certificate, key=given.key, stand=given.stand,
+          yaw=math.radians(real("--yaw", given.yaw, -3600, 3600)), scale=given.scale)
+
+
 def _convert(given):
     from .convert import convert
 
@@ -217,7 +236,7 @@ def main(arguments=None):
             if given.command == "convert":
                 _convert(given)
             else:
-                {"record": _record, "picture": _picture, "view": _view}[given.command](build, given)
+                {"record": _record, "picture": _picture, "view": _view, "hands": _hands}[given.command](build, given)
     except (subadmm.Error, ValueError, ImportError, OSError) as error:
         print(f"subadmm: {error}", file=sys.stderr)
         return 1

@@ -20,14 +20,15 @@ FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshade
 
 
 class Page:
-    """A page of its own browser. errors: what it wrote to the console as errors, and exceptions."""
+    """A page of its own browser. errors: what it wrote to the console as errors, and exceptions. before: a script that
+    runs before those of the page; flags: more of the browser's."""
 
-    def __init__(self, url, width=640, height=480):
+    def __init__(self, url, width=640, height=480, before=None, flags=()):
         from websockets.sync.client import connect
 
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self._process = subprocess.Popen(
-            [PATH, *FLAGS, f"--window-size={width},{height}", f"--user-data-dir={self._folder.name}", "about:blank"],
+            [PATH, *FLAGS, *flags, f"--window-size={width},{height}", f"--user-data-dir={self._folder.name}", "about:blank"],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ, "HOME": self._folder.name},
             start_new_session=True)
         self.errors, self._number = [], 0
@@ -36,6 +37,8 @@ class Page:
             self.call("Runtime.enable")
             self.call("Log.enable")
             self.call("Page.enable")
+            if before is not None:
+                self.call("Page.addScriptToEvaluateOnNewDocument", source=before)
             self.call("Page.navigate", url=url)
         except BaseException:
             self.close()

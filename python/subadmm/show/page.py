@@ -49,19 +49,23 @@ def _forces(recording, put):
     }
 
 
-def page_of(recording) -> str:
-    """The page's text."""
-    description = recording.description
-    blob = bytearray()
+class Blob:
+    """Data of a page."""
 
-    def put(values, kind):
+    def __init__(self):
+        self.data = bytearray()
+
+    def put(self, values, kind):
         """Where the values are in the data: [type, offset in bytes, count]."""
         data = np.ascontiguousarray(values, {"f32": "<f4", "u8": "u1", "i8": "i1", "i32": "<i4"}[kind]).tobytes()
-        blob.extend(b"\0" * (-len(blob) % 4))
-        at = len(blob)
-        blob.extend(data)
+        self.data.extend(b"\0" * (-len(self.data) % 4))
+        at = len(self.data)
+        self.data.extend(data)
         return [kind, at, np.size(values)]
 
+
+def drawing_of(description, camera, put):
+    """What drawing.js has to know of a world, as members of a header; put: of a Blob."""
     groups = []
     for group in description.groups:
         groups.append({
@@ -75,35 +79,48 @@ def page_of(recording) -> str:
             "colour": put(np.rint(np.clip(group.tinted(), 0, 1) * 255), "u8"),
             "wall": put(group.wall, "f32"),
         })
-    camera = usual_camera(recording)
-    header = {
-        "title": recording.title,
+    return {
         "bodies": description.bodies,
-        "count": description.count,
-        "frames": len(recording.times),
         "centre": list(map(float, description.centre)),
         "radius": description.radius,
         "eye": list(map(float, camera.eye)),
         "target": list(map(float, camera.target)),
         "field": camera.field,
         "sun": list(map(float, SUN)),
+        "groups": groups,
+    }
+
+
+def filled(path, marks):
+    """The text of a page's file, with drawing.js in it and what the marks stand for."""
+    drawing = (Path(__file__).parent / "drawing.js").read_text(encoding="utf-8").rstrip("\n")
+    page = Path(path).read_text(encoding="utf-8")
+    for mark, text in (("drawing", drawing), *marks.items()):
+        page = page.replace("{{" + mark + "}}", text)
+    return page
+
+
+def page_of(recording) -> str:
+    """The page's text."""
+    blob = Blob()
+    put = blob.put
+    header = {
+        **drawing_of(recording.description, usual_camera(recording), put),
+        "title": recording.title,
+        "count": recording.description.count,
+        "frames": len(recording.times),
         "times": put(recording.times, "f32"),
         "positionStep": recording.position_step,
         "turnStep": TURN_STEP,
         "positions": put(np.frombuffer(packed(recording.positions), np.uint8), "u8"),
         "turns": put(np.frombuffer(packed(recording.orientations), np.uint8), "u8"),
-        "groups": groups,
         "forces": _forces(recording, put) if recording.forces else None,
         "measures": [{"name": MEASURES[name][0], "unit": MEASURES[name][1], "values": put(values, "f32")}
                      for name, values in recording.measures.items()],
     }
-    page = (Path(__file__).parent / "player.html").read_text(encoding="utf-8")
-    data = base64.b64encode(zlib.compress(bytes(blob), 9)).decode()
-    for mark, text in (
-        ("{{title}}", html.escape(recording.title)),
-        ("{{legend}}", legend()),
-        ("{{header}}", json.dumps(header).replace("<", "\\u003c")),
-        ("{{data}}", data),
-    ):
-        page = page.replace(mark, text)
-    return page
+    return filled(Path(__file__).parent / "player.html", {
+        "title": html.escape(recording.title),
+        "legend": legend(),
+        "header": json.dumps(header).replace("<", "\\u003c"),
+        "data": base64.b64encode(zlib.compress(bytes(blob.data), 9)).decode(),
+    })

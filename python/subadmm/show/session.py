@@ -52,6 +52,8 @@ class Session:
     def __init__(self, build):
         self.lock = threading.RLock()
         self.build = build
+        #: Objects whose before_step() and after_step() are called around each step of a world.
+        self.around_steps = []
         self.running = True
         self._speed = 1.0
         self.reset()
@@ -145,7 +147,11 @@ class Session:
                     self.environments.step()
                 else:
                     self.steering.before_step()
+                    for around in self.around_steps:
+                        around.before_step()
                     self.world.step()
+                    for around in self.around_steps:
+                        around.after_step()
                 self._took = time.perf_counter() - begun
                 self.steps += 1
             now = self.steps * self.dt

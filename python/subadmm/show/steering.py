@@ -1,18 +1,10 @@
 """What a user leads: the targets of a world's couplings and of its joints' position drives."""
 import numpy as np
 
+from ..following import Follower, follow
 from ..given import point, real, whole
-from ..rotations import multiply, of_vector, rotate, to_vector, unit
+from ..rotations import rotate, unit
 from .chains import Finger, driven_chains, opposing, opposing_thumb
-
-_RATE = 40.0  # 1/s: targets go after what the user asks for, which comes in jumps, as a critically damped spring would
-
-
-def _follow(offset, speed, dt):
-    """(offset, speed) after dt (s) of what goes to 0, at first with this offset and speed: exactly."""
-    both = (speed + _RATE * offset) * dt
-    fade = np.exp(-_RATE * dt)
-    return (offset + both) * fade, (speed - _RATE * both) * fade
 
 
 class Lead:
@@ -22,9 +14,26 @@ class Lead:
         self.coupling = coupling
         self.name = coupling.body.name or f"body {coupling.body.index}"
         self.most = coupling.max_force      # N
-        self.at, self.turn = (np.array(values) for values in coupling.target)
-        self.position, self.orientation = self.at, self.turn
-        self._speed = self._spin = np.zeros(3)
+        self._follower = Follower(*(np.array(values)[None] for values in coupling.target))
+
+    at = property(lambda self: self._follower.at[0], doc="Where the target is, m, world.")
+    turn = property(lambda self: self._follower.turn[0], doc="Its orientation, w x y z.")
+
+    @property
+    def position(self):
+        return self._follower.position[0]
+
+    @position.setter
+    def position(self, value):
+        self._follower.position = np.asarray(value)[None]
+
+    @property
+    def orientation(self):
+        return self._follower.orientation[0]
+
+    @orientation.setter
+    def orientation(self, value):
+        self._follower.orientation = np.asarray(value)[None]
 
     def go(self, position, orientation):
         """Where the target is to go: finite numbers, and an orientation that is none of length 0."""
@@ -35,15 +44,8 @@ class Lead:
 
     def step(self, dt):
         """Bring the target on by a step."""
-        position, orientation = self.position, self.orientation
-        offset, self._speed = _follow(self.at - position, self._speed, dt)
-        away = to_vector(multiply(self.turn, orientation * [1, -1, -1, -1]))
-        angle, self._spin = _follow(away, self._spin, dt)
-        at, turn = position + offset, multiply(of_vector(angle), orientation)
-        spin = to_vector(multiply(turn, self.turn * [1, -1, -1, -1])) / dt
-        self.coupling.set_target(self.at.tolist(), self.turn.tolist(),
-                                 [*((at - self.at) / dt).tolist(), *spin.tolist()])
-        self.at, self.turn = at, unit(turn)
+        at, turn, velocity = self._follower.step(dt)
+        self.coupling.set_target(at[0].tolist(), turn[0].tolist(), velocity[0].tolist())
 
     def grip(self):
         """Where the frame on the body is, m, world."""
@@ -142,7 +144,7 @@ class Steering:
         for lead in self.leads:
             lead.step(dt)
         if self.chains:
-            offset, self._rates = _follow(self.targets - self.goals, self._rates, dt)
+            offset, self._rates = follow(self.targets - self.goals, self._rates, dt)
             targets = self.goals + offset
             speeds = np.where(self._led, (targets - self.targets) / dt, self._speeds)
             self.world.set("joint_target_position", self.targets)
