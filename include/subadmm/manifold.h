@@ -15,8 +15,8 @@
  *
  * The callback is called within sadmm_world_step on the thread that calls that, once for each manifold of each
  * sub-step, in the order of sadmm_world_contacts; and for hits within the step (settings.hits) as they are found, maybe
- * more than once for one hit. It must not call anything on the world but what takes a const world, and must not keep the pointer.
- * Given the same manifolds it should decide the same: then so are steps, to the last bit.
+ * more than once for one hit. It must not call anything on the world but what takes a const world, and must not keep
+ * the pointer. Given the same manifolds it should decide the same: then so are steps, to the last bit.
  *
  * Cost: on CUDA contacts are found, and steps driven, by the host in worlds with a callback. Without one it costs
  * nothing. It is not saved (save.h), not copied to environments (environments.h), and stays where a world is restored.
