@@ -68,6 +68,7 @@ typedef struct sadmm_body_def {
     double linear_damping;       /* 1/s, in [0, 1e6]; default 0. c: a force -c mass velocity, so that free motion decays
                                     as exp(-c t), exactly and at any dt */
     double angular_damping;      /* the same of the angular velocity: a torque -c inertia velocity */
+    void *user_data;             /* the caller's, never used by the library; default NULL */
 } sadmm_body_def;
 
 /* The defaults named above. Thread-safe. */
@@ -122,6 +123,8 @@ typedef struct sadmm_shape_def {
                                     it has shapes of it, so the caller may destroy it at once. Read back: the same
                                     pointer */
     const sadmm_mesh *mesh;      /* of MESH; likewise */
+    const char *name;            /* UTF-8; copied, as many whole characters as fit into 63 bytes; NULL = "" */
+    void *user_data;             /* the caller's, never used by the library; default NULL */
 } sadmm_shape_def;
 
 /* The defaults named above. Thread-safe. */

@@ -86,7 +86,7 @@ NB_MODULE(_core, m)
 
     bind_settings(m);
     bind_shapes(m);
-    nb::class_<world> w(m, "World", nb::is_weak_referenceable(),
+    nb::class_<world> w(m, "World", nb::is_weak_referenceable(), collected_world(),
         "Bodies with shapes, joints and forces, stepped through time. SI units; the world's frame for positions, "
         "orientations (unit quaternions w x y z, body to world) and velocities. Calls on one world are serialised; "
         "different worlds run in parallel. The GIL is released while a world works.");
