@@ -366,6 +366,15 @@ static void on_queries(void)
     ck_assert(sadmm_query_filter_default().body_types == 7);
 }
 
+static void on_drawing(void)
+{
+    const sadmm_draw draw = sadmm_draw_default(); /* all callbacks are NULL: nothing is drawn */
+    REFUSES("world", sadmm_world_debug_draw(NULL, &draw));
+    ck_assert_int_eq(sadmm_world_debug_draw(world, NULL), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_int_eq(sadmm_world_debug_draw(world, &draw), SADMM_OK);
+    REFUSES("world", sadmm_world_prepare_draw(NULL));
+}
+
 static void on_events(void)
 {
     sadmm_event event;
@@ -621,6 +630,7 @@ static void on_defaults(void)
     sadmm_heightfield_def_init(NULL, sizeof(sadmm_heightfield_def));
     sadmm_mesh_file_def_init(NULL, sizeof(sadmm_mesh_file_def));
     sadmm_query_filter_init(NULL, sizeof(sadmm_query_filter));
+    sadmm_draw_init(NULL, sizeof(sadmm_draw));
 }
 
 /* By the function that passes NULL to them; those without a pointer have none. */
@@ -675,6 +685,7 @@ static const struct {
     {on_queries,
      {W(cast_ray), W(cast_ray_all), W(cast_rays), W(cast_shape), W(overlap_box), W(overlap_shape),
       W(closest_points), W(closest_to_shape)}},
+    {on_drawing, {W(debug_draw), W(prepare_draw)}},
     {on_events, {W(record_events), W(event_capacity), W(event_count), W(take_events), W(sensor_overlaps)}},
     {on_steps,
      {W(step), W(step_async), W(wait), W(report_sized), W(contact_count), W(contacts), W(contact_errors), W(state_hash),
@@ -728,7 +739,7 @@ static const struct {
     {on_defaults,
      {"sadmm_settings_init", W(def_init), "sadmm_body_def_init", "sadmm_shape_def_init", "sadmm_hull_def_init",
       "sadmm_joint_def_init", "sadmm_coupling_def_init", "sadmm_gear_def_init", "sadmm_mesh_def_init",
-      "sadmm_heightfield_def_init", "sadmm_mesh_file_def_init", "sadmm_query_filter_init"}},
+      "sadmm_heightfield_def_init", "sadmm_mesh_file_def_init", "sadmm_query_filter_init", "sadmm_draw_init"}},
     {NULL,
      {"sadmm_array_name", "sadmm_environments_is_input", "sadmm_status_name", "sadmm_last_message", "sadmm_version",
       "sadmm_version_number", "sadmm_build_commit", "sadmm_build_compiler"}},

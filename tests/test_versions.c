@@ -90,6 +90,7 @@ START_TEST(members_are_where_they_were)
     COMPARE(heightfield_def, "");
     COMPARE(mesh_file_def, "");
     COMPARE(query_filter, "");
+    COMPARE(draw, "");
     COMPARE(backend_info, "");
     COMPARE(solve_report, "");
     COMPARE(step_report, "");

@@ -392,3 +392,4 @@ void bind_events(nb::module_ &m, nb::class_<world> &w);
 void bind_scenes(nb::module_ &m, nb::class_<world> &w);
 void bind_environments(nb::module_ &m);
 void bind_draw(nb::module_ &m);
+void bind_debug_draw(nb::class_<world> &w);

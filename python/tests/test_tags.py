@@ -1,7 +1,8 @@
-"""Names and user data of all objects of a world."""
+"""Names and user data of all objects of a world; what debug_draw gives."""
 import gc
 import weakref
 
+import numpy as np
 import pytest
 
 import subadmm
@@ -151,3 +152,29 @@ def test_a_world_with_itself_inside_is_collected():
     del world, made
     gc.collect()
     assert seen() is None
+
+
+# ---- drawing ------------------------------------------------------------------------------------------------------------
+
+
+def test_debug_draw():
+    world, _ = machine()
+    world.add_ground(height=-0.1)
+    world.step(2)
+    shapes = world.debug_draw()
+    count = 2 * 24 * 22 + 2
+    assert shapes["triangles"].shape == (count, 3, 3) and shapes["triangle_normals"].shape == (count, 3)
+    assert shapes["lines"].shape == (0, 2, 3) and shapes["triangle_colours"].dtype == np.uint32
+    ball = shapes["triangles"][:24 * 22].reshape(-1, 3)
+    assert np.linalg.norm(ball - world["wheel"].position, axis=1) == pytest.approx(0.1, abs=1e-12)
+    all_of_it = world.debug_draw(["joints", "names", "contacts", "centres"])
+    assert sorted(text for text, _ in all_of_it["texts"]) == [
+        "axle", "ground", "pinion", "shaft", "skin", "wheel"]
+    assert len(all_of_it["points"]) == 2 + world.report.contacts
+    assert len(world.debug_draw(["edges"], segments=8)["lines"]) == 2 * 3 * 8 + 22
+    with pytest.raises(ValueError, match="what = .*must have names of 'shapes', 'edges'"):
+        world.debug_draw(["shape"])
+    with pytest.raises(TypeError, match="must be a sequence of names"):
+        world.debug_draw("shapes")
+    with pytest.raises(subadmm.InvalidArgument, match="segments = 6: must be a multiple of 4"):
+        world.debug_draw(segments=6)

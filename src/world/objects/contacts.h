@@ -4,6 +4,10 @@
 
 #include "world/state/world_state.h"
 
+/* How many contacts of the last step can be read; and these, first to first + count - 1, once the host has them. */
+int32_t sadmm_world_readable_contacts(const sadmm_world *world);
+void sadmm_world_copy_contacts(const sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts);
+
 /* A point of the last step: where sadmm_contact says it is. */
 void sadmm_world_contact_position(const sadmm_world *world, const struct sadmm_contact_pair *pair,
                                   const struct sadmm_contact_point *point, double position[3]);
