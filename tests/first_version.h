@@ -76,6 +76,13 @@
     M(size_t, struct_size, ) M(uint32_t, body_types, ) M(sadmm_body_id, ignored, ) M(int32_t, environment, ) \
     M(uint32_t, category, ) M(uint32_t, mask, ) M(bool, from_inside, ) M(bool, from_behind, ) M(bool, sensors, )
 
+/* Callbacks have the size of pointers. */
+#define FIRST_draw(M) \
+    M(size_t, struct_size, ) M(void *, user, ) M(void *, line, ) M(void *, triangle, ) M(void *, point, ) \
+    M(void *, text, ) M(void *, shape_colour, ) M(uint32_t, flags, ) M(int32_t, segments, ) M(double, force_scale, ) \
+    M(double, axis_length, ) M(double, plane_size, ) M(double, lowest, [3]) M(double, highest, [3]) \
+    M(int32_t, environment, )
+
 #define FIRST_backend_info(M) \
     M(sadmm_backend, backend, ) M(const char *, name, ) M(bool, available, [2]) M(const char *, reason, )
 
@@ -112,6 +119,7 @@ struct first_mesh_def { FIRST_mesh_def(FIRST_MEMBER) };
 struct first_heightfield_def { FIRST_heightfield_def(FIRST_MEMBER) };
 struct first_mesh_file_def { FIRST_mesh_file_def(FIRST_MEMBER) };
 struct first_query_filter { FIRST_query_filter(FIRST_MEMBER) };
+struct first_draw { FIRST_draw(FIRST_MEMBER) };
 struct first_backend_info { FIRST_backend_info(FIRST_MEMBER) };
 struct first_solve_report { FIRST_solve_report(FIRST_MEMBER) };
 struct first_step_report { FIRST_step_report(FIRST_MEMBER) };

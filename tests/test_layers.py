@@ -25,7 +25,7 @@ import sys
 CORE = ["core/base", "core/math", "core/model", "core/solve"]
 COLLISION = ["collision/" + name for name in
              ("base", "shapes", "hull", "convex", "mesh", "manifold", "broad", "find", "query")] + ["collision"]
-WORLD = ["world/" + name for name in ("state", "step", "resident", "query", "objects")] + ["world", "world/save", "world/environments"]
+WORLD = ["world/" + name for name in ("state", "step", "resident", "query", "objects", "draw")] + ["world", "world/save", "world/environments"]
 CUDA = ["backend_cuda/" + name for name in
         ("device", "collide", "graph", "assemble", "weight", "iterate", "step", "table")]
 FLIGHT = "collision/flight"

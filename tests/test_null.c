@@ -133,6 +133,19 @@ static void on_saves(void)
     REFUSES("buffer", sadmm_world_restore(world, NULL, 0));
 }
 
+/* Of what is alike for objects of all kinds. */
+#define ON_TAGS(object)                                                          \
+    do {                                                                         \
+        sadmm_##object##_id found;                                               \
+        REFUSES("world", sadmm_world_set_##object##_user_data(NULL, object, NULL)); \
+        ck_assert_ptr_null(sadmm_world_##object##_user_data(NULL, object));      \
+        ck_assert_str_eq(sadmm_world_##object##_name(NULL, object), "");         \
+        REFUSES("world", sadmm_world_##object##_named(NULL, "a", &found));       \
+        REFUSES("name", sadmm_world_##object##_named(world, NULL, &found));      \
+        REFUSES("id", sadmm_world_##object##_named(world, "a", NULL));           \
+    } while (0)
+#define TAGS(object) W(object##_name), W(object##_named), W(object##_user_data), W(set_##object##_user_data)
+
 static void on_bodies(void)
 {
     const double three[3] = {0};
@@ -165,13 +178,12 @@ static void on_bodies(void)
     REFUSES("point", sadmm_world_apply_body_impulse_at(world, body, three, NULL));
     REFUSES("world", sadmm_world_set_body_mass(NULL, body, 1, three));
     REFUSES("inertia", sadmm_world_set_body_mass(world, body, 1, NULL));
-    REFUSES("world", sadmm_world_set_body_user_data(NULL, body, NULL));
+    ON_TAGS(body);
     REFUSES("world", sadmm_world_set_body_gravity_scale(NULL, body, 1));
     REFUSES("world", sadmm_world_set_body_damping(NULL, body, 0, 0));
     REFUSES("world", sadmm_world_move_body(NULL, body, three, six));
     REFUSES("position", sadmm_world_move_body(world, body, NULL, six));
     REFUSES("orientation", sadmm_world_move_body(world, body, three, NULL));
-    ck_assert_ptr_null(sadmm_world_body_user_data(NULL, body));
     REFUSES("world", sadmm_world_body_contact_wrench(NULL, body, six));
     REFUSES("wrench", sadmm_world_body_contact_wrench(world, body, NULL));
     REFUSES("world", sadmm_world_set_body_pair_contact(NULL, body, body, true));
@@ -196,6 +208,7 @@ static void on_shapes(void)
     REFUSES("world", sadmm_world_add_shape(NULL, body, &def, &id));
     REFUSES("def", sadmm_world_add_shape(world, body, NULL, &id));
     REFUSES("world", sadmm_world_remove_shape(NULL, shape));
+    ON_TAGS(shape);
     ck_assert_int_eq(sadmm_world_shape_count(NULL), 0);
     REFUSES("world", sadmm_world_shape_at(NULL, 0, &id));
     REFUSES("id", sadmm_world_shape_at(world, 0, NULL));
@@ -235,6 +248,7 @@ static void on_joints(void)
     REFUSES("world", sadmm_world_add_joint(NULL, &def, &id));
     REFUSES("def", sadmm_world_add_joint(world, NULL, &id));
     REFUSES("world", sadmm_world_remove_joint(NULL, joint));
+    ON_TAGS(joint);
     ck_assert_int_eq(sadmm_world_joint_count(NULL), 0);
     REFUSES("world", sadmm_world_joint_at(NULL, 0, &id));
     REFUSES("id", sadmm_world_joint_at(world, 0, NULL));
@@ -264,6 +278,7 @@ static void on_couplings(void)
     REFUSES("world", sadmm_world_add_coupling(NULL, &def, &id));
     REFUSES("def", sadmm_world_add_coupling(world, NULL, &id));
     REFUSES("world", sadmm_world_remove_coupling(NULL, coupling));
+    ON_TAGS(coupling);
     ck_assert_int_eq(sadmm_world_coupling_count(NULL), 0);
     REFUSES("world", sadmm_world_coupling_at(NULL, 0, &id));
     REFUSES("id", sadmm_world_coupling_at(world, 0, NULL));
@@ -287,6 +302,7 @@ static void on_gears(void)
     REFUSES("world", sadmm_world_add_gear(NULL, &def, &id));
     REFUSES("def", sadmm_world_add_gear(world, NULL, &id));
     REFUSES("world", sadmm_world_remove_gear(NULL, gear));
+    ON_TAGS(gear);
     ck_assert_int_eq(sadmm_world_gear_count(NULL), 0);
     REFUSES("world", sadmm_world_gear_at(NULL, 0, &id));
     REFUSES("id", sadmm_world_gear_at(world, 0, NULL));
@@ -351,6 +367,15 @@ static void on_queries(void)
     REFUSES("orientation", sadmm_world_closest_to_shape(world, &def, zero, NULL, shape, &closest));
     REFUSES("closest", sadmm_world_closest_to_shape(world, &def, zero, unit, shape, NULL));
     ck_assert(sadmm_query_filter_default().body_types == 7);
+}
+
+static void on_drawing(void)
+{
+    const sadmm_draw draw = sadmm_draw_default(); /* all callbacks are NULL: nothing is drawn */
+    REFUSES("world", sadmm_world_debug_draw(NULL, &draw));
+    ck_assert_int_eq(sadmm_world_debug_draw(world, NULL), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_int_eq(sadmm_world_debug_draw(world, &draw), SADMM_OK);
+    REFUSES("world", sadmm_world_prepare_draw(NULL));
 }
 
 static void on_events(void)
@@ -608,6 +633,7 @@ static void on_defaults(void)
     sadmm_heightfield_def_init(NULL, sizeof(sadmm_heightfield_def));
     sadmm_mesh_file_def_init(NULL, sizeof(sadmm_mesh_file_def));
     sadmm_query_filter_init(NULL, sizeof(sadmm_query_filter));
+    sadmm_draw_init(NULL, sizeof(sadmm_draw));
 }
 
 /* By the function that passes NULL to them; those without a pointer have none. */
@@ -615,7 +641,7 @@ static void on_defaults(void)
 #define W(name) "sadmm_world_" #name
 static const struct {
     void (*pass_null)(void);
-    const char *names[24];
+    const char *names[26];
 } functions[] = {
     {on_worlds, {W(create), W(destroy), W(message), W(settings_sized), W(set_settings), W(set_backend)}},
     {on_bodies,
@@ -630,11 +656,10 @@ static const struct {
       W(add_body_force_at),
       W(apply_body_impulse_at),
       W(set_body_mass),
-      W(set_body_user_data),
+      TAGS(body),
       W(set_body_gravity_scale),
       W(set_body_damping),
       W(move_body),
-      W(body_user_data),
       W(body_contact_wrench),
       W(set_body_pair_contact),
       W(body_wrench),
@@ -644,24 +669,27 @@ static const struct {
     {on_shapes,
      {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def_sized), W(set_shape_material),
       W(set_shape_surface_velocity), W(set_manifold_callback), W(set_shape_size), W(set_shape_frame),
-      W(set_pair_friction), W(pair_friction_count), W(pair_friction_at)}},
+      W(set_pair_friction), W(pair_friction_count), W(pair_friction_at),
+      TAGS(shape)}},
     {on_joints,
      {W(place_joint), W(add_joint), W(remove_joint), W(joint_count), W(joint_at), W(joint_def_sized),
       W(set_joint_enabled), W(set_joint_coordinate_sized), W(joint_state), W(set_joint_spring_table),
-      W(joint_spring_table)}},
+      W(joint_spring_table), TAGS(joint)}},
     {on_couplings,
      {W(add_coupling), W(remove_coupling), W(coupling_count), W(coupling_at), W(coupling_def_sized),
       W(set_coupling_target), W(set_coupling_gains), W(set_coupling_limits), W(set_coupling_enabled),
-      W(coupling_state)}},
+      W(coupling_state), TAGS(coupling)}},
     {on_arrays,
      {"sadmm_array_columns", "sadmm_array_is_settable", W(array_rows), W(get_array), W(set_array), W(body_index),
       W(shape_index), W(joint_index), W(coupling_index), W(device_array), W(dynamic_bodies)}},
     {on_saves, {W(save), W(restore)}},
     {on_gears,
-     {W(add_gear), W(remove_gear), W(gear_count), W(gear_at), W(gear_def_sized), W(set_gear_enabled), W(gear_state)}},
+     {W(add_gear), W(remove_gear), W(gear_count), W(gear_at), W(gear_def_sized), W(set_gear_enabled), W(gear_state),
+      TAGS(gear)}},
     {on_queries,
      {W(cast_ray), W(cast_ray_all), W(cast_rays), W(cast_shape), W(overlap_box), W(overlap_shape),
       W(closest_points), W(closest_to_shape)}},
+    {on_drawing, {W(debug_draw), W(prepare_draw)}},
     {on_events, {W(record_events), W(event_capacity), W(event_count), W(take_events), W(sensor_overlaps)}},
     {on_steps,
      {W(step), W(step_async), W(wait), W(report_sized), W(contact_count), W(contacts), W(contact_errors), W(state_hash),
@@ -715,7 +743,7 @@ static const struct {
     {on_defaults,
      {"sadmm_settings_init", W(def_init), "sadmm_body_def_init", "sadmm_shape_def_init", "sadmm_hull_def_init",
       "sadmm_joint_def_init", "sadmm_coupling_def_init", "sadmm_gear_def_init", "sadmm_mesh_def_init",
-      "sadmm_heightfield_def_init", "sadmm_mesh_file_def_init", "sadmm_query_filter_init"}},
+      "sadmm_heightfield_def_init", "sadmm_mesh_file_def_init", "sadmm_query_filter_init", "sadmm_draw_init"}},
     {NULL,
      {"sadmm_array_name", "sadmm_environments_is_input", "sadmm_status_name", "sadmm_last_message", "sadmm_version",
       "sadmm_version_number", "sadmm_build_commit", "sadmm_build_compiler"}},

@@ -49,6 +49,15 @@ static void turn(struct draw *d, double q[4])
     if (!(norm > 0.01) || rarely(d, 3)) q[0] = 1, q[1] = q[2] = q[3] = 0;
 }
 
+/* Of one object in three; the next call writes over it. */
+static const char *any_name(struct draw *d)
+{
+    static char name[8];
+    if (!rarely(d, 3)) return NULL;
+    snprintf(name, sizeof name, "n%d", below(d, 256));
+    return name;
+}
+
 /* ---- ids: of what is there as a rule, or of what is gone or never was -------------------------------------------- */
 
 #define TAKE_ID(name, type, count_of, at)                                           \
@@ -109,6 +118,7 @@ static sadmm_status add_shape_to(struct draw *d, sadmm_world *world, sadmm_body_
                                               SADMM_SHAPE_CYLINDER, SADMM_SHAPE_CONE, SADMM_SHAPE_ELLIPSOID};
     sadmm_shape_def def = sadmm_shape_def_default();
     const int kind = below(d, 10);
+    def.name = any_name(d);
     def.type = kind == 9   ? SADMM_SHAPE_PLANE
                : kind == 8 ? SADMM_SHAPE_MESH
                : kind == 7 ? SADMM_SHAPE_HULL
@@ -255,6 +265,7 @@ static sadmm_status add_joint(struct draw *d, sadmm_world *world)
     sadmm_joint_def def = sadmm_joint_def_default();
     double x[3], q[4];
     if (sadmm_world_joint_count(world) >= MOST_JOINTS) return sadmm_world_remove_joint(world, any_joint(d, world));
+    def.name = any_name(d);
     def.kind = (sadmm_joint_kind)below(d, SADMM_JOINT_KIND_COUNT);
     def.locks = (uint32_t)below(d, 64);
     def.body_b = any_body(d, world);
@@ -311,6 +322,7 @@ static sadmm_status change_gear(struct draw *d, sadmm_world *world)
         const sadmm_gear_id id = any_gear(d, world);
         return sadmm_world_set_gear_enabled(world, id, below(d, 2));
     }
+    def.name = any_name(d);
     def.joint_1 = any_joint(d, world);
     def.joint_2 = any_joint(d, world);
     def.coordinate_1 = below(d, 6);
@@ -324,6 +336,7 @@ static sadmm_status change_gear(struct draw *d, sadmm_world *world)
 static sadmm_status add_coupling(struct draw *d, sadmm_world *world)
 {
     sadmm_coupling_def def = sadmm_coupling_def_default();
+    def.name = any_name(d);
     def.body = any_body(d, world);
     vector(d, 0.3, def.position, 3);
     turn(d, def.orientation);

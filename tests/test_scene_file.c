@@ -242,6 +242,7 @@ static void add_joints(sadmm_world *world, const sadmm_body_id *balls, uint64_t 
     for (int k = 0; k < 2; ++k) {
         sadmm_joint_def def = sadmm_joint_def_default();
         def.kind = SADMM_JOINT_CYLINDRICAL;
+        def.name = k ? "hinge \"B\"" : NULL;
         def.body_b = balls[8 + k];
         MUST(world, sadmm_world_add_joint(world, &def, &hinges[k]));
     }
@@ -253,6 +254,7 @@ static void add_joints(sadmm_world *world, const sadmm_body_id *balls, uint64_t 
         def.coordinate_2 = 5;
         def.ratio = k ? -0.3 : 1.0 / 7;
         def.enabled = k == 0;
+        def.name = k ? "screw" : NULL;
         MUST(world, sadmm_world_add_gear(world, &def, NULL));
     }
 }
@@ -272,6 +274,7 @@ static void add_coupling(sadmm_world *world, sadmm_body_id body, uint64_t *state
     def.max_force = 50;
     MUST(world, sadmm_world_add_coupling(world, &def, NULL));
     def.enabled = false;
+    def.name = "h\xc3\xa4nd";
     MUST(world, sadmm_world_add_coupling(world, &def, NULL));
 }
 
@@ -467,6 +470,41 @@ START_TEST(names_stand_for_bodies)
 }
 END_TEST
 
+/* Of shapes, joints, gears and couplings; a gear's joints by theirs. */
+START_TEST(all_objects_have_names)
+{
+    struct sadmm_scene scene = open_words(
+        HEAD ", \"bodies\": [{\"mass\": 1, \"inertia\": [1, 1, 1], \"shapes\": [{\"type\": \"sphere\", \"size\": [1], "
+             "\"name\": \"tip\"}]}, {\"mass\": 1, \"inertia\": [1, 1, 1]}], \"joints\": [{\"kind\": \"revolute\", "
+             "\"body_b\": 0, \"name\": \"left\"}, {\"kind\": \"revolute\", \"body_b\": 1, \"name\": \"right\"}], "
+             "\"gears\": [{\"joint_1\": \"right\", \"coordinate_1\": 5, \"joint_2\": 0, \"coordinate_2\": 5, "
+             "\"name\": \"pair\"}], \"couplings\": [{\"body\": 1, \"name\": \"hand\"}]}");
+    sadmm_world *world = build_scene(&scene);
+    sadmm_shape_id shape;
+    sadmm_joint_id right;
+    sadmm_gear_id gear;
+    sadmm_coupling_id coupling;
+    sadmm_gear_def def;
+    MUST(world, sadmm_world_shape_named(world, "tip", &shape));
+    MUST(world, sadmm_world_joint_named(world, "right", &right));
+    MUST(world, sadmm_world_gear_named(world, "pair", &gear));
+    MUST(world, sadmm_world_coupling_named(world, "hand", &coupling));
+    MUST(world, sadmm_world_gear_def(world, gear, &def));
+    ck_assert_uint_eq(def.joint_1.slot, right.slot);
+    sadmm_world_destroy(world);
+    sadmm_scene_close(&scene);
+
+    scene = open_words(HEAD ", \"bodies\": [{\"mass\": 1, \"inertia\": [1, 1, 1]}], \"joints\": [{\"kind\": "
+                            "\"cylindrical\", \"body_b\": 0}], \"gears\": [{\"joint_1\": \"none\", "
+                            "\"coordinate_1\": 5, \"joint_2\": 0, \"coordinate_2\": 2}]}");
+    struct sadmm_error error = {0};
+    ck_assert_int_eq(sadmm_scene_build(&scene, &world, &error), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_msg(strstr(error.message, "gears[0]") && strstr(error.message, "the name of one joint"), "%s",
+                  error.message);
+    sadmm_scene_close(&scene);
+}
+END_TEST
+
 /* The numbers of a method: those of settings for their own, and what the file says of others. */
 START_TEST(methods_have_their_numbers)
 {
@@ -616,6 +654,7 @@ int main(void)
     tcase_add_test(tests, a_state_of_a_run_comes_back);
     tcase_add_test(tests, what_is_left_out_is_the_default);
     tcase_add_test(tests, names_stand_for_bodies);
+    tcase_add_test(tests, all_objects_have_names);
     tcase_add_test(tests, methods_have_their_numbers);
     tcase_add_test(tests, files_have_no_script);
     tcase_add_test(tests, arguments_are_checked);

@@ -90,6 +90,7 @@ START_TEST(members_are_where_they_were)
     COMPARE(heightfield_def, "");
     COMPARE(mesh_file_def, "");
     COMPARE(query_filter, "");
+    COMPARE(draw, "");
     COMPARE(backend_info, "");
     COMPARE(solve_report, "");
     COMPARE(step_report, "");
@@ -236,6 +237,8 @@ struct later_coordinate {
 struct later_joint_def {
     unsigned char head[offsetof(sadmm_joint_def, coordinates)];
     struct later_coordinate coordinates[6];
+    const char *name;
+    void *user_data;
     double more;
 };
 struct later_body_def {
@@ -296,13 +299,16 @@ START_TEST(parts_may_be_larger_than_the_library_knows)
     j->kind = SADMM_JOINT_REVOLUTE;
     j->body_b = ball;
     joint.coordinates[5].known.armature = 4;
+    joint.name = "hinge", joint.user_data = &world; /* behind the larger coordinates */
     ck_assert_int_eq(sadmm_world_add_joint(world, j, &hinge), SADMM_OK);
     sadmm_joint_def back;
     ck_assert_int_eq(sadmm_world_joint_def(world, hinge, &back), SADMM_OK);
     ck_assert(back.coordinates[5].armature == 4 && back.coordinates[4].armature == 0);
+    ck_assert(strcmp(back.name, "hinge") == 0 && back.user_data == &world);
     GUARD(joint);
     ck_assert_int_eq(sadmm_world_joint_def_sized(world, hinge, j, sizeof joint, sizeof *joint.coordinates), SADMM_OK);
     ck_assert(joint.coordinates[5].known.armature == 4 && joint.coordinates[5].more == 0 && joint.more == 0);
+    ck_assert(strcmp(joint.name, "hinge") == 0 && joint.user_data == &world);
     joint.coordinates[3].more = 1;
     REFUSED(sadmm_world_add_joint(world, j, &hinge), "def: a member at byte ");
     joint.coordinates[5].more = 1;

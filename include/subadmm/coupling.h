@@ -43,6 +43,8 @@ typedef struct sadmm_coupling_def {
                                     midpoint of the step), so at most sqrt(3) times that in total; default infinite */
     double max_torque;           /* N m, likewise */
     bool enabled;                /* default true. If false, no force acts, but the target moves on */
+    const char *name;            /* UTF-8; copied, as many whole characters as fit into 63 bytes; NULL = "" */
+    void *user_data;             /* the caller's, never used by the library; default NULL */
 } sadmm_coupling_def;
 
 /* The defaults named above. Thread-safe. */
@@ -72,6 +74,14 @@ static inline sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_co
     return sadmm_world_coupling_def_sized(world, id, def, sizeof *def);
 }
 
+/* The coupling that has this name, as sadmm_world_body_named. Errors: INVALID_ARGUMENT (none has it, or several). */
+SADMM_API sadmm_status sadmm_world_coupling_named(sadmm_world *world, const char *name, sadmm_coupling_id *id);
+/* Its name; "" as of sadmm_world_body_name. */
+SADMM_API const char *sadmm_world_coupling_name(const sadmm_world *world, sadmm_coupling_id id);
+/* The user_data of its definition, or what was set since; as of sadmm_world_set_body_user_data. Errors: STALE_ID,
+ * OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_world_set_coupling_user_data(sadmm_world *world, sadmm_coupling_id id, void *data);
+SADMM_API void *sadmm_world_coupling_user_data(const sadmm_world *world, sadmm_coupling_id id);
 /* Set the target at the current time of the world, from the next step on: position (m, world), orientation (target to
  * world, w x y z, unit within 1e-6), velocity (linear, angular, world; NULL: 0). May be called before every step (some
  * ten nanoseconds). Jumps are allowed. Errors: STALE_ID, INVALID_ARGUMENT (range; nothing changes), DEVICE. */

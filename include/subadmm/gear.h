@@ -36,6 +36,8 @@ typedef struct sadmm_gear_def {
     double offset;               /* |offset| <= 1e9, unit of coordinate 1, or NaN: the value when the gear is added (in
                                     the same range, and read back); default NaN */
     bool enabled;                /* default true. Inactive if false, or if one of its joints is disabled */
+    const char *name;            /* UTF-8; copied, as many whole characters as fit into 63 bytes; NULL = "" */
+    void *user_data;             /* the caller's, never used by the library; default NULL */
 } sadmm_gear_def;
 
 /* The defaults named above. Thread-safe. */
@@ -65,6 +67,14 @@ static inline sadmm_status sadmm_world_gear_def(sadmm_world *world, sadmm_gear_i
 {
     return sadmm_world_gear_def_sized(world, id, def, sizeof *def);
 }
+/* The gear that has this name, as sadmm_world_body_named. Errors: INVALID_ARGUMENT (none has it, or several). */
+SADMM_API sadmm_status sadmm_world_gear_named(sadmm_world *world, const char *name, sadmm_gear_id *id);
+/* Its name; "" as of sadmm_world_body_name. */
+SADMM_API const char *sadmm_world_gear_name(const sadmm_world *world, sadmm_gear_id id);
+/* The user_data of its definition, or what was set since; as of sadmm_world_set_body_user_data. Errors: STALE_ID,
+ * OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_world_set_gear_user_data(sadmm_world *world, sadmm_gear_id id, void *data);
+SADMM_API void *sadmm_world_gear_user_data(const sadmm_world *world, sadmm_gear_id id);
 /* From the next step on; its offset stays. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_set_gear_enabled(sadmm_world *world, sadmm_gear_id id, bool enabled);
 

@@ -99,6 +99,8 @@ typedef struct sadmm_joint_def {
                                          (norms of the parts of wrench_b) exceeds them in a (sub-)step is disabled from
                                          the next step on */
     sadmm_joint_coordinate coordinates[6]; /* locked ones: all default but for drive_force, which is ignored */
+    const char *name;            /* UTF-8; copied, as many whole characters as fit into 63 bytes; NULL = "" */
+    void *user_data;             /* the caller's, never used by the library; default NULL */
 } sadmm_joint_def;
 
 /* The defaults named above. coordinate_size: of a sadmm_joint_coordinate. Thread-safe. */
@@ -133,6 +135,14 @@ static inline sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint
 {
     return sadmm_world_joint_def_sized(world, id, def, sizeof *def, sizeof *def->coordinates);
 }
+/* The joint that has this name, as sadmm_world_body_named. Errors: INVALID_ARGUMENT (none has it, or several). */
+SADMM_API sadmm_status sadmm_world_joint_named(sadmm_world *world, const char *name, sadmm_joint_id *id);
+/* Its name; "" as of sadmm_world_body_name. */
+SADMM_API const char *sadmm_world_joint_name(const sadmm_world *world, sadmm_joint_id id);
+/* The user_data of its definition, or what was set since; as of sadmm_world_set_body_user_data. Errors: STALE_ID,
+ * OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_world_set_joint_user_data(sadmm_world *world, sadmm_joint_id id, void *data);
+SADMM_API void *sadmm_world_joint_user_data(const sadmm_world *world, sadmm_joint_id id);
 /* From the next step on; enabling a broken joint repairs it. On CUDA, here and below: sent with the next step, without
  * waiting. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled);

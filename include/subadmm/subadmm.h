@@ -4,6 +4,7 @@
 
 #include "arrays.h"
 #include "coupling.h"
+#include "draw.h"
 #include "environments.h"
 #include "events.h"
 #include "gear.h"

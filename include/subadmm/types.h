@@ -68,6 +68,7 @@ typedef struct sadmm_body_def {
     double linear_damping;       /* 1/s, in [0, 1e6]; default 0. c: a force -c mass velocity, so that free motion decays
                                     as exp(-c t), exactly and at any dt */
     double angular_damping;      /* the same of the angular velocity: a torque -c inertia velocity */
+    void *user_data;             /* the caller's, never used by the library; default NULL */
 } sadmm_body_def;
 
 /* The defaults named above. Thread-safe. */
@@ -125,6 +126,8 @@ typedef struct sadmm_shape_def {
     double surface_velocity[3];  /* how the surface moves, as a conveyor belt's does, while the shape stays: m/s, in the
                                     shape's frame, |x| <= 1e6. Contacts see what of it is across their normal. 0 on a
                                     dynamic body; default 0 */
+    const char *name;            /* UTF-8; copied, as many whole characters as fit into 63 bytes; NULL = "" */
+    void *user_data;             /* the caller's, never used by the library; default NULL */
 } sadmm_shape_def;
 
 /* The defaults named above. Thread-safe. */

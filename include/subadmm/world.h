@@ -84,8 +84,8 @@ SADMM_API sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id i
  * orientation (w x y z) are written. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_body_move(sadmm_world *world, sadmm_body_id id, bool *pending, double position[3],
                                              double orientation[4]);
-/* Read back the definition (mass, inertia, type, name, scale of gravity, damping) with the current state. The name is
- * the world's copy, valid until the body is removed or the world destroyed. Errors: STALE_ID, DEVICE. */
+/* Read back the definition (mass, inertia, type, name, user data, scale of gravity, damping) with the current state.
+ * The name is the world's copy, as of sadmm_world_body_name. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_body_def_sized(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def,
                                                   size_t size);
 static inline sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def)
@@ -118,8 +118,16 @@ SADMM_API sadmm_status sadmm_world_apply_body_impulse_at(sadmm_world *world, sad
  * stay. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_body_mass(sadmm_world *world, sadmm_body_id id, double mass,
                                                  const double inertia[3]);
-/* A pointer of the caller's that is stored with the body and never used by the library; NULL until set, for a stale id
- * and for a NULL world. Errors: STALE_ID. */
+/* The body that has this name: names are those of definitions, cut as they are. Looks through all names of bodies.
+ * Errors: INVALID_ARGUMENT (no body has it, several have it, or it is ""; the message says how many). */
+SADMM_API sadmm_status sadmm_world_body_named(sadmm_world *world, const char *name, sadmm_body_id *id);
+/* Its name, "" where it has none, for a stale id and for NULL: the world's copy, valid until the body is removed, or
+ * the world restored or destroyed. */
+SADMM_API const char *sadmm_world_body_name(const sadmm_world *world, sadmm_body_id id);
+/* A pointer of the caller's that is stored with the body and never used by the library: the user_data of its
+ * definition, or what was set since; NULL for a stale id and for a NULL world. A number of up to 64 bits goes through
+ * uintptr_t. It is not saved: sadmm_world_restore (save.h) keeps it with bodies that had the same id before. Errors:
+ * STALE_ID, OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_set_body_user_data(sadmm_world *world, sadmm_body_id id, void *data);
 SADMM_API void *sadmm_world_body_user_data(const sadmm_world *world, sadmm_body_id id);
 /* Sum of the contact wrenches of the last step on the body: force (N), then torque about its centre of mass
@@ -184,6 +192,14 @@ SADMM_API sadmm_status sadmm_world_set_shape_size(sadmm_world *world, sadmm_shap
  * unit length to rounding is taken as it is. Errors: STALE_ID, INVALID_ARGUMENT (range; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_shape_frame(sadmm_world *world, sadmm_shape_id id, const double position[3],
                                                    const double orientation[4]);
+/* The shape that has this name, as sadmm_world_body_named. Errors: INVALID_ARGUMENT (none has it, or several). */
+SADMM_API sadmm_status sadmm_world_shape_named(sadmm_world *world, const char *name, sadmm_shape_id *id);
+/* Its name; "" as of sadmm_world_body_name. */
+SADMM_API const char *sadmm_world_shape_name(const sadmm_world *world, sadmm_shape_id id);
+/* The user_data of its definition, or what was set since; as of sadmm_world_set_body_user_data. Errors: STALE_ID,
+ * OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_world_set_shape_user_data(sadmm_world *world, sadmm_shape_id id, void *data);
+SADMM_API void *sadmm_world_shape_user_data(const sadmm_world *world, sadmm_shape_id id);
 /* Override the pair's friction (mu in [0, 1e6]), or give -1 to return to the geometric mean. Errors: STALE_ID,
  * INVALID_ARGUMENT (range; a and b the same), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b,

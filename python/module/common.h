@@ -16,6 +16,8 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <unordered_map>
+#include <unordered_set>
 
 #include "core/base/names.h"
 #include "scene_file/scene_file.h"
@@ -122,6 +124,14 @@ struct shape_def {
     sadmm_shape_def def = sadmm_shape_def_default();
     std::shared_ptr<hull_holder> hull;
     std::shared_ptr<mesh_holder> mesh;
+    std::string name;
+    // To be given to the library; valid as long as this.
+    sadmm_shape_def named() const
+    {
+        sadmm_shape_def out = def;
+        out.name = name.c_str();
+        return out;
+    }
     bool of_world = false; // it was read of a BodyShape
 };
 
@@ -135,6 +145,21 @@ struct coordinate_of {
 void hold_parts(shape_def &shape);
 // Copies of the Shapes that an argument is a sequence of.
 std::vector<shape_def> read_shapes(const char *name, nb::handle given);
+
+// Objects of Python's that objects of a world have as user data, by keys, 1 and up (tags.h). Under the interpreter's
+// lock.
+struct world;
+struct kept_objects {
+    std::unordered_map<uintptr_t, nb::object> by_key;
+    std::unordered_set<uintptr_t> placing; // on their way to an object
+    uintptr_t last = 0;
+    size_t limit = 64;
+    nb::object get(uintptr_t key) const;
+    uintptr_t add(world &w, nb::object value); // 0: of None
+    void drop(uintptr_t key);
+    void sweep(world &w);
+};
+nb::type_slots collected_world();
 
 // A world, and the script of the scene that it was built from, where there is one. Calls are made without the
 // interpreter's lock and one at a time: it is let go first, then the world's own is taken, and the other way round, so
@@ -156,6 +181,7 @@ struct world {
     int64_t steps = 0; // of the scene
     bool warned = false; // of a step that missed its tolerance
     sadmm_world_def def = sadmm_world_def_default(); // as it was created, with the precision that it has now
+    kept_objects user_data;
     // From now on `made` is its own.
     void take(sadmm_world *made)
     {
@@ -396,3 +422,4 @@ nb::type_slots collected_world();
 void bind_scenes(nb::module_ &m, nb::class_<world> &w);
 void bind_environments(nb::module_ &m);
 void bind_draw(nb::module_ &m);
+void bind_debug_draw(nb::class_<world> &w);

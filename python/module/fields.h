@@ -116,6 +116,7 @@ template <class E> std::enable_if_t<std::is_enum_v<E>, const char *> shown(E x) 
 #define PARAMETER_PLAIN(...) __VA_ARGS__
 #define PARAMETER_DYNAMIC(...) __VA_ARGS__
 #define PARAMETER_OWN(...)
+#define PARAMETER_HIDDEN(...)
 #define PARAMETER_OF_REAL(name) , double name
 #define PARAMETER_OF_BOUND(name) , double name
 #define PARAMETER_OF_FLAG(name) , bool name
@@ -133,6 +134,7 @@ template <class E> std::enable_if_t<std::is_enum_v<E>, const char *> shown(E x) 
 #define ARGUMENT_PLAIN(...) __VA_ARGS__
 #define ARGUMENT_DYNAMIC(...) __VA_ARGS__
 #define ARGUMENT_OWN(...)
+#define ARGUMENT_HIDDEN(...)
 #define ARGUMENT_OF_REAL(name, value) , nb::arg(#name) = (double)(value)
 #define ARGUMENT_OF_BOUND(name, value) , nb::arg(#name) = (double)(value)
 #define ARGUMENT_OF_FLAG(name, value) , nb::arg(#name) = value
@@ -150,6 +152,7 @@ template <class E> std::enable_if_t<std::is_enum_v<E>, const char *> shown(E x) 
 #define PUT_PLAIN(statement) statement
 #define PUT_DYNAMIC(statement) statement
 #define PUT_OWN(statement)
+#define PUT_HIDDEN(statement)
 #define PUT_OF_REAL(def, name) def.name = name;
 #define PUT_OF_BOUND(def, name) def.name = name;
 #define PUT_OF_FLAG(def, name) def.name = name;

@@ -1,5 +1,6 @@
 // Joints, gears and virtual couplings.
 #include "fields.h"
+#include "tags.h"
 
 using C = coordinate_of;
 
@@ -23,7 +24,7 @@ static void bind_coordinate(nb::module_ &m)
 static joint add_joint(nb::handle_t<world> self, const std::string &kind, const std::optional<body> &a,
                        const std::optional<body> &b, std::optional<numbers<3>> position,
                        std::optional<numbers<4>> orientation SADMM_JOINT_FIELDS(PARAMETER, ),
-                       const nb::dict &coordinates)
+                       const nb::dict &coordinates, const std::string &name)
 {
     world &w = nb::cast<world &>(self);
     joint out{nb::borrow(self), &w, {}};
@@ -32,6 +33,7 @@ static joint add_joint(nb::handle_t<world> self, const std::string &kind, const 
     if (a) def.body_a = id_in(w, *a, "a");
     if (b) def.body_b = id_in(w, *b, "b");
     SADMM_JOINT_FIELDS(PUT, def)
+    def.name = without_null("name", name).c_str();
     const vec3 place = position ? position->as("position") : vec3{};
     const quat turn = orientation ? orientation->as("orientation") : quat{1, 0, 0, 0};
     for (auto [k, value] : coordinates) {
@@ -161,6 +163,7 @@ static void bind_joint(nb::module_ &m)
         .def("remove",
              [](const joint &j) { call(j.in(), [&](sadmm_world *h) { return sadmm_world_remove_joint(h, j.id); }); });
     SADMM_JOINT_FIELDS(JOINT_IS, )
+    bind_tags(c);
 #define OF_STATE(name, doc) .def_prop_ro(#name, [](const joint &j) { return array_of<6>(state_of(j).name); }, doc)
     c OF_STATE(position, "Coordinates, m and rad; of locked ones the error.")
         OF_STATE(speed, "m/s and rad/s.")
@@ -178,7 +181,7 @@ static void bind_joint(nb::module_ &m)
 }
 
 static gear add_gear(nb::handle_t<world> self, const joint &a, whole coordinate_a, const joint &b, whole coordinate_b,
-                     double ratio, std::optional<double> offset, bool enabled)
+                     double ratio, std::optional<double> offset, bool enabled, const std::string &name)
 {
     world &w = nb::cast<world &>(self);
     gear out{nb::borrow(self), &w, {}};
@@ -187,17 +190,20 @@ static gear add_gear(nb::handle_t<world> self, const joint &a, whole coordinate_
     def.joint_2 = id_in(w, b, "joint_2"), def.coordinate_2 = coordinate_b.as_int("coordinate_2");
     def.ratio = ratio, def.enabled = enabled;
     if (offset) def.offset = *offset;
+    def.name = without_null("name", name).c_str();
     call(w, [&](sadmm_world *h) { return sadmm_world_add_gear(h, &def, &out.id); });
     return out;
 }
 
-static coupling add_coupling(nb::handle_t<world> self, const body &b SADMM_COUPLING_FIELDS(PARAMETER, ))
+static coupling add_coupling(nb::handle_t<world> self, const body &b SADMM_COUPLING_FIELDS(PARAMETER, ),
+                             const std::string &name)
 {
     world &w = nb::cast<world &>(self);
     coupling out{nb::borrow(self), &w, {}};
     sadmm_coupling_def def = sadmm_coupling_def_default();
     def.body = id_in(w, b, "body");
     SADMM_COUPLING_FIELDS(PUT, def)
+    def.name = without_null("name", name).c_str();
     call(w, [&](sadmm_world *h) { return sadmm_world_add_coupling(h, &def, &out.id); });
     return out;
 }
@@ -225,6 +231,7 @@ static sadmm_coupling_def def_of(const coupling &c)
 #define COUPLING_IS_TURN(name, text)
 #define COUPLING_IS_TWIST(name, text)
 #define COUPLING_IS_ID(name, text)
+#define COUPLING_IS_OTHER(name, text)
 
 static void bind_coupling(nb::module_ &m)
 {
@@ -305,7 +312,12 @@ static void bind_coupling(nb::module_ &m)
             call(c.in(), [&](sadmm_world *h) { return sadmm_world_remove_coupling(h, c.id); });
         });
     SADMM_COUPLING_FIELDS(COUPLING_IS, )
-    nb::class_<gear>(m, "Gear", collected<sadmm_gear_id>(), "A ratio between two coordinates of joints.")
+    bind_tags(c);
+    nb::class_<gear> g(m, "Gear", collected<sadmm_gear_id>(), "A ratio between two coordinates of joints.");
+    bind_tags(g);
+    g.def(
+         "__eq__", [](const gear &a, const gear &b) { return same_id(a, b); }, nb::is_operator())
+        .def("__hash__", &hash_of<sadmm_gear_id>)
         .def_prop_ro("world", [](const gear &g) { return g.owner; })
         .def(
             "set_enabled",
@@ -333,13 +345,14 @@ void bind_joints(nb::module_ &m, nb::class_<world> &w)
     w.def(
         "add_joint", &add_joint, "kind"_a, "a"_a.none() = nb::none(), "b"_a.none() = nb::none(), nb::kw_only(),
         "position"_a = nb::none(), "orientation"_a = nb::none() SADMM_JOINT_FIELDS(ARGUMENT, ),
-        "coordinates"_a = nb::dict(),
+        "coordinates"_a = nb::dict(), "name"_a = "",
         "A joint between body a and body b (None: the static world). kind:\n" SADMM_JOINT_KINDS(KIND_AND_USE, )
         "Frames: `position` and `orientation` in the world at the current poses, or position_a ... in the bodies' "
         "frames.\ncoordinates: {5: Coordinate(drive='speed', target_speed=2)}, what acts along free ones.");
     w.def("add_gear", &add_gear, "joint_1"_a, "coordinate_1"_a, "joint_2"_a, "coordinate_2"_a, "ratio"_a = 1.0,
-          "offset"_a = nb::none(), "enabled"_a = true, "q_1 + ratio q_2 = offset; None: the current value.");
-    w.def("add_coupling", &add_coupling, "body"_a, nb::kw_only() SADMM_COUPLING_FIELDS(ARGUMENT, ),
+          "offset"_a = nb::none(), "enabled"_a = true, "name"_a = "",
+          "q_1 + ratio q_2 = offset; None: the current value.");
+    w.def("add_coupling", &add_coupling, "body"_a, nb::kw_only() SADMM_COUPLING_FIELDS(ARGUMENT, ), "name"_a = "",
           "A virtual coupling of a frame on the body to a target pose in the world. N/m, N s/m, N m/rad, N m s/rad.");
     w.def_prop_ro("joints", [](nb::handle_t<world> self) {
         return all_of<joint>(self, &sadmm_world_joint_count, &sadmm_world_joint_at);
@@ -347,4 +360,7 @@ void bind_joints(nb::module_ &m, nb::class_<world> &w)
     w.def_prop_ro("couplings", [](nb::handle_t<world> self) {
         return all_of<coupling>(self, &sadmm_world_coupling_count, &sadmm_world_coupling_at);
     }, "All couplings.");
+    w.def_prop_ro("gears", [](nb::handle_t<world> self) {
+        return all_of<gear>(self, &sadmm_world_gear_count, &sadmm_world_gear_at);
+    }, "All gears.");
 }

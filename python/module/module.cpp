@@ -99,4 +99,5 @@ NB_MODULE(_core, m)
     bind_scenes(m, w);
     bind_environments(m);
     bind_draw(m);
+    bind_debug_draw(w);
 }

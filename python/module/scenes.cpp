@@ -3,6 +3,7 @@
 #include <cstdlib>
 
 #include "common.h"
+#include "tags.h"
 
 static nb::list list_scenes()
 {
@@ -65,6 +66,7 @@ static std::unique_ptr<world> clone_of(world &w)
     auto made = std::make_unique<world>();
     sadmm_error error{};
     sadmm_status status;
+    const bool tagged = !w.user_data.by_key.empty();
     {
         nb::gil_scoped_release release;
         world_lock lock(w);
@@ -88,6 +90,8 @@ static std::unique_ptr<world> clone_of(world &w)
             status = sadmm_world_restore(copy, bytes.data(), bytes.size());
             if (status != SADMM_OK) snprintf(error.message, sizeof error.message, "%s", sadmm_world_message(copy));
         }
+        if (status == SADMM_OK && tagged)
+            each_key(w.handle, [&](auto id, void *key) { tag_calls<decltype(id)>::set(copy, id, key); });
         made->def = w.def, made->steps = w.steps, made->warned = w.warned;
         // A scene of the library belongs to nobody; one of a file has no script, and is its world's own.
         if (w.scripted && !w.scene.loaded) {
@@ -96,6 +100,8 @@ static std::unique_ptr<world> clone_of(world &w)
         }
     }
     check_error(status, error);
+    made->user_data = w.user_data;
+    made->user_data.placing.clear();
     return made;
 }
 

@@ -130,7 +130,7 @@ static nb::object geometry_of(const shape_def &s)
 #define BIND_VECTOR BIND_AS
 #define BIND_TURN BIND_AS
 #define BIND_SHAPE_TYPE(kind, name) // stays what it is
-#define BIND_OTHER(kind, name)
+#define BIND_OTHER(kind, name) // has a form of its own
 
 void bind_shapes(nb::module_ &m)
 {
@@ -160,6 +160,10 @@ void bind_shapes(nb::module_ &m)
                 return out;
             },
             "A copy of the definition; hulls and meshes are shared.")
+        .def_prop_rw(
+            "name", [](const S &s) { return s.name; },
+            [](S &s, const std::string &name) { change(s, [&](S &t) { t.name = without_null("name", name); }); },
+            "The name of the shape on its body, up to 63 bytes of UTF-8; '': none.")
         .def("geometry", &geometry_of,
              "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.")
         .def_prop_ro(

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "fields.h"
+#include "tags.h"
 
 static void set_settings(nb::handle owner, const std::function<void(settings_of &)> &change)
 {
@@ -101,7 +102,8 @@ static sadmm_status add_shapes(sadmm_world *h, sadmm_body_id body, const std::ve
                                std::string &which)
 {
     for (size_t k = 0; k < shapes.size(); ++k) {
-        const sadmm_status status = sadmm_world_add_shape(h, body, &shapes[k].def, nullptr);
+        const sadmm_shape_def def = shapes[k].named();
+        const sadmm_status status = sadmm_world_add_shape(h, body, &def, nullptr);
         if (status == SADMM_OK) continue;
         if (shapes.size() > 1) which = "shapes[" + std::to_string(k) + "]: ";
         return status;
@@ -150,18 +152,6 @@ static sadmm_body_def def_of(const body &b)
     return def;
 }
 
-static std::string name_of(const body &b)
-{
-    std::string name;
-    call(b.in(), [&](sadmm_world *h) {
-        sadmm_body_def def;
-        const sadmm_status status = sadmm_world_body_def(h, b.id, &def);
-        if (status == SADMM_OK) name = def.name;
-        return status;
-    });
-    return name;
-}
-
 template <size_t N> using member = double (sadmm_body_state::*)[N];
 
 template <size_t N> static void bind_member(nb::class_<body> &c, const char *name, member<N> at, const char *doc)
@@ -182,14 +172,16 @@ template <size_t N> static void bind_member(nb::class_<body> &c, const char *nam
 static shape add_shape(const body &b, const shape_def &given)
 {
     shape out{b.owner, b.w, {}};
-    const sadmm_shape_def def = given.def; // another thread may change it
+    const shape_def taken(given); // another thread may change it
+    const sadmm_shape_def def = taken.named();
     call(b.in(), [&](sadmm_world *h) { return sadmm_world_add_shape(h, b.id, &def, &out.id); });
     return out;
 }
 
 // Poses and velocities are those of the state, and can be set.
 #define BODY_IS(X, kind, role, name, value, lo, hi, ends, text) BODY_IS_##role##_##kind(name, text)
-#define BODY_IS_OWN_OTHER(name, text) c.def_prop_ro(#name, [](const body &b) { return name_of(b); }, text);
+#define BODY_IS_OWN_OTHER(name, text) c.def_prop_ro(#name, &tagged_name<sadmm_body_id>, text);
+#define BODY_IS_HIDDEN_OTHER(name, text) bind_user_data(c);
 #define BODY_IS_PLAIN_BODY_TYPE(name, text) READ_ONLY(c, body, name, text);
 #define BODY_IS_PLAIN_WHOLE(name, text) READ_ONLY(c, body, name, text);
 #define BODY_IS_DYNAMIC_REAL(name, text) READ_ONLY(c, body, name, text);
@@ -293,8 +285,9 @@ static void bind_body(nb::module_ &m)
             [](const body &b) { call(b.in(), [&](sadmm_world *h) { return sadmm_world_remove_body(h, b.id); }); },
             "Remove the body with its shapes, joints and couplings.");
 
-    nb::class_<shape>(m, "BodyShape", collected<sadmm_shape_id>(), "A shape on a body.")
-        .def(
+    nb::class_<shape> s(m, "BodyShape", collected<sadmm_shape_id>(), "A shape on a body.");
+    bind_tags(s);
+    s.def(
             "__eq__", [](const shape &a, const shape &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_shape_id>)
         .def_prop_ro("world", [](const shape &s) { return s.owner; })
@@ -321,8 +314,10 @@ static void bind_body(nb::module_ &m)
                 call(s.in(), [&](sadmm_world *h) {
                     const sadmm_status status = sadmm_world_shape_def(h, s.id, &out.def, nullptr);
                     if (status == SADMM_OK) hold_parts(out); // the world could let go of them
+                    if (status == SADMM_OK) out.name = out.def.name;
                     return status;
                 });
+                out.def.name = nullptr, out.def.user_data = nullptr;
                 out.of_world = true;
                 return out;
             },

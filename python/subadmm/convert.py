@@ -55,7 +55,7 @@ def open_source(source, **options):
     only.
 
     report: what of the source is not in the world, or will not be in a scene file of it. joints: {name: place in the
-    file's list of joints and coordinate}, because joints have no names there.
+    file's list of joints and coordinate}: a joint there may be several of the source.
     """
     from . import scene
 

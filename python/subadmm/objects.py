@@ -57,17 +57,30 @@ def no_such_name(what, name, names):
     return KeyError(f"{name!r}: no {what} has this name" + (f"; is it {' or '.join(map(repr, near))}?" if near else ""))
 
 
-def _body_named(self, name):
-    """The body with the name. KeyError: none has it; ValueError: several have."""
+def _row_named(name, names, what, plural):
     if not isinstance(name, str):
-        raise TypeError(f"name = {name!r}: must be a string; bodies by their rows are World.bodies")
-    names = self.names
+        raise TypeError(f"name = {name!r}: must be a string; {plural} by their rows are World.{plural}")
     rows = [k for k, other in enumerate(names) if other == name]
     if not rows or not name:
-        raise no_such_name("body", name, names)
+        raise no_such_name(what, name, names)
     if len(rows) > 1:
-        raise ValueError(f"name = {name!r}: {len(rows)} bodies have it, rows {rows[0]}, {rows[1]} ... of World.bodies")
-    return self.bodies[rows[0]]
+        raise ValueError(f"name = {name!r}: {len(rows)} {plural} have it, rows {rows[0]}, {rows[1]} ... of World.{plural}")
+    return rows[0]
+
+
+def _body_named(self, name):
+    """The body with the name. KeyError: none has it; ValueError: several have."""
+    return self.bodies[_row_named(name, self.names, "body", "bodies")]
+
+
+def _finder(what, plural):
+    def find(self, name):
+        objects = getattr(self, plural)
+        return objects[_row_named(name, [one.name for one in objects], what, plural)]
+
+    find.__name__ = what
+    find.__doc__ = f"The {what} with the name. KeyError: none has it; ValueError: several have."
+    return find
 
 
 def _has_name(self, name):
@@ -119,7 +132,7 @@ def _quoted(of):
 
 def _of_joint(joint):
     ends = [f"{_id(body)}{_quoted(body)}" if body is not None else "the world" for body in (joint.body_a, joint.body_b)]
-    return f"{joint.index}, {joint.kind}, between {ends[0]} and {ends[1]}"
+    return f"{joint.index}{_quoted(joint)}, {joint.kind}, between {ends[0]} and {ends[1]}"
 
 
 def _of_report(report):
@@ -138,10 +151,10 @@ def _of_world(self):
 def _add_reprs():
     _core.World.__repr__ = _of_world
     _core.Body.__repr__ = _or_removed(lambda b: f"{_id(b)}{_quoted(b)}, {b.type}")
-    _core.BodyShape.__repr__ = _or_removed(lambda s: f"{_id(s)}, {s.definition.type} on {s.body!r}")
+    _core.BodyShape.__repr__ = _or_removed(lambda s: f"{_id(s)}{_quoted(s)}, {s.definition.type} on {s.body!r}")
     _core.Joint.__repr__ = _or_removed(_of_joint)
-    _core.Coupling.__repr__ = _or_removed(lambda c: f"{c.index}, of {c.body!r}")
-    _core.Gear.__repr__ = _or_removed(lambda g: f"with error {g.error:.3g}")
+    _core.Coupling.__repr__ = _or_removed(lambda c: f"{c.index}{_quoted(c)}, of {c.body!r}")
+    _core.Gear.__repr__ = _or_removed(lambda g: f"{_quoted(g)[1:]}{', ' if g.name else ''}with error {g.error:.3g}")
     _core.Report.__repr__ = lambda r: f"<subadmm.Report {_of_report(r)}>"
     _core.Mass.__repr__ = lambda m: f"<subadmm.Mass {m.mass:.6g} kg, centre {m.centre.tolist()}>"
     _core.Certificate.__repr__ = lambda c: f"<subadmm.Certificate ncp_max {c.ncp_max:.3g} m/s, " \
@@ -157,5 +170,7 @@ def add_to_module():
     _add_reprs()
     _core.World.__getitem__ = _body_named
     _core.World.__contains__ = _has_name
+    for what in ("shape", "joint", "gear", "coupling"):
+        setattr(_core.World, what, _finder(what, what + "s"))
     _core.World.body_rows = _body_rows
     _core.World.shape_rows = _shape_rows

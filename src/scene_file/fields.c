@@ -27,6 +27,7 @@
 #define DYNAMIC(type, kind, role, name, ...) DYNAMIC_##role(type, kind, name)
 #define DYNAMIC_PLAIN(type, kind, name)
 #define DYNAMIC_OWN(type, kind, name)
+#define DYNAMIC_HIDDEN(type, kind, name)
 #define DYNAMIC_DYNAMIC(type, kind, name) MEMBER(type, kind, name),
 
 static const struct sadmm_field file_list[] = {

@@ -33,12 +33,9 @@ static sadmm_status read_body_def(const struct sadmm_filler *f, const json_t *ob
                                   sadmm_body_def *def)
 {
     static const char *const needed[] = {"mass", "inertia"};
-    enum { LONGEST_NAME = 63 };
     *def = sadmm_body_def_default();
     TRY(sadmm_read_fields(&f->reader, object, &sadmm_body_fields, def));
-    TRY(sadmm_read_string(&f->reader, object, "name", &def->name));
-    if (def->name && strlen(def->name) > LONGEST_NAME)
-        return sadmm_refuse(&f->reader, "name", "must have at most %d bytes, has %zu", LONGEST_NAME, strlen(def->name));
+    TRY(sadmm_read_object_name(f, object, &def->name));
     const json_t *given = json_object_get(object, "index");
     if (given) {
         int64_t index;
@@ -194,6 +191,7 @@ static sadmm_status read_shape(struct sadmm_filler *f, const json_t *object, siz
         return sadmm_refuse(&f->reader, "size", "is missing, %zu number%s", sizes, sizes > 1 ? "s" : "");
     if (size) TRY(sadmm_read_reals(&f->reader, "size", size, def.size, sizes));
     TRY(read_form(f, object, &def));
+    TRY(sadmm_read_object_name(f, object, &def.name));
     sadmm_before_unit(def.orientation);
     return sadmm_refuse_world(f, sadmm_world_add_shape(f->world, f->bodies[body], &def, id), ": ");
 }

@@ -2,6 +2,7 @@
 #include "filler.h"
 
 #include <stdio.h>
+#include <string.h>
 
 sadmm_status sadmm_refuse_world(const struct sadmm_filler *f, sadmm_status status, const char *joint)
 {
@@ -25,6 +26,15 @@ sadmm_status sadmm_read_number_in(const struct sadmm_filler *f, const json_t *ob
     if (!value) return sadmm_refuse(&f->reader, member, "is missing");
     if (count == 0) return sadmm_refuse(&f->reader, member, "names one of a list that is empty");
     return sadmm_read_whole(&f->reader, member, value, 0, (double)(count - 1), number);
+}
+
+sadmm_status sadmm_read_object_name(const struct sadmm_filler *f, const json_t *object, const char **name)
+{
+    enum { LONGEST_NAME = 63 };
+    TRY(sadmm_read_string(&f->reader, object, "name", name));
+    if (*name && strlen(*name) > LONGEST_NAME)
+        return sadmm_refuse(&f->reader, "name", "must have at most %d bytes, has %zu", LONGEST_NAME, strlen(*name));
+    return SADMM_OK;
 }
 
 /* Numbers of bodies by their names, -1 of a name that several have. */

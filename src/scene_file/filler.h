@@ -24,6 +24,8 @@ struct sadmm_filler {
     size_t mesh_count;
 };
 
+/* The name of the object at hand; NULL: it has none. */
+sadmm_status sadmm_read_object_name(const struct sadmm_filler *f, const json_t *object, const char **name);
 /* A failed call of the world, as sadmm_refuse_as. */
 sadmm_status sadmm_refuse_world(const struct sadmm_filler *f, sadmm_status status, const char *joint);
 /* A failed call without a world: its message is sadmm_last_message. */

@@ -120,6 +120,7 @@ static sadmm_status read_joint(struct sadmm_filler *f, const json_t *object, siz
         return sadmm_refuse(&f->reader, "body_a, body_b", "one of them must be dynamic");
     const json_t *coordinates = json_object_get(object, "coordinates");
     TRY(read_coordinates(f, coordinates, &def));
+    TRY(sadmm_read_object_name(f, object, &def.name));
     def.body_a = body_of(f, bodies[0]);
     def.body_b = body_of(f, bodies[1]);
     sadmm_before_unit(def.orientation_a);
@@ -152,22 +153,36 @@ static sadmm_status read_coupling(struct sadmm_filler *f, const json_t *object, 
     TRY(sadmm_read_fields(&f->reader, object, &sadmm_coupling_fields, &def));
     TRY(sadmm_read_body(f, object, "body", &body));
     if (!moves(f, body)) return sadmm_refuse(&f->reader, "body", "must be a dynamic body");
+    TRY(sadmm_read_object_name(f, object, &def.name));
     def.body = body_of(f, body);
     sadmm_before_unit(def.orientation);
     sadmm_before_unit(def.target_orientation);
     return sadmm_refuse_world(f, sadmm_world_add_coupling(f->world, &def, NULL), ": ");
 }
 
+/* A joint, by its number or its name. */
+static sadmm_status read_joint_of(const struct sadmm_filler *f, const json_t *object, const char *member,
+                                  sadmm_joint_id *id)
+{
+    int64_t number;
+    const json_t *value = json_object_get(object, member);
+    if (json_is_string(value)) {
+        if (sadmm_world_joint_named(f->world, json_string_value(value), id) == SADMM_OK) return SADMM_OK;
+        return sadmm_refuse_value(&f->reader, member, "the name of one joint", value);
+    }
+    TRY(sadmm_read_number_in(f, object, member, f->joint_count, &number));
+    *id = f->joints[number];
+    return SADMM_OK;
+}
+
 static sadmm_status read_gear(struct sadmm_filler *f, const json_t *object, size_t number)
 {
     sadmm_gear_def def = sadmm_gear_def_default();
-    int64_t joints[2];
     (void)number;
     TRY(sadmm_read_fields(&f->reader, object, &sadmm_gear_fields, &def));
-    TRY(sadmm_read_number_in(f, object, "joint_1", f->joint_count, &joints[0]));
-    TRY(sadmm_read_number_in(f, object, "joint_2", f->joint_count, &joints[1]));
-    def.joint_1 = f->joints[joints[0]];
-    def.joint_2 = f->joints[joints[1]];
+    TRY(read_joint_of(f, object, "joint_1", &def.joint_1));
+    TRY(read_joint_of(f, object, "joint_2", &def.joint_2));
+    TRY(sadmm_read_object_name(f, object, &def.name));
     return sadmm_refuse_world(f, sadmm_world_add_gear(f->world, &def, NULL), ": ");
 }
 

@@ -126,6 +126,7 @@ static sadmm_status write_shape(struct sadmm_writer *w, int32_t number, json_t *
     w->shape_place[number] = json_array_size(shapes);
     json_t *shape = sadmm_append_object(w, shapes, &sadmm_shape_fields, &def);
     sadmm_put(w, shape, "index", json_integer(number));
+    sadmm_put_name(w, shape, def.name);
     sadmm_put(w, shape, "size", sadmm_json_reals(def.size, (size_t)sadmm_shape_sizes[def.type]));
     sadmm_append(w, all, json_incref(shape));
     return write_form(w, shape, &def);

@@ -26,6 +26,7 @@ static sadmm_status write_joint(struct sadmm_writer *w, json_t *joints, sadmm_jo
 {
     json_t *joint = sadmm_append_object(w, joints, &sadmm_joint_fields, def),
            *coordinates = sadmm_put(w, joint, "coordinates", json_array());
+    sadmm_put_name(w, joint, def->name);
     sadmm_put(w, joint, "body_a", body_number(w, def->body_a));
     sadmm_put(w, joint, "body_b", body_number(w, def->body_b));
     for (int32_t k = 0; k < 6; ++k) {
@@ -62,6 +63,7 @@ static sadmm_status write_couplings(struct sadmm_writer *w)
         TRY(sadmm_pass_on(w, sadmm_world_coupling_at(w->world, k, &id)));
         TRY(sadmm_pass_on(w, sadmm_world_coupling_def(w->world, id, &def)));
         json_t *coupling = sadmm_append_object(w, couplings, &sadmm_coupling_fields, &def);
+        sadmm_put_name(w, coupling, def.name);
         sadmm_put(w, coupling, "body", body_number(w, def.body));
     }
     return SADMM_OK;
@@ -76,6 +78,7 @@ static sadmm_status write_gears(struct sadmm_writer *w)
         TRY(sadmm_pass_on(w, sadmm_world_gear_at(w->world, k, &id)));
         TRY(sadmm_pass_on(w, sadmm_world_gear_def(w->world, id, &def)));
         json_t *gear = sadmm_append_object(w, gears, &sadmm_gear_fields, &def);
+        sadmm_put_name(w, gear, def.name);
         sadmm_put(w, gear, "joint_1", json_integer(sadmm_slot_number(&w->joint_slots, def.joint_1.slot)));
         sadmm_put(w, gear, "joint_2", json_integer(sadmm_slot_number(&w->joint_slots, def.joint_2.slot)));
     }

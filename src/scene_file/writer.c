@@ -25,6 +25,12 @@ json_t *sadmm_append_object(struct sadmm_writer *w, json_t *array, const struct 
     return object;
 }
 
+void sadmm_put_name(struct sadmm_writer *w, json_t *object, const char *name)
+{
+    json_object_del(object, "name");
+    if (*name) sadmm_put(w, object, "name", json_string(name));
+}
+
 sadmm_status sadmm_pass_on(struct sadmm_writer *w, sadmm_status status)
 {
     return status == SADMM_OK ? status : sadmm_fail(w->error, status, "%s", sadmm_world_message(w->world));

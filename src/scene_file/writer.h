@@ -31,6 +31,8 @@ json_t *sadmm_put(struct sadmm_writer *w, json_t *object, const char *name, json
 json_t *sadmm_append(struct sadmm_writer *w, json_t *array, json_t *value);
 /* An element of an array with members of all fields; NULL as above. */
 json_t *sadmm_append_object(struct sadmm_writer *w, json_t *array, const struct sadmm_fields *fields, const void *from);
+/* The name of an object; one without has no such member. */
+void sadmm_put_name(struct sadmm_writer *w, json_t *object, const char *name);
 /* The number of a slot in a list; it is there. */
 int32_t sadmm_slot_number(const struct sadmm_slot_list *list, uint32_t slot);
 /* The world's error, if there is one. */

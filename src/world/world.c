@@ -87,7 +87,6 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_rows_free(&world->start.rows);
     sadmm_rows_free(&world->last_start.rows);
     sadmm_rows_free(&world->closing);
-    for (SADMM_OBJECTS(slot, &world->body_ids)) sadmm_free(world->bodies[slot].name);
     sadmm_world_free_tables(world);
     sadmm_shape_data_free(&world->shape_data);
     sadmm_query_tree_free(&world->query.tree);

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .model import element, name_of
+from .model import element, name_of, world_name
 from .options import disabled
 from .poses import IDENTITY, mul, pose
 from .wheel import tie_by_wheel
@@ -56,6 +56,7 @@ def _add_loop(loaded, index, weld):
         orientation_b=frame_b[1],
         collide=True,
         enabled=bool(source.eq_active0[index]),
+        name=world_name(name_of(source, "equality", index)),
     )
     loaded.loops[name_of(source, "equality", index)] = joint
     off = np.linalg.norm(joint.position[:3])
@@ -93,7 +94,7 @@ def _add_tie(loaded, index):
     terms = {"ratio": -one.sign * ratio * other.sign, "offset": float(offset),
              "enabled": bool(source.eq_active0[index])}
     try:
-        gear = loaded.world.add_gear(*ends, **terms)
+        gear = loaded.world.add_gear(*ends, **terms, name=world_name(name_of(source, "equality", index)))
     except Error as error:
         try:
             (gear, _), wheel = tie_by_wheel(loaded.world, *ends, **terms)

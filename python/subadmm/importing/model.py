@@ -33,7 +33,7 @@ LONGEST_NAME = 63  # bytes, of a body
 
 
 def world_name(name):
-    """A name as bodies of a world can have it: of a longer one the end."""
+    """A name as objects of a world can have it: of a longer one the end."""
     return name.encode()[-LONGEST_NAME:].decode(errors="ignore")
 
 

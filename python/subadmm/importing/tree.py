@@ -284,6 +284,7 @@ def _add_joint(loaded, data, fit, a, base_a, b, base_b):
         locks=fit.locks,
         collide=True,
         coordinates=coordinates,
+        name=world_name("+".join(name_of(source, "joint", index) for index in fit.joints)),
     )
     types = {1: "ball", 2: "slide", 3: "hinge"}
     for index, (place, sign), offset in zip(fit.joints, fit.places, offsets):

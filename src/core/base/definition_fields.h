@@ -29,7 +29,8 @@ extern "C" {
     F(X, WHOLE, PLAIN, environment, 0, -1, 2147483647, CLOSED, "Bodies of different ones never collide; -1: of all.") \
     F(X, REAL, DYNAMIC, gravity_scale, 1, -1e6, 1e6, CLOSED, "The body's gravity over settings.gravity.")             \
     F(X, REAL, DYNAMIC, linear_damping, 0, 0, 1e6, CLOSED, "1/s.")                                                    \
-    F(X, REAL, DYNAMIC, angular_damping, 0, 0, 1e6, CLOSED, "1/s.")
+    F(X, REAL, DYNAMIC, angular_damping, 0, 0, 1e6, CLOSED, "1/s.")                                                   \
+    F(X, OTHER, HIDDEN, user_data, NULL, 0, 0, ANY, "")
 
 #define SADMM_SHAPE_FIELDS(F, X)                                                                           \
     F(X, SHAPE_TYPE, PLAIN, type, SADMM_SHAPE_SPHERE, 0, 0, ANY, "What it is.")                            \
@@ -45,7 +46,9 @@ extern "C" {
     F(X, OTHER, OWN, hull, NULL, 0, 0, ANY, "")                                                            \
     F(X, OTHER, OWN, mesh, NULL, 0, 0, ANY, "")                                                            \
     F(X, VECTOR, PLAIN, surface_velocity, SADMM_NUMBERS(0, 0, 0), -1e6, 1e6, CLOSED,                       \
-      "How its surface moves while it stays, as a belt's, in its own frame, m/s.")
+      "How its surface moves while it stays, as a belt's, in its own frame, m/s.")                               \
+    F(X, OTHER, OWN, name, NULL, 0, 0, ANY, "The name, up to 63 bytes of UTF-8.")                          \
+    F(X, OTHER, HIDDEN, user_data, NULL, 0, 0, ANY, "")
 
 /* m and N; of rotations rad and N m. */
 #define SADMM_COORDINATE_FIELDS(F, X)                                                                \
@@ -78,7 +81,9 @@ extern "C" {
     F(X, FLAG, PLAIN, enabled, true, 0, 1, ANY, "Whether it does anything.")                                          \
     F(X, BOUND, PLAIN, break_force, INFINITY, 0, INFINITY, CLOSED, "It breaks beyond this force, N.")                 \
     F(X, BOUND, PLAIN, break_torque, INFINITY, 0, INFINITY, CLOSED, "It breaks beyond this torque, N m.")             \
-    F(X, OTHER, OWN, coordinates, SADMM_DEFAULT_COORDINATES, 0, 0, ANY, "What acts along each.")
+    F(X, OTHER, OWN, coordinates, SADMM_DEFAULT_COORDINATES, 0, 0, ANY, "What acts along each.")                      \
+    F(X, OTHER, OWN, name, NULL, 0, 0, ANY, "The name, up to 63 bytes of UTF-8.")                                     \
+    F(X, OTHER, HIDDEN, user_data, NULL, 0, 0, ANY, "")
 #define SADMM_DEFAULT_COORDINATE {SADMM_COORDINATE_FIELDS(SADMM_FIELD_DEFAULT, )}
 #define SADMM_DEFAULT_COORDINATES                                                                            \
     {SADMM_DEFAULT_COORDINATE, SADMM_DEFAULT_COORDINATE, SADMM_DEFAULT_COORDINATE, SADMM_DEFAULT_COORDINATE, \
@@ -98,16 +103,20 @@ extern "C" {
     F(X, REAL, PLAIN, angular_damping, 0, 0, 1e15, CLOSED, "N m s/rad.")                                     \
     F(X, BOUND, PLAIN, max_force, INFINITY, 0, INFINITY, CLOSED, "N, along each axis of the target.")        \
     F(X, BOUND, PLAIN, max_torque, INFINITY, 0, INFINITY, CLOSED, "N m, likewise.")                          \
-    F(X, FLAG, PLAIN, enabled, true, 0, 1, ANY, "Whether its force acts.")
+    F(X, FLAG, PLAIN, enabled, true, 0, 1, ANY, "Whether its force acts.")                                   \
+    F(X, OTHER, OWN, name, NULL, 0, 0, ANY, "The name, up to 63 bytes of UTF-8.")                            \
+    F(X, OTHER, HIDDEN, user_data, NULL, 0, 0, ANY, "")
 
-#define SADMM_GEAR_FIELDS(F, X)                                           \
-    F(X, ID, OWN, joint_1, SADMM_NUMBERS(0, 0), 0, 0, ANY, "")            \
-    F(X, WHOLE, PLAIN, coordinate_1, -1, 0, 5, ANY, "Of joint_1.")        \
-    F(X, ID, OWN, joint_2, SADMM_NUMBERS(0, 0), 0, 0, ANY, "")            \
-    F(X, WHOLE, PLAIN, coordinate_2, -1, 0, 5, ANY, "Of joint_2.")        \
-    F(X, REAL, PLAIN, ratio, 1, 0, 0, ANY, "Its size is in [1e-9, 1e9].") \
-    F(X, MEASURED, PLAIN, offset, NAN, -1e9, 1e9, ANY, "NaN: as it is.")  \
-    F(X, FLAG, PLAIN, enabled, true, 0, 1, ANY, "Whether it acts.")
+#define SADMM_GEAR_FIELDS(F, X)                                                   \
+    F(X, ID, OWN, joint_1, SADMM_NUMBERS(0, 0), 0, 0, ANY, "")                    \
+    F(X, WHOLE, PLAIN, coordinate_1, -1, 0, 5, ANY, "Of joint_1.")                \
+    F(X, ID, OWN, joint_2, SADMM_NUMBERS(0, 0), 0, 0, ANY, "")                    \
+    F(X, WHOLE, PLAIN, coordinate_2, -1, 0, 5, ANY, "Of joint_2.")                \
+    F(X, REAL, PLAIN, ratio, 1, 0, 0, ANY, "Its size is in [1e-9, 1e9].")         \
+    F(X, MEASURED, PLAIN, offset, NAN, -1e9, 1e9, ANY, "NaN: as it is.")          \
+    F(X, FLAG, PLAIN, enabled, true, 0, 1, ANY, "Whether it acts.")               \
+    F(X, OTHER, OWN, name, NULL, 0, 0, ANY, "The name, up to 63 bytes of UTF-8.") \
+    F(X, OTHER, HIDDEN, user_data, NULL, 0, 0, ANY, "")
 
 #define SADMM_HULL_FIELDS(F, X)                                                                          \
     F(X, OTHER, HIDDEN, points, NULL, 0, 0, ANY, "")                                                     \

@@ -97,7 +97,8 @@ static sadmm_status copy_bodies(struct sadmm_environments *environments, sadmm_w
         sadmm_body_def def = sadmm_body_def_default();
         sadmm_body_id id;
         TRY(sadmm_world_body_def_sized(from, sadmm_world_body_id(from, merged->bodies.slots[i]), &def, sizeof def));
-        def.name = NULL;
+        def.name = NULL; /* names and user data are the template's */
+        def.user_data = NULL;
         def.environment = environment * groups + merged->groups[i];
         TRY(sadmm_world_add_body(to, &def, &id));
         to->bodies[id.slot - 1].rigid = from->bodies[merged->bodies.slots[i]].rigid;
@@ -117,6 +118,8 @@ static sadmm_status copy_shapes(struct sadmm_environments *environments, sadmm_w
         sadmm_shape_def def = sadmm_shape_def_default();
         sadmm_shape_id id;
         TRY(sadmm_world_shape_def_sized(from, sadmm_world_shape_id(from, slot), &def, sizeof def, NULL));
+        def.name = NULL;
+        def.user_data = NULL;
         TRY(sadmm_world_add_shape(to, sadmm_world_body_id(to, (size_t)body), &def, &id));
         struct sadmm_shape *made = &to->shapes[id.slot - 1];
         struct sadmm_geometry *geometry = &to->geometries[made->geometry];
@@ -173,6 +176,8 @@ static sadmm_status copy_gears(struct sadmm_environments *environments, sadmm_wo
         size_t joint[2];
         TRY(sadmm_world_gear_def_sized(from, sadmm_world_gear_id(from, slot), &def, sizeof def));
         for (int k = 0; k < 2; ++k) joint[k] = (size_t)slot_in(&merged->joints, environment, (int32_t)own->joint[k]);
+        def.name = NULL;
+        def.user_data = NULL;
         def.joint_1 = sadmm_world_joint_id(to, joint[0]);
         def.joint_2 = sadmm_world_joint_id(to, joint[1]);
         TRY(sadmm_world_add_gear(to, &def, &id));
@@ -189,6 +194,8 @@ static sadmm_status copy_couplings(struct sadmm_environments *environments, sadm
         sadmm_coupling_def def = sadmm_coupling_def_default();
         sadmm_coupling_id id;
         TRY(sadmm_world_coupling_def_sized(from, sadmm_world_coupling_id(from, slot), &def, sizeof def));
+        def.name = NULL;
+        def.user_data = NULL;
         def.body = body_id_in(environments, environment, own->joint.body[1]);
         TRY(sadmm_world_add_coupling(to, &def, &id));
         struct sadmm_world_coupling *made = &to->couplings[id.slot - 1];

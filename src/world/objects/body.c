@@ -6,7 +6,6 @@
 #include "core/base/definition_fields.h"
 #include "core/base/growing.h"
 #include "core/base/memory.h"
-#include "core/base/utf8.h"
 #include "coupling.h"
 #include "joint_slots.h"
 #include "shape.h"
@@ -19,21 +18,6 @@ static const struct sadmm_growing growing = SADMM_GROWING(sadmm_body_def, &defau
 
 void sadmm_body_def_init(sadmm_body_def *def, size_t size) { sadmm_growing_init(&growing, def, size, 0); }
 
-/* A copy of `given`, cut to the characters that fit. */
-static sadmm_status copy_name(const char *given, char **name, struct sadmm_error *error)
-{
-    const size_t length = given ? sadmm_utf8_fit(given, SADMM_NAME_SIZE - 1) : 0;
-    *name = NULL;
-    if (given && given[length] && sadmm_utf8_character(given + length) == 0)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->name: must be UTF-8, its byte %zu (0x%02x) is not",
-                          length, (unsigned char)given[length]);
-    if (length == 0) return SADMM_OK;
-    *name = (char *)sadmm_alloc(length + 1, 1);
-    if (!*name) return sadmm_fail_memory(error, "a body's name");
-    memcpy(*name, given, length);
-    return SADMM_OK;
-}
-
 sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *given, sadmm_body_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
@@ -41,7 +25,6 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *give
     sadmm_body_def taken;
     const sadmm_body_def *const def = &taken;
     double orientation[4];
-    char *name;
     size_t slot;
     TRY(sadmm_growing_take(&growing, &taken, given, "def", error));
     TRY(sadmm_check_given(id, "id", error));
@@ -49,7 +32,7 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *give
     TRY(sadmm_world_detach(world));
     TRY(sadmm_ids_next(&world->body_ids, &slot, error));
     if (!SADMM_GROW(world->bodies, world->body_ids.slots, slot + 1)) return sadmm_fail_memory(error, "a body");
-    TRY(copy_name(def->name, &name, error));
+    TRY(sadmm_tags_set(&world->body_ids.tags, slot, def->name, def->user_data, error));
 
     struct sadmm_world_body *body = &world->bodies[slot];
     memset(body, 0, sizeof *body);
@@ -69,7 +52,6 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *give
     }
     memcpy(rigid->velocity, def->linear_velocity, sizeof def->linear_velocity);
     memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
-    body->name = name;
     sadmm_ids_take(&world->body_ids, slot);
     if (def->type == SADMM_BODY_KINEMATIC) sadmm_world_count_kinematic(world, 1);
     *id = sadmm_world_body_id(world, slot);
@@ -86,8 +68,6 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     sadmm_world_kill_joints_of(world, (int32_t)id.slot - 1);
     sadmm_world_kill_couplings_of(world, (int32_t)id.slot - 1);
     sadmm_pair_table_forget(&world->disabled_pairs, id.slot - 1);
-    sadmm_free(body->name);
-    body->name = NULL;
     sadmm_ids_release(&world->body_ids, id.slot - 1);
     if (body->type == SADMM_BODY_DYNAMIC) --world->dynamic_count;
     if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_count_kinematic(world, -1);
@@ -106,7 +86,8 @@ sadmm_status sadmm_world_body_def_sized(sadmm_world *world, sadmm_body_id id, sa
     sadmm_body_def def = {.type = body->type,
                           .mass = body->rigid.mass,
                           .environment = body->environment,
-                          .name = sadmm_world_body_name(body),
+                          .name = sadmm_tags_name(&world->body_ids.tags, id.slot - 1),
+                          .user_data = sadmm_tags_data(&world->body_ids.tags, id.slot - 1),
                           .gravity_scale = body->rigid.gravity_scale,
                           .linear_damping = body->rigid.damping[0],
                           .angular_damping = body->rigid.damping[1]};
@@ -116,20 +97,4 @@ sadmm_status sadmm_world_body_def_sized(sadmm_world *world, sadmm_body_id id, sa
     memcpy(def.linear_velocity, body->rigid.velocity, sizeof def.linear_velocity);
     memcpy(def.angular_velocity, body->rigid.velocity + 3, sizeof def.angular_velocity);
     return sadmm_growing_give(&growing, out, size, 0, &def, "def", error);
-}
-
-sadmm_status sadmm_world_set_body_user_data(sadmm_world *world, sadmm_body_id id, void *data)
-{
-    TRY(sadmm_check_given(world, "world", NULL));
-    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", &world->error);
-    if (!body) return SADMM_ERROR_STALE_ID;
-    body->user_data = data;
-    return SADMM_OK;
-}
-
-void *sadmm_world_body_user_data(const sadmm_world *world, sadmm_body_id id)
-{
-    struct sadmm_error ignored;
-    const struct sadmm_world_body *body = world ? sadmm_world_find_body(world, id, "id", &ignored) : NULL;
-    return body ? body->user_data : NULL;
 }

@@ -1,6 +1,7 @@
 /* What a world gives out of its last step: contacts and the frozen problem. */
 #include <string.h>
 
+#include "contacts.h"
 #include "core/base/check.h"
 #include "core/base/memory.h"
 #include "core/model/system_math.h"
@@ -8,7 +9,7 @@
 #include "world/state/contact_place.h"
 #include "world/state/ids.h"
 
-static int32_t readable_contacts(const sadmm_world *world)
+int32_t sadmm_world_readable_contacts(const sadmm_world *world)
 {
     if (!world->contacts_readable) return 0;
     return (world->resident.contacts_behind ? world->report.contacts : (int32_t)world->contacts.point_count) +
@@ -19,7 +20,7 @@ int32_t sadmm_world_contact_count(sadmm_world *world)
 {
     if (!world) return 0;
     sadmm_world_synchronise_quietly(world);
-    return readable_contacts(world);
+    return sadmm_world_readable_contacts(world);
 }
 
 /* Pairs are in point order: the pair of a point by bisection. */
@@ -74,7 +75,7 @@ static void read_contact(const sadmm_world *world, const struct sadmm_contact_pa
 
 static sadmm_status check_range(sadmm_world *world, int32_t first, int32_t count)
 {
-    const int32_t total = readable_contacts(world);
+    const int32_t total = sadmm_world_readable_contacts(world);
     if (first < 0 || count < 0 || first > total - count)
         return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
                           "first = %d, count = %d: must be contacts of the last step, which has %d", first, count,
@@ -82,14 +83,8 @@ static sadmm_status check_range(sadmm_world *world, int32_t first, int32_t count
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts)
+void sadmm_world_copy_contacts(const sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts)
 {
-    TRY(sadmm_check_given(world, "world", NULL));
-    TRY(sadmm_world_synchronise(world));
-    TRY(check_range(world, first, count));
-    if (count == 0) return SADMM_OK;
-    TRY(sadmm_check_given(contacts, "contacts", &world->error));
-    TRY(sadmm_world_download_contacts(world));
     const double dt = sadmm_settings_of_substep(&world->step_settings).dt;
     const int32_t points = (int32_t)world->contacts.point_count;
     size_t p = pair_of(&world->contacts, first);
@@ -102,6 +97,17 @@ sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t cou
         while (k >= world->contacts.pairs[p].first + world->contacts.pairs[p].count) ++p;
         read_contact(world, &world->contacts.pairs[p], k, dt, &contacts[k - first]);
     }
+}
+
+sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(sadmm_world_synchronise(world));
+    TRY(check_range(world, first, count));
+    if (count == 0) return SADMM_OK;
+    TRY(sadmm_check_given(contacts, "contacts", &world->error));
+    TRY(sadmm_world_download_contacts(world));
+    sadmm_world_copy_contacts(world, first, count, contacts);
     return SADMM_OK;
 }
 

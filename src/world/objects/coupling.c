@@ -47,8 +47,9 @@ static sadmm_status check_def(const sadmm_world *world, const sadmm_coupling_def
     if (!body) return SADMM_ERROR_STALE_ID;
     if (body->type != SADMM_BODY_DYNAMIC)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->body = (slot %u, generation %u): must be dynamic, it is %s", def->body.slot,
-                          def->body.generation, sadmm_body_type_names[body->type]);
+                          "def->body = (slot %u, generation %u, \"%s\"): must be dynamic, it is %s", def->body.slot,
+                          def->body.generation, sadmm_world_body_name(world, def->body),
+                          sadmm_body_type_names[body->type]);
     return sadmm_fields_check(sadmm_coupling_table, SADMM_COUPLING_FIELDS_COUNT, def, "def->", error);
 }
 
@@ -131,6 +132,9 @@ sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_d
     TRY(sadmm_ids_next(&world->coupling_ids, &slot, error));
     if (!SADMM_GROW(world->couplings, world->coupling_ids.slots, slot + 1))
         return sadmm_fail_memory(error, "a coupling");
+    TRY(sadmm_tags_set(&world->coupling_ids.tags, slot, def->name, def->user_data, error));
+    def->name = NULL; /* both are in the tags */
+    def->user_data = NULL;
     sadmm_ids_take(&world->coupling_ids, slot);
     world->couplings[slot] = made;
     sadmm_world_link_coupling(world, slot);
@@ -162,6 +166,8 @@ sadmm_status sadmm_world_coupling_def_sized(sadmm_world *world, sadmm_coupling_i
     memcpy(def.target_position, target->position, sizeof def.target_position);
     memcpy(def.target_orientation, target->orientation, sizeof def.target_orientation);
     memcpy(def.target_velocity, target->velocity, sizeof def.target_velocity);
+    def.name = sadmm_tags_name(&world->coupling_ids.tags, id.slot - 1);
+    def.user_data = sadmm_tags_data(&world->coupling_ids.tags, id.slot - 1);
     return sadmm_growing_give(&growing, out, size, 0, &def, "def", &world->error);
 }
 

@@ -117,6 +117,9 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *give
     }
     TRY(sadmm_ids_next(&world->gear_ids, &slot, error));
     if (!SADMM_GROW(world->gears, world->gear_ids.slots, slot + 1)) return sadmm_fail_memory(error, "a gear");
+    TRY(sadmm_tags_set(&world->gear_ids.tags, slot, made.def.name, made.def.user_data, error));
+    made.def.name = NULL; /* both are in the tags */
+    made.def.user_data = NULL;
     sadmm_ids_take(&world->gear_ids, slot);
     world->gears[slot] = made;
     sadmm_world_link_gear(world, slot);
@@ -135,12 +138,15 @@ sadmm_status sadmm_world_remove_gear(sadmm_world *world, sadmm_gear_id id)
 
 /* ---- what it is, and what is set --------------------------------------------------------------------------------- */
 
-sadmm_status sadmm_world_gear_def_sized(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def, size_t size)
+sadmm_status sadmm_world_gear_def_sized(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *out, size_t size)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     const struct sadmm_world_gear *gear = sadmm_world_find_gear(world, id, "id", &world->error);
     if (!gear) return SADMM_ERROR_STALE_ID;
-    return sadmm_growing_give(&growing, def, size, 0, &gear->def, "def", &world->error);
+    sadmm_gear_def def = gear->def;
+    def.name = sadmm_tags_name(&world->gear_ids.tags, id.slot - 1);
+    def.user_data = sadmm_tags_data(&world->gear_ids.tags, id.slot - 1);
+    return sadmm_growing_give(&growing, out, size, 0, &def, "def", &world->error);
 }
 
 sadmm_status sadmm_world_set_gear_enabled(sadmm_world *world, sadmm_gear_id id, bool enabled)

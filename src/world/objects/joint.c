@@ -104,13 +104,14 @@ static sadmm_status find_sides(const sadmm_world *world, const sadmm_joint_def *
     TRY(find_side(world, def->body_b, "def->body_b", &slots[1], error));
     if (slots[0] == slots[1] && slots[0] >= 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->body_a = def->body_b = (slot %u, generation %u): must be two bodies", def->body_a.slot,
-                          def->body_a.generation);
+                          "def->body_a = def->body_b = (slot %u, generation %u, \"%s\"): must be two bodies",
+                          def->body_a.slot, def->body_a.generation, sadmm_world_body_name(world, def->body_a));
     if (!moves(world, slots[0]) && !moves(world, slots[1]))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->body_a = (slot %u, generation %u), def->body_b = (slot %u, generation %u): one at "
-                          "least must be dynamic", def->body_a.slot, def->body_a.generation, def->body_b.slot,
-                          def->body_b.generation);
+                          "def->body_a = (slot %u, generation %u, \"%s\"), def->body_b = (slot %u, generation %u, "
+                          "\"%s\"): one at least must be dynamic", def->body_a.slot, def->body_a.generation,
+                          sadmm_world_body_name(world, def->body_a), def->body_b.slot, def->body_b.generation,
+                          sadmm_world_body_name(world, def->body_b));
     return SADMM_OK;
 }
 
@@ -193,15 +194,18 @@ sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_id id)
 
 /* ---- what it is, and what is set --------------------------------------------------------------------------------- */
 
-sadmm_status sadmm_world_joint_def_sized(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def, size_t size,
+sadmm_status sadmm_world_joint_def_sized(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *out, size_t size,
                                          size_t coordinate_size)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
     if (!joint) return SADMM_ERROR_STALE_ID;
-    TRY(sadmm_check_given(def, "def", &world->error));
+    TRY(sadmm_check_given(out, "def", &world->error));
     TRY(sadmm_world_download_joints(world));
-    return sadmm_growing_give(&growing, def, size, coordinate_size, &joint->def, "def", &world->error);
+    sadmm_joint_def def = joint->def;
+    def.name = sadmm_tags_name(&world->joint_ids.tags, id.slot - 1);
+    def.user_data = sadmm_tags_data(&world->joint_ids.tags, id.slot - 1);
+    return sadmm_growing_give(&growing, out, size, coordinate_size, &def, "def", &world->error);
 }
 
 sadmm_status sadmm_world_take_update(sadmm_world *world, struct sadmm_world_joint *joint,

@@ -64,9 +64,12 @@ sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_wor
     TRY(sadmm_ids_next(&world->joint_ids, slot, &world->error));
     if (!SADMM_GROW(world->joints, world->joint_ids.slots, *slot + 1))
         return sadmm_fail_memory(&world->error, "a joint");
+    TRY(sadmm_tags_set(&world->joint_ids.tags, *slot, joint->def.name, joint->def.user_data, &world->error));
     TRY(add_pair(world, joint));
     sadmm_ids_take(&world->joint_ids, *slot);
     world->joints[*slot] = *joint;
+    world->joints[*slot].def.name = NULL; /* both are in the tags */
+    world->joints[*slot].def.user_data = NULL;
     sadmm_world_link_joint(world, *slot);
     return SADMM_OK;
 }

@@ -148,6 +148,7 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
 
     TRY(sadmm_ids_next(&world->shape_ids, &slot, error));
     if (!reserve(world, slot + 1)) return sadmm_fail_memory(error, "a shape");
+    TRY(sadmm_tags_set(&world->shape_ids.tags, slot, def.name, def.user_data, error));
     TRY(sadmm_world_put_shape(world, slot, (int32_t)body_id.slot - 1, &def, error));
     sadmm_ids_take(&world->shape_ids, slot);
     if (id) *id = sadmm_world_shape_id(world, slot);
@@ -201,7 +202,9 @@ sadmm_status sadmm_world_shape_def_sized(sadmm_world *world, sadmm_shape_id id, 
                            .restitution = shape->restitution,
                            .category = shape->category,
                            .mask = shape->mask,
-                           .sensor = shape->sensor};
+                           .sensor = shape->sensor,
+                           .name = sadmm_tags_name(&world->shape_ids.tags, id.slot - 1),
+                           .user_data = sadmm_tags_data(&world->shape_ids.tags, id.slot - 1)};
     memcpy(def.surface_velocity, world->surfaces + 3 * (id.slot - 1), sizeof def.surface_velocity);
     memcpy(def.size, geometry->size, sizeof def.size);
     memcpy(def.position, shape->position, sizeof def.position);

@@ -139,19 +139,30 @@ static sadmm_status check_header(const void *buffer, size_t size, struct sadmm_e
     return SADMM_OK;
 }
 
-static void keep_user_data(sadmm_world *fresh, const sadmm_world *world)
+/* Objects that are there before and after keep what the caller gave them. Errors: OUT_OF_MEMORY. */
+static sadmm_status keep_user_data(struct sadmm_id_pool *fresh, const struct sadmm_id_pool *own,
+                                   struct sadmm_error *error)
 {
-    for (SADMM_OBJECTS(slot, &fresh->body_ids))
-        if (sadmm_ids_has(&world->body_ids, slot) &&
-            fresh->body_ids.generations[slot] == world->body_ids.generations[slot])
-            fresh->bodies[slot].user_data = world->bodies[slot].user_data;
+    for (size_t slot = 0; slot < own->tags.slots; ++slot)
+        if (sadmm_ids_has(own, slot) && sadmm_ids_has(fresh, slot) &&
+            fresh->generations[slot] == own->generations[slot])
+            TRY(sadmm_tags_set_data(&fresh->tags, slot, sadmm_tags_data(&own->tags, slot), error));
+    return SADMM_OK;
+}
+
+static sadmm_status keep_all_user_data(sadmm_world *fresh, const sadmm_world *world, struct sadmm_error *error)
+{
+    TRY(keep_user_data(&fresh->body_ids, &world->body_ids, error));
+    TRY(keep_user_data(&fresh->shape_ids, &world->shape_ids, error));
+    TRY(keep_user_data(&fresh->joint_ids, &world->joint_ids, error));
+    TRY(keep_user_data(&fresh->gear_ids, &world->gear_ids, error));
+    return keep_user_data(&fresh->coupling_ids, &world->coupling_ids, error);
 }
 
 /* The world that was read becomes `world`, and the other way round. What is the caller's stays, and so does a backend's
  * context that can be used again. */
 static void exchange(sadmm_world *world, sadmm_world *fresh)
 {
-    keep_user_data(fresh, world);
     fresh->def.tasks = world->def.tasks;
     fresh->team = world->team;
     sadmm_world_hand_events_on(world, fresh);
@@ -184,6 +195,7 @@ sadmm_status sadmm_world_restore(sadmm_world *world, const void *buffer, size_t 
     archive_world(&reading, fresh);
     if (reading.status == SADMM_OK)
         sadmm_archive_expect(&reading, reading.at == reading.size, "something follows its end");
+    if (reading.status == SADMM_OK) reading.status = keep_all_user_data(fresh, world, error);
     /* Steps begun have nothing to end in; what they say is of no use any more. */
     if (reading.status == SADMM_OK) {
         (void)sadmm_world_synchronise(world);

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "core/base/check.h"
-#include "core/base/utf8.h"
 #include "core/model/rolling.h"
 #include "save_joints.h"
 #include "save_parts.h"
@@ -39,16 +38,6 @@ static void archive_def(struct sadmm_archive *archive, sadmm_world_def *def)
 }
 
 /* ---- bodies ------------------------------------------------------------------------------------------------------ */
-
-static void archive_name(struct sadmm_archive *archive, char **name)
-{
-    size_t length = archive->reading || !*name ? 0 : strlen(*name);
-    sadmm_archive_count(archive, &length, 1, SADMM_NAME_SIZE - 1);
-    if (archive->reading && (length == 0 || !sadmm_archive_room(archive, name, length + 1, 1))) return;
-    if (length > 0) sadmm_archive_bytes(archive, *name, length);
-    if (archive->reading && length > 0 && archive->status == SADMM_OK)
-        sadmm_archive_expect(archive, sadmm_utf8_fit(*name, length) == length, "the name of a body");
-}
 
 static bool body_fits(const sadmm_world *world, const struct sadmm_world_body *body, struct sadmm_error *error)
 {
@@ -92,7 +81,6 @@ static void archive_body(struct sadmm_archive *archive, sadmm_world *world, size
     sadmm_archive_flag(archive, &body->target.set);
     SADMM_ARCHIVE(archive, body->target.position);
     SADMM_ARCHIVE(archive, body->target.orientation);
-    archive_name(archive, &body->name);
     if (!archive->reading) return;
     body->system_body = -1;
     if (archive->status != SADMM_OK || !sadmm_archive_expect(archive, body_fits(world, body, archive->error), "a body"))

@@ -1,5 +1,9 @@
 #include "save_parts.h"
 
+#include <string.h>
+
+#include "core/base/utf8.h"
+
 static void archive_field(struct sadmm_archive *archive, const struct sadmm_field *field, void *at)
 {
     switch (field->kind) {
@@ -26,6 +30,20 @@ void sadmm_archive_fail_memory(struct sadmm_archive *archive)
     if (archive->status == SADMM_OK) archive->status = sadmm_fail_memory(archive->error, "the state of a world");
 }
 
+static void archive_name(struct sadmm_archive *archive, struct sadmm_tags *tags, size_t slot)
+{
+    char name[SADMM_NAME_SIZE] = "";
+    size_t length = archive->reading ? 0 : strlen(sadmm_tags_name(tags, slot));
+    sadmm_archive_count(archive, &length, 1, SADMM_NAME_SIZE - 1);
+    if (!archive->reading) memcpy(name, sadmm_tags_name(tags, slot), length);
+    if (archive->status != SADMM_OK || length == 0) return;
+    sadmm_archive_bytes(archive, name, length);
+    if (!archive->reading || archive->status != SADMM_OK ||
+        !sadmm_archive_expect(archive, sadmm_utf8_fit(name, length) == length, "a name"))
+        return;
+    if (sadmm_tags_set(tags, slot, name, NULL, archive->error) != SADMM_OK) sadmm_archive_fail_memory(archive);
+}
+
 bool sadmm_archive_ids(struct sadmm_archive *archive, struct sadmm_id_pool *pool, void *array, size_t size)
 {
     size_t slots = pool->slots;
@@ -41,6 +59,7 @@ bool sadmm_archive_ids(struct sadmm_archive *archive, struct sadmm_id_pool *pool
         SADMM_ARCHIVE(archive, pool->generations[slot]);
         if (archive->reading && sadmm_archive_expect(archive, pool->generations[slot] > 0, "an id") && taken)
             sadmm_ids_take(pool, slot);
+        if (taken && archive->status == SADMM_OK) archive_name(archive, &pool->tags, slot);
     }
     return archive->status == SADMM_OK;
 }

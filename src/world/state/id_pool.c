@@ -70,6 +70,7 @@ void sadmm_ids_release(struct sadmm_id_pool *pool, size_t slot)
     --pool->count;
     uint32_t *generation = &pool->generations[slot];
     *generation = *generation < UINT32_MAX ? *generation + 1 : 1;
+    sadmm_tags_clear(&pool->tags, slot);
 }
 
 sadmm_status sadmm_ids_check(const struct sadmm_id_pool *pool, uint32_t number, uint32_t generation,
@@ -108,6 +109,7 @@ int32_t sadmm_ids_index(const struct sadmm_id_pool *pool, size_t slot)
 
 void sadmm_ids_free(struct sadmm_id_pool *pool)
 {
+    sadmm_tags_free(&pool->tags);
     sadmm_free(pool->generations);
     sadmm_free(pool->bits);
     sadmm_free(pool->sums);

@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "core/base/error.h"
+#include "tags.h"
 
 /* All but the first members 0: no objects. */
 struct sadmm_id_pool {
@@ -23,6 +24,7 @@ struct sadmm_id_pool {
     uint64_t *bits;               /* slots with an object */
     uint32_t *sums;               /* sums[i], i >= 1: objects in the words [i - (lowest bit of i), i) of these */
     size_t words;                 /* a power of two, or 0 */
+    struct sadmm_tags tags;       /* names and user data; gone with the object */
 };
 
 /* Room for `slots` slots; false, with nothing changed, when memory runs out. */

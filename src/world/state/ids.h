@@ -25,7 +25,4 @@ struct sadmm_world_gear *sadmm_world_find_gear(const sadmm_world *world, sadmm_g
 struct sadmm_world_coupling *sadmm_world_find_coupling(const sadmm_world *world, sadmm_coupling_id id,
                                                        const char *argument, struct sadmm_error *error);
 
-/* "" where it has none. */
-const char *sadmm_world_body_name(const struct sadmm_world_body *body);
-
 #endif

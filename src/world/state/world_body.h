@@ -8,8 +8,6 @@
 #include "subadmm/mesh.h"
 #include "subadmm/types.h"
 
-enum { SADMM_NAME_SIZE = 64 }; /* a name is cut to what fits, with its final 0 */
-
 /* A body slot. Dynamic bodies are numbered in slot order for the solver at every step. */
 struct sadmm_world_body {
     sadmm_body_type type;
@@ -24,8 +22,6 @@ struct sadmm_world_body {
         bool set; /* a kinematic body is to be there after the next step */
         double position[3], orientation[4];
     } target;
-    void *user_data;     /* the caller's */
-    char *name;          /* a block of its own, so that it stays where it is when slots are added; NULL: none */
     uint32_t dirty;                     /* bit of enum sadmm_update_kind: no step has taken that along yet */
     int64_t set_at[SADMM_BODY_UPDATES]; /* steps enqueued since the world was loaded, when that was set; -1: before */
 };

@@ -32,7 +32,8 @@ sadmm_status sadmm_world_slot_not_finite(sadmm_world *world, int32_t slot)
     world->not_finite = slot;
     return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
                       "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it",
-                      slot + 1, world->body_ids.generations[slot], sadmm_world_body_name(&world->bodies[slot]));
+                      slot + 1, world->body_ids.generations[slot],
+                      sadmm_tags_name(&world->body_ids.tags, (size_t)slot));
 }
 
 sadmm_status sadmm_world_gather_kinematic(sadmm_world *world)

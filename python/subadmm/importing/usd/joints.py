@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..model import world_name
 from ..poses import inverse, mul, pose, q_mul, q_of_matrix
 from .stage import ALONG, one_of, quat, value
 
@@ -211,6 +212,7 @@ def _add_joint(loaded, reader, prim):
         break_force=float(value(joint.GetBreakForceAttr(), infinite=True)) * force,
         break_torque=float(value(joint.GetBreakTorqueAttr(), infinite=True)) * force * reader.metre,
         coordinates=coordinates,
+        name=world_name(str(prim.GetPath())),
     )
     loaded.joints[str(prim.GetPath())] = made
     _report_start(reader, prim, made, coordinates)
