@@ -139,6 +139,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     set_or_null(o, "couplings", record, json_integer(last->couplings));
     json_object_set_new(o, "contacts", contacts_json(record));
     json_object_set_new(o, "steps", json_integer((json_int_t)record->steps));
+    json_object_set_new(o, "seconds", cli_json_real((double)record->steps * scene->def.settings.dt));
     json_object_set_new(o, "dt", cli_json_real(scene->def.settings.dt));
     json_object_set_new(o, "substeps", json_integer(scene->def.settings.substeps));
     json_object_set_new(o, "iterations", json_integer(scene->def.settings.iterations));
@@ -149,7 +150,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     else json_object_set_new(o, "residual", json_null());
     json_object_set_new(o, "certificate", certificate_json(record));
     json_object_set_new(o, "stop", stop_json(record, &scene->def.settings));
-    set_or_null(o, "error", record, record->error >= 0 ? cli_json_real(record->error) : json_null());
+    set_or_null(o, "error_max", record, record->error >= 0 ? cli_json_real(record->error) : json_null());
     set_or_null(o, "error_kind", record,
                 record->error >= 0 ? json_string(sadmm_step_error_names[record->error_kind]) : json_null());
     set_or_null(o, "limited_steps", record, json_integer((json_int_t)record->limited_steps));
@@ -177,6 +178,7 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     if (scene->loaded) printf("file           a world at its beginning: no script, no measure of success\n");
     printf("steps          %zu of %g s", record->steps, scene->def.settings.dt);
     if (scene->def.settings.substeps > 1) printf(" in %d sub-steps", scene->def.settings.substeps);
+    printf(", %g s in all", (double)record->steps * scene->def.settings.dt);
     printf("%s\n", interrupted() ? ", interrupted" : "");
     if (record->steps > 0) {
         printf("backend        %s %s, %d thread%s, %d iterations a step (%s)\n", cli_backend_name(last->backend),
