@@ -92,6 +92,12 @@ void bench_write_csv_text(FILE *out, const char *text)
     putc('"', out);
 }
 
+void bench_write_csv_scene(FILE *out, const char *spec)
+{
+    if (strpbrk(spec, ",\"\r\n")) bench_write_csv_text(out, spec);
+    else fputs(spec, out);
+}
+
 int bench_compare_doubles(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;
@@ -165,7 +171,7 @@ int bench_check_scenes(const char *command, const char *const *scenes, int count
     for (int k = 0; k < count; ++k) {
         if (sadmm_scene_open(scenes[k], &scene, &error) != SADMM_OK) {
             fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
-            return 2;
+            return sadmm_scene_is_file(scenes[k]) || sadmm_scene_is_model(scenes[k]) ? 1 : 2;
         }
         sadmm_scene_close(&scene);
     }

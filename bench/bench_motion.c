@@ -76,6 +76,8 @@ static int make_plan(const struct options *o, struct motion_plan *plan)
 {
     struct sadmm_error error;
     struct sadmm_scene *scene = &plan->scene;
+    const int code = bench_check_scenes(command, &o->scene, 1);
+    if (code) return code;
     if (sadmm_scene_open(o->scene, scene, &error) != SADMM_OK) return wrong(error.message);
     const bool heap = scene->info->chaotic;
     double *dt = &scene->def.settings.dt;

@@ -236,6 +236,7 @@ int bench_queries(int argc, char **argv)
         BENCH_NUMBER("threads", &o.threads, 0, 1024, "at most; default 0, all"),
     };
     int code = bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
+    if (code == 0) code = bench_check_scenes(command, &o.scene, 1);
     if (code) return code < 0 ? 0 : code;
     struct sadmm_error error = {SADMM_OK, ""};
     struct bench b = {.error = &error, .count = (int32_t)o.rays, .state = 7};

@@ -156,7 +156,8 @@ static int parse(int argc, char **argv, struct options *o)
         BENCH_NUMBER("iterations", &o->iterations, 1, 100000, "by which two solves differ, default 200, cuda 4000"),
         BENCH_NUMBER("pairs", &o->pairs, 1, MOST_PAIRS, "solves without and with the block in turn, default 21"),
     };
-    return bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
+    const int code = bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
+    return code ? code : bench_check_scenes(command, &o->scene, 1);
 }
 
 static sadmm_status run(const struct options *o, sadmm_problem *const problems[3], struct sadmm_error *error)

@@ -195,9 +195,10 @@ int bench_stand(int argc, char **argv)
     struct stand s = {.scene = &scene};
     int code = parse(argc, argv, &o);
     if (code) return code < 0 ? 0 : code;
+    if ((code = bench_check_scenes(command, &o.scene, 1)) != 0) return code;
     if (sadmm_scene_open(o.scene, &scene, &s.error) != SADMM_OK) {
         fprintf(stderr, "subadmm-bench %s: %s\n", command, s.error.message);
-        return 2;
+        return 1;
     }
     sadmm_settings *settings = &scene.def.settings;
     scene.def.backend = (sadmm_backend)o.backend;
