@@ -62,8 +62,10 @@ static void write_header(const struct sinks *out, const struct options *o)
             "medians of up to %ld steps after %ld, ms; solver: all but collide; ncp_max (m/s), momentum: worst of %ld "
             "certified steps\n",
             o->steps, o->warm_up, o->certified);
-    fprintf(out->table, "%-24s %-5s %4s %-4s %9s %5s %9s %9s %9s %9s %9s %9s %5s %8s %8s %16s\n", "scene", "", "thr",
-            "", "contacts", "iter", "collide", "assemble", "solve", "finish", "solver", "step", "steps", "ncp_max",
+    fprintf(out->table,
+            "thr: CPU threads; iter: iterations a step; steps: timed ones; state: hash of it after the last\n");
+    fprintf(out->table, "%-24s %-5s %4s %-4s %9s %5s %9s %9s %9s %9s %9s %9s %5s %8s %8s %16s\n", "scene", "by", "thr",
+            "in", "contacts", "iter", "collide", "assemble", "solve", "finish", "solver", "step", "steps", "ncp_max",
             "momentum", "state");
 }
 

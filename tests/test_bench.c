@@ -305,6 +305,33 @@ START_TEST(convergence_measures)
 }
 END_TEST
 
+/* Where no ratio can be made, the table says so, and why. */
+START_TEST(convergence_with_nothing_to_compare)
+{
+    static char out[MAX_TEXT];
+    char arguments[256], path[64];
+    snprintf(path, sizeof path, "/tmp/test_bench_%ld.json", (long)getpid());
+    FILE *scene = fopen(path, "w");
+    ck_assert_ptr_nonnull(scene);
+    fputs("{\"format\": \"subadmm scene\", \"format_version\": 1, \"bodies\": [{\"density\": 1000, \"shapes\": ["
+          "{\"type\": \"sphere\", \"size\": [0.1]}]}]}", /* nothing to touch */
+          scene);
+    ck_assert_int_eq(fclose(scene), 0);
+    snprintf(arguments, sizeof arguments, "convergence '%s' --only warm --seconds 0.02", path);
+    ck_assert_int_eq(run(arguments, out), 0);
+    ck_assert_msg(strstr(out, "one of them above): nothing to compare, for no error is above 1e-6 m/s\n"), "%s", out);
+    ck_assert_int_eq(run("convergence --only cold --limit 1 --problem cards", out), 0);
+    ck_assert_msg(strstr(out, "- iterations to 0.001, paper / fast: nothing to compare, fast gets there in none\n"),
+                  "%s", out);
+    ck_assert_msg(strstr(out, "where both get there): nothing to compare, no problem is one that both get to\n"), "%s",
+                  out);
+    ck_assert_ptr_null(strstr(out, "geometric mean"));
+    ck_assert_int_eq(run("convergence --only cold --limit 1 --problem cards --method fast", out), 0);
+    ck_assert_msg(!strstr(out, "paper / fast"), "%s", out); /* of one method there is nothing to say */
+    ck_assert_int_eq(remove(path), 0);
+}
+END_TEST
+
 /* One problem by one method, with fewer iterations than it needs. */
 START_TEST(convergence_of_one_problem)
 {
@@ -494,6 +521,7 @@ int main(void)
     tcase_add_test(cases, scaling_takes_a_file);
     tcase_add_test(cases, convergence_measures);
     tcase_add_test(cases, convergence_of_one_problem);
+    tcase_add_test(cases, convergence_with_nothing_to_compare);
     tcase_add_test(cases, precision_against_a_reference);
     tcase_add_test(cases, precision_of_many_iterations);
     tcase_add_test(cases, ablation_measures);

@@ -285,7 +285,7 @@ END_TEST
 START_TEST(run_prints)
 {
     MUST("run pyramid:2 --steps 3 --certify --explain", 0);
-    static const char *const parts[] = {"pyramid:2, 3 bodies", "ms per step", "certificate", "hash", "weights",
+    static const char *const parts[] = {"pyramid:2, 3 dynamic bodies", "ms per step", "certificate", "hash", "weights",
                                         "20 iterations a step (fast)"};
     for (size_t k = 0; k < sizeof parts / sizeof *parts; ++k)
         ck_assert_msg(strstr(out, parts[k]) != NULL, "no '%s' in\n%s", parts[k], out);
