@@ -284,9 +284,10 @@ void rows_print_warm(const struct rows *rows, const struct series *series, FILE 
         if (!any) {
             print_heading("Warm", series, out);
             fputs("Steps of k iterations that start from the step before; paper / fast. Medians over the last quarter "
-                  "of a run: of the\nnatural map, and of that of the impulses with the velocities that balance momentum. "
-                  "settled: from landing until\nthe natural map stays below 1e-5 m/s, -: it does not. excess: most "
-                  "energy out of nothing, as a height of all\nbodies. limited: steps that slowed an island down.\n\n",
+                  "of a run: of the\nnatural map, and of that of the impulses with the velocities that balance "
+                  "momentum. settled: from landing until\nthe natural map stays below 1e-5 m/s, -: it does not. "
+                  "excess: most energy out of nothing, as a height of all\nbodies. limited: steps that slowed an "
+                  "island down.\n\n",
                   out);
             fprintf(out, "| %-20s | %8s | %4s | %-17s | %-17s | %-13s | %-17s | %-10s | %-13s | |\n", "scene",
                     "contacts", "k", "median, m/s", "balanced, m/s", "settled, s", "excess, mm", "limited, %",
