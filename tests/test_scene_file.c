@@ -1,5 +1,6 @@
 /* Scene files: what is written of a world is read to the same world, bit for bit, and written again to the same text.
  * What is refused, and the schema: test_scene_files.py. */
+#include "config.h"
 #include "core/base/memory.h"
 #include "core/math/quat.h"
 #include "core/model/settings.h"
@@ -511,16 +512,18 @@ END_TEST
 /* A hammer: a head across the end of a handle, in the frame that it was drawn in. The handle, half lengths 0.1 x 0.1 x
  * 1, is at the origin; the head, 0.5 x 0.1 x 0.1, around x = 0.2, z = 1. Where its shapes, a joint and a coupling are
  * in the world stays as drawn, while the body's own frame is that of its principal axes. */
+static const char hammer[] =
+    HEAD ", \"bodies\": [{\"name\": \"hammer\", \"density\": 1000, \"position\": [1, 2, 3], \"orientation\": "
+         "[0.6, 0, 0, 0.8], \"shapes\": [{\"type\": \"box\", \"size\": [0.1, 0.1, 1]}, {\"type\": \"box\", "
+         "\"size\": [0.5, 0.1, 0.1], \"position\": [0.2, 0, 1]}]}], "
+         "\"joints\": [{\"kind\": \"spherical\", \"body_b\": 0, \"position_b\": [0, 0, -1]}], "
+         "\"couplings\": [{\"body\": 0, \"position\": [0.7, 0, 1], \"orientation\": [0, 1, 0, 0]}]}";
+
 START_TEST(density_turns_what_is_on_a_body)
 {
     static const double at[3] = {1, 2, 3}, turn[4] = {0.6, 0, 0, 0.8}, tolerance = 1e-12; /* rounding */
     static const double drawn[][3] = {{0, 0, 0}, {0.2, 0, 1}, {0, 0, -1}, {0.7, 0, 1}};
-    struct sadmm_scene scene = open_words(
-        HEAD ", \"bodies\": [{\"name\": \"hammer\", \"density\": 1000, \"position\": [1, 2, 3], \"orientation\": "
-             "[0.6, 0, 0, 0.8], \"shapes\": [{\"type\": \"box\", \"size\": [0.1, 0.1, 1]}, {\"type\": \"box\", "
-             "\"size\": [0.5, 0.1, 0.1], \"position\": [0.2, 0, 1]}]}], "
-             "\"joints\": [{\"kind\": \"spherical\", \"body_b\": 0, \"position_b\": [0, 0, -1]}], "
-             "\"couplings\": [{\"body\": 0, \"position\": [0.7, 0, 1], \"orientation\": [0, 1, 0, 0]}]}");
+    struct sadmm_scene scene = open_words(hammer);
     sadmm_world *world = build_scene(&scene);
     const sadmm_body_id id = body_at(world, 0);
     const sadmm_body_def body = body_def(world, id);
@@ -564,6 +567,29 @@ START_TEST(density_turns_what_is_on_a_body)
     sadmm_scene_close(&scene);
 }
 END_TEST
+
+#ifdef SADMM_HAVE_QHULL
+/* A hull has the mass of the box that it is, in a frame away from its middle. */
+START_TEST(density_of_hulls)
+{
+    struct sadmm_scene scene = open_words(
+        HEAD ", \"bodies\": [{\"density\": 1000, \"shapes\": [{\"type\": \"hull\", \"hull\": 0}]}], \"hulls\": ["
+             "{\"points\": [[0, 0, 0], [1, 0, 0], [0, 2, 0], [1, 2, 0], [0, 0, 3], [1, 0, 3], [0, 2, 3], "
+             "[1, 2, 3]]}]}");
+    sadmm_world *world = build_scene(&scene);
+    const sadmm_body_def body = body_def(world, body_at(world, 0));
+    static const double middle[3] = {0.5, 1, 1.5};
+    double sum = 0;
+    ck_assert_double_eq_tol(body.mass, 6000, 1e-9);
+    expect_vector(body.position, middle, 3, 1e-12);
+    for (int k = 0; k < 3; ++k) sum += body.inertia[k];
+    ck_assert_double_eq_tol(sum, 6000.0 / 6 * (1 + 4 + 9), 1e-8); /* twice the mass over 12 times the edges' squares */
+    expect_comes_back(&scene, "file", world, 2);
+    sadmm_world_destroy(world);
+    sadmm_scene_close(&scene);
+}
+END_TEST
+#endif
 
 /* The numbers of a method: those of settings for their own, and what the file says of others. */
 START_TEST(methods_have_their_numbers)
@@ -667,13 +693,12 @@ START_TEST(arguments_are_checked)
 END_TEST
 
 /* Each allocation of the library fails once: nothing is lost, and nothing is left in hand. */
-START_TEST(memory_may_run_out)
+/* Wherever it runs out as the text is read and a world built. */
+static void expect_said_without_memory(const char *text, size_t length)
 {
-    struct sadmm_scene scene, file;
-    sadmm_world *world = world_with_everything(&scene), *copy;
-    size_t length;
-    char *text = text_of(&scene, "everything", world, &length);
+    struct sadmm_scene file;
     struct sadmm_error error;
+    sadmm_world *copy;
     bool built = false;
     for (long allocations = 0; !built; ++allocations) {
         ck_assert_int_lt(allocations, 5000);
@@ -687,6 +712,17 @@ START_TEST(memory_may_run_out)
         if (built) sadmm_world_destroy(copy);
         if (opened) sadmm_scene_close(&file);
     }
+}
+
+START_TEST(memory_may_run_out)
+{
+    struct sadmm_scene scene;
+    sadmm_world *world = world_with_everything(&scene);
+    size_t length;
+    char *text = text_of(&scene, "everything", world, &length);
+    struct sadmm_error error;
+    expect_said_without_memory(text, length);
+    expect_said_without_memory(hammer, strlen(hammer));
     bool written = false;
     for (long allocations = 0; !written; ++allocations) {
         ck_assert_int_lt(allocations, 100);
@@ -716,6 +752,9 @@ int main(void)
     tcase_add_test(tests, names_stand_for_bodies);
     tcase_add_test(tests, density_is_mass_and_inertia);
     tcase_add_test(tests, density_turns_what_is_on_a_body);
+#ifdef SADMM_HAVE_QHULL
+    tcase_add_test(tests, density_of_hulls);
+#endif
     tcase_add_test(tests, methods_have_their_numbers);
     tcase_add_test(tests, files_have_no_script);
     tcase_add_test(tests, arguments_are_checked);
