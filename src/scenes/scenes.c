@@ -122,7 +122,8 @@ static sadmm_status refuse_model(const char *path, struct sadmm_error *error)
     const int stem = (int)(strrchr(path, '.') - path);
     return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                       "%.60s: is a robot's file, which the Python package reads: \"python -m subadmm convert %.60s "
-                      "%.*s.json\" makes a scene file of it, \"python -m subadmm view %.60s\" shows it run",
+                      "%.*s.json\" makes a scene file of it, \"python -m subadmm view %.60s\" shows it run; in Python, "
+                      "subadmm.load",
                       path, path, stem < 60 ? stem : 60, path, path);
 }
 
