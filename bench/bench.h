@@ -32,8 +32,12 @@ int bench_machine_threads(void);
 /* Can a backend run in a precision? Else `notes` says why not. */
 bool bench_is_available(sadmm_backend backend, sadmm_precision precision, FILE *notes);
 
-/* Are all of them scenes? Else says on standard error which is not. Returns 0, or an exit status: 2 for a name that is
- * none, 1 for a file. */
+/* Open a scene, or say on standard error why not. Returns 0, or the exit status: 2 for a name that is none, 1 for a
+ * file. */
+struct sadmm_scene;
+int bench_open_scene(const char *command, const char *spec, struct sadmm_scene *scene);
+int bench_scene_status(const char *spec); /* of one that could not be opened */
+/* The same of all of them, closed again. */
 int bench_check_scenes(const char *command, const char *const *scenes, int count);
 
 /* A field of a CSV: quoted, on one line. */

@@ -168,7 +168,7 @@ static sadmm_status measure_overlaps(struct bench *b)
     double least = HUGE_VAL, found = 0;
     double volume = 1;
     for (int k = 0; k < 3; ++k) volume *= fmax(b->highest[k] - b->lowest[k], 1e-6);
-    ball.size[0] = 1.2 * cbrt(volume / sadmm_world_shape_count(b->world));
+    ball.size[0] = fmax(1.2 * cbrt(volume / sadmm_world_shape_count(b->world)), 1e-3); /* one body has no extent */
     for (int k = 0; k < REPEATS && !interrupted(); ++k) {
         const double begin = sadmm_clock_ms();
         b->state = 5;
@@ -236,7 +236,6 @@ int bench_queries(int argc, char **argv)
         BENCH_NUMBER("threads", &o.threads, 0, 1024, "at most; default 0, all"),
     };
     int code = bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
-    if (code == 0) code = bench_check_scenes(command, &o.scene, 1);
     if (code) return code < 0 ? 0 : code;
     struct sadmm_error error = {SADMM_OK, ""};
     struct bench b = {.error = &error, .count = (int32_t)o.rays, .state = 7};
@@ -248,5 +247,5 @@ int bench_queries(int argc, char **argv)
     sadmm_free(b.hits);
     if (status == SADMM_OK) return 0;
     fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
-    return 1;
+    return status == SADMM_ERROR_INVALID_ARGUMENT ? bench_scene_status(o.scene) : 1;
 }

@@ -156,8 +156,7 @@ static int parse(int argc, char **argv, struct options *o)
         BENCH_NUMBER("iterations", &o->iterations, 1, 100000, "by which two solves differ, default 200, cuda 4000"),
         BENCH_NUMBER("pairs", &o->pairs, 1, MOST_PAIRS, "solves without and with the block in turn, default 21"),
     };
-    const int code = bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
-    return code ? code : bench_check_scenes(command, &o->scene, 1);
+    return bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
 }
 
 static sadmm_status run(const struct options *o, sadmm_problem *const problems[3], struct sadmm_error *error)
@@ -203,5 +202,5 @@ int bench_rows(int argc, char **argv)
     for (int k = 0; k < 3; ++k) sadmm_problem_destroy(problems[k]);
     if (status == SADMM_OK) return 0;
     fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
-    return status == SADMM_ERROR_INVALID_ARGUMENT ? 2 : 1;
+    return status == SADMM_ERROR_INVALID_ARGUMENT ? bench_scene_status(o.scene) : 1;
 }

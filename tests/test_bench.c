@@ -212,6 +212,14 @@ START_TEST(scaling_takes_a_file)
         ck_assert_msg(run(arguments, out) == 2 && strstr(out, "is a file that is read: must be another"), "%s: %s",
                       arguments, out);
     }
+    /* read once, so that it may come by a pipe */
+    static const char *const once[] = {"stand --steps 2 --threads 1", "queries --rays 10",
+                                       "rows --iterations 2 --pairs 1"};
+    for (size_t k = 0; k < sizeof once / sizeof *once; ++k) {
+        char script[512];
+        snprintf(script, sizeof script, "cat '%s' | %s %s /dev/stdin >/dev/null 2>&1", path, command, once[k]);
+        ck_assert_msg(system(script) == 0, "%s", script);
+    }
     ck_assert_int_eq(remove(path), 0);
     snprintf(arguments, sizeof arguments, "scaling '%s'", path);
     ck_assert_int_eq(run(arguments, out), 1);
@@ -460,6 +468,10 @@ static const struct {
     {"convergence --budgets 5,0", "--budgets 5,0: must be"},
     {"convergence --scene nowhere", "must be one of"},
     {"convergence --seconds 0", "--seconds 0: must be in (0, 3600]"},
+    {"joints", "--reference '': must be the folder of the tables"},
+    {"queries there", "scene = \"there\": must be one of"},
+    {"rows --scene there", "scene = \"there\": must be one of"},
+    {"motion there", "scene = \"there\": must be one of"},
     {"convergence there", "scene = \"there\": must be one of"},
     {"kernels there", "unexpected argument \"there\""},
     {"stand --steps 0", "--steps 0: must be in [1, 10000000]"},

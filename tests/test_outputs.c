@@ -275,6 +275,8 @@ START_TEST(what_is_no_file_is_written_directly)
     ck_assert_int_eq(sh("$B scaling --sizes 10 --steps 1 --threads 1 --backend cpu --csv /dev/stdout >got 2>log.err"),
                      0);
     ck_assert_int_eq(sh("test $(wc -l <got) = 2"), 0);
+    ck_assert_int_eq(sh("$B environments chain:1 --environments 1 --steps 1 --warm-up 1 --csv - >got 2>log.err"), 0);
+    ck_assert_int_eq(sh("test $(wc -l <got) = 2"), 0);
     /* one that takes anything takes two */
     ck_assert_int_eq(sh("$S run incline --steps 2 --json /dev/null --trace /dev/null" LOGGED), 0);
     expect_in("log.out", "final state");
