@@ -92,6 +92,12 @@ void bench_write_csv_text(FILE *out, const char *text)
     putc('"', out);
 }
 
+void bench_write_csv_scene(FILE *out, const char *spec)
+{
+    if (strpbrk(spec, ",\"\r\n")) bench_write_csv_text(out, spec);
+    else fputs(spec, out);
+}
+
 int bench_compare_doubles(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;
@@ -158,15 +164,22 @@ bool bench_is_available(sadmm_backend backend, sadmm_precision precision, FILE *
     return false;
 }
 
+int bench_scene_status(const char *spec) { return sadmm_scene_is_file(spec) || sadmm_scene_is_model(spec) ? 1 : 2; }
+
+int bench_open_scene(const char *command, const char *spec, struct sadmm_scene *scene)
+{
+    struct sadmm_error error;
+    if (sadmm_scene_open(spec, scene, &error) == SADMM_OK) return 0;
+    fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
+    return bench_scene_status(spec);
+}
+
 int bench_check_scenes(const char *command, const char *const *scenes, int count)
 {
     struct sadmm_scene scene;
-    struct sadmm_error error;
     for (int k = 0; k < count; ++k) {
-        if (sadmm_scene_open(scenes[k], &scene, &error) != SADMM_OK) {
-            fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
-            return 2;
-        }
+        const int code = bench_open_scene(command, scenes[k], &scene);
+        if (code) return code;
         sadmm_scene_close(&scene);
     }
     return 0;

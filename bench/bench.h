@@ -32,11 +32,18 @@ int bench_machine_threads(void);
 /* Can a backend run in a precision? Else `notes` says why not. */
 bool bench_is_available(sadmm_backend backend, sadmm_precision precision, FILE *notes);
 
-/* Are all of them scenes? Else says on standard error which is not; returns 0 or the exit status of wrong usage. */
+/* Open a scene, or say on standard error why not. Returns 0, or the exit status: 2 for a name that is none, 1 for a
+ * file. */
+struct sadmm_scene;
+int bench_open_scene(const char *command, const char *spec, struct sadmm_scene *scene);
+int bench_scene_status(const char *spec); /* of one that could not be opened */
+/* The same of all of them, closed again. */
 int bench_check_scenes(const char *command, const char *const *scenes, int count);
 
 /* A field of a CSV: quoted, on one line. */
 void bench_write_csv_text(FILE *out, const char *text);
+/* A scene: quoted where it is a path that makes it necessary. */
+void bench_write_csv_scene(FILE *out, const char *spec);
 
 int bench_compare_doubles(const void *a, const void *b);
 

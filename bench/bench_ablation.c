@@ -213,7 +213,8 @@ static void measure_scene(struct bench *b, const char *spec)
     sadmm_scene_set_method(&scene, (sadmm_method)b->o->method);
     scene.def.settings.threads = (int)b->o->threads;
     fprintf(b->out,
-            "%s, %ld steps after %ld\n\n| | what | ms a step | times | of it solve | natural map, m/s | same bits |\n"
+            "%s, %ld steps after %ld; times: of the scene as it is; same bits: does it end in the same state\n\n"
+            "| | what | ms a step | times | of it solve | natural map, m/s | same bits |\n"
             "|---|---|---|---|---|---|---|\n",
             spec, b->o->steps, b->o->warm_up);
     for (int k = 0; k < VARIATIONS && !interrupted(); ++k) {

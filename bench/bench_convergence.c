@@ -205,7 +205,6 @@ int bench_convergence(int argc, char **argv)
     struct rows rows = {0};
     struct bench b = {.o = &o, .rows = &rows};
     struct output *csv = NULL;
-    for (int k = 0; k < o.file_count; ++k) outputs_protect(o.files[k]);
     if (o.csv && (status = output_open("--csv", o.csv, OUTPUT_STREAM, &csv)) != 0) return status;
     if (csv) rows_write_header(rows.csv = output_stream(csv));
     for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {

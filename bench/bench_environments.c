@@ -162,27 +162,34 @@ static sadmm_status measure(const struct options *o, const char *scene, int prec
     return status;
 }
 
-static void print(const struct options *o, FILE *csv, const char *scene, int precision, long count, long threads,
-                  const struct figures *f)
+static void print(const struct options *o, FILE *table, FILE *csv, const char *scene, int precision, long count,
+                  long threads, const struct figures *f)
 {
     const char *name = bench_precision_name((sadmm_precision)precision);
     const double unsolved = (double)f->unsolved / ((double)o->steps * (double)count);
-    printf("%-20s %-4s %8ld %7ld %9.2f %9.4g %9.1e %9.1e %9.2g %9.1e %8zu %8.1f\n", scene, name, count, threads, f->us,
-           1 / f->us, f->error_median, f->error_most, unsolved, f->drift, f->memory, f->make_ms);
-    fflush(stdout);
-    if (f->failed > 0) printf("    %ld environments failed\n", f->failed);
-    if (csv)
-        fprintf(csv, "%s,%s,%ld,%ld,%ld,%.4g,%.4g,%.4g,%.4g,%.4g,%zu,%.4g,%ld\n", scene, name, count, threads, o->steps,
-                f->us, f->error_median, f->error_most, unsolved, f->drift, f->memory, f->make_ms, f->failed);
+    fprintf(table, "%-20s %-4s %8ld %7ld %9.2f %9.4g %9.1e %9.1e %9.2g %9.1e %8zu %8.1f\n", scene, name, count, threads,
+            f->us, 1 / f->us, f->error_median, f->error_most, unsolved, f->drift, f->memory, f->make_ms);
+    fflush(table);
+    if (f->failed > 0) fprintf(table, "    %ld environments failed\n", f->failed);
+    if (!csv) return;
+    bench_write_csv_scene(csv, scene);
+    fprintf(csv, ",%s,%ld,%ld,%ld,%.4g,%.4g,%.4g,%.4g,%.4g,%zu,%.4g,%ld\n", name, count, threads, o->steps, f->us,
+            f->error_median, f->error_most, unsolved, f->drift, f->memory, f->make_ms, f->failed);
 }
 
 static sadmm_status run(const struct options *o, FILE *csv, struct sadmm_error *error)
 {
+    FILE *const table = outputs_on_stdout() ? stderr : stdout;
     char machine[128];
     bench_runs_on((sadmm_backend)o->backend, machine, sizeof machine);
-    printf("%s; %ld steps, %s\n", machine, o->steps, o->fixed ? "the scenes' fixed work" : "to the default tolerance");
-    printf("%-20s %-4s %8s %7s %9s %9s %9s %9s %9s %9s %8s %8s\n", "scene", "", "copies", "threads", "us/step", "M/s",
-           "median", "most m/s", "unsolved", "drift m", "bytes", "made ms");
+    fprintf(table, "%s; %ld steps, %s\n", machine, o->steps,
+            o->fixed ? "the scenes' fixed work" : "to the default tolerance");
+    fprintf(table,
+            "us/step: time of a step of one environment; M/s: million such steps a second; median, most: of the true "
+            "errors of\nsteps, m/s; unsolved: share of steps that miss the tolerance; drift: of locked joints; "
+            "bytes: of one environment;\nmade: time to make all of them\n");
+    fprintf(table, "%-20s %-4s %8s %7s %9s %9s %9s %9s %9s %9s %8s %8s\n", "scene", "", "copies", "threads", "us/step",
+            "M/s", "median", "most m/s", "unsolved", "drift m", "bytes", "made ms");
     if (csv)
         fprintf(csv, "scene,precision,environments,threads,steps,us,error_median,error_most,unsolved,drift,bytes,"
                      "make_ms,failed\n");
@@ -193,7 +200,7 @@ static sadmm_status run(const struct options *o, FILE *csv, struct sadmm_error *
                     struct figures figures;
                     if (o->precision >= 0 && o->precision != precision) continue;
                     TRY(measure(o, o->scenes[s], precision, o->counts[n], o->threads[t], &figures, error));
-                    print(o, csv, o->scenes[s], precision, o->counts[n], o->threads[t], &figures);
+                    print(o, table, csv, o->scenes[s], precision, o->counts[n], o->threads[t], &figures);
                 }
     return SADMM_OK;
 }

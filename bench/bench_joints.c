@@ -141,9 +141,11 @@ static sadmm_status run(const struct options *o, struct joint_sample *samples, d
                         struct sadmm_error *error)
 {
     if (!outputs_on_stdout()) {
-        printf("%-20s %7s", "error (rms)", "dt");
+        printf("rms differences from the tables, in their units; dt, s; locked: of the coordinates a joint locks, m; "
+               "worst: the\nlargest over its tolerance\n");
+        printf("%-20s %7s", "case", "dt");
         for (int q = 0; q < JOINT_QUANTITIES; ++q) printf(" %8s", names[q]);
-        printf(" %8s %8s\n", "locked", "worst/tolerance");
+        printf(" %8s %8s\n", "locked", "worst");
     }
     for (size_t k = 0; k < joint_case_count() && !interrupted(); ++k) {
         const struct joint_case *which = joint_case_at(k);
@@ -175,11 +177,11 @@ static int parse(int argc, char **argv, struct options *o)
     };
     int code = bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
     if (code) return code;
-    if (!o->reference) return bench_bad_option(command, "--reference", "", "the folder of the tables");
+    if (!o->reference) return bench_bad_option(command, "reference", "''", "the folder of the tables");
     if (o->dt > 0 && fabs(instant / o->dt - steps_of(o->dt)) > 1e-6) {
         char value[32];
         snprintf(value, sizeof value, "%g", o->dt);
-        return bench_bad_option(command, "--dt", value, "0.01 s over a whole number of at least 2");
+        return bench_bad_option(command, "dt", value, "0.01 s over a whole number of at least 2");
     }
     return 0;
 }

@@ -74,9 +74,9 @@ static int frames_in(double seconds, double dt) { return (int)fmax(1, fmin(1e8, 
 
 static int make_plan(const struct options *o, struct motion_plan *plan)
 {
-    struct sadmm_error error;
     struct sadmm_scene *scene = &plan->scene;
-    if (sadmm_scene_open(o->scene, scene, &error) != SADMM_OK) return wrong(error.message);
+    const int code = bench_open_scene(command, o->scene, scene);
+    if (code) return code;
     const bool heap = scene->info->chaotic;
     double *dt = &scene->def.settings.dt;
     if (o->dt > 0) *dt = o->dt;

@@ -5,6 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/output.h"
+#include "scenes/scenes.h"
+
 enum { MOST_OPTIONS = 32, HELP_COLUMN = 30, FIRST_VALUE = 1000 /* of an option, for getopt: no character */ };
 
 const struct bench_word bench_backends[4] = {
@@ -117,9 +120,38 @@ static int refuse(const char *command, const struct bench_option *o, const char 
     return bench_bad_option(command, o->name, text, allowed);
 }
 
+/* The option that words without one are taken for; NULL: the command takes none. */
+static const struct bench_option *find_scene(const struct bench_option *options, size_t count)
+{
+    for (size_t k = 0; k < count; ++k)
+        if (!strcmp(options[k].name, "scene")) return &options[k];
+    return NULL;
+}
+
+/* No output may be a file that is read: scene files, problem files. */
+static void protect(const struct bench_option *o, const char *text)
+{
+    if ((!strcmp(o->name, "scene") && sadmm_scene_is_file(text)) || !strcmp(o->name, "fclib")) outputs_protect(text);
+}
+
+static int take_scenes(const char *command, const struct bench_option *scene, bool given, int argc, char **argv)
+{
+    for (int k = optind; k < argc; ++k, given = true) {
+        if (!scene || (scene->kind == BENCH_IS_TEXT && given)) {
+            fprintf(stderr, "subadmm-bench %s: unexpected argument \"%s\"\n", command, argv[k]);
+            return 2;
+        }
+        if (!read_value(scene, argv[k])) return refuse(command, scene, argv[k]);
+        protect(scene, argv[k]);
+    }
+    return 0;
+}
+
 static void usage(FILE *out, const char *command, const struct bench_option *options, size_t count, const char *more)
 {
-    fprintf(out, "usage: subadmm-bench %s [options]\n\n", command);
+    const struct bench_option *scene = find_scene(options, count);
+    const char *const operands = !scene ? "" : scene->kind == BENCH_IS_TEXT ? " [SCENE]" : " [SCENE...]";
+    fprintf(out, "usage: subadmm-bench %s%s [options]\n\n", command, operands);
     for (size_t k = 0; k < count; ++k) {
         const struct bench_option *o = &options[k];
         char words[64];
@@ -128,13 +160,19 @@ static void usage(FILE *out, const char *command, const struct bench_option *opt
         const int width = fprintf(out, "  --%s%s%s", o->name, *value ? " " : "", value);
         fprintf(out, "%*s%s\n", width < HELP_COLUMN ? HELP_COLUMN - width : 1, "", o->help);
     }
+    if (scene)
+        fprintf(out,
+                "\nSCENE, the same as --scene: a name (subadmm scenes lists them), name:N or name:N:M; what ends in "
+                ".json\nor has a / in it is a scene file.\n");
     if (more) fprintf(out, "\n%s", more);
 }
 
 int bench_parse(const char *command, const struct bench_option *options, size_t option_count, const char *more,
                 int argc, char **argv)
 {
+    const struct bench_option *const scene = find_scene(options, option_count);
     struct option longs[MOST_OPTIONS + 2] = {{0}};
+    bool scene_given = false;
     for (size_t k = 0; k < option_count; ++k)
         longs[k] = (struct option){options[k].name, options[k].kind != BENCH_IS_FLAG, NULL, FIRST_VALUE + (int)k};
     longs[option_count] = (struct option){"help", no_argument, NULL, 'h'};
@@ -145,8 +183,8 @@ int bench_parse(const char *command, const struct bench_option *options, size_t 
         }
         const struct bench_option *o = &options[found - FIRST_VALUE];
         if (!read_value(o, optarg)) return refuse(command, o, optarg);
+        if (optarg) protect(o, optarg);
+        scene_given = scene_given || o == scene;
     }
-    if (optind == argc) return 0;
-    fprintf(stderr, "subadmm-bench %s: unexpected argument \"%s\"\n", command, argv[optind]);
-    return 2;
+    return take_scenes(command, scene, scene_given, argc, argv);
 }

@@ -49,8 +49,9 @@ struct bench_option {
     {name, NULL, help, BENCH_IS_WORD, to, NULL, 0, 0, words, word_count}
 
 /* Read a command's arguments into where its options point to: bool, const char * (texts: BENCH_LIST of them), long
- * (numbers: BENCH_LIST of them), double, int. `more`: what --help says after the options, or NULL. Returns 0 to go on,
- * -1 after --help, 2 after wrong usage, which was named on standard error. */
+ * (numbers: BENCH_LIST of them), double, int. Where there is an option "scene", words without an option are scenes,
+ * too; the files of these and of "fclib" are protected from outputs. `more`: what --help says after the options, or
+ * NULL. Returns 0 to go on, -1 after --help, 2 after wrong usage, which was named on standard error. */
 int bench_parse(const char *command, const struct bench_option *options, size_t option_count, const char *more,
                 int argc, char **argv);
 

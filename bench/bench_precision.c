@@ -254,7 +254,6 @@ int bench_precision(int argc, char **argv)
     struct output *csv = NULL;
     int status = parse(argc, argv, &o);
     if (status) return status < 0 ? 0 : status;
-    for (int k = 0; k < o.file_count; ++k) outputs_protect(o.files[k]);
     if (o.csv && (status = output_open("--csv", o.csv, OUTPUT_STREAM, &csv)) != 0) return status;
     if (csv) rows_write_header(b.rows.csv = output_stream(csv));
     b.out = outputs_on_stdout() ? stderr : stdout;

@@ -168,7 +168,7 @@ static sadmm_status measure_overlaps(struct bench *b)
     double least = HUGE_VAL, found = 0;
     double volume = 1;
     for (int k = 0; k < 3; ++k) volume *= fmax(b->highest[k] - b->lowest[k], 1e-6);
-    ball.size[0] = 1.2 * cbrt(volume / sadmm_world_shape_count(b->world));
+    ball.size[0] = fmax(1.2 * cbrt(volume / sadmm_world_shape_count(b->world)), 1e-3); /* one body has no extent */
     for (int k = 0; k < REPEATS && !interrupted(); ++k) {
         const double begin = sadmm_clock_ms();
         b->state = 5;
@@ -247,5 +247,5 @@ int bench_queries(int argc, char **argv)
     sadmm_free(b.hits);
     if (status == SADMM_OK) return 0;
     fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
-    return 1;
+    return status == SADMM_ERROR_INVALID_ARGUMENT ? bench_scene_status(o.scene) : 1;
 }

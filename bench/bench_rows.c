@@ -167,9 +167,12 @@ static sadmm_status run(const struct options *o, sadmm_problem *const problems[3
         status = extend(problems[2], problems[k], o->welds, k == 1, error);
     if (status != SADMM_OK) return status;
     sadmm_backend_query((sadmm_backend)o->backend, &info);
-    printf("%s after %ld steps: %d bodies, %d contacts; %ld welds between %ld more bodies\n", o->scene, o->steps,
-           sadmm_problem_body_count(problems[2]), sadmm_problem_contact_count(problems[2]), o->welds, 2 * o->welds);
-    printf("%-6s %-5s %-4s %12s %12s %8s\n", "", "", "", "us/it", "with rows", "ratio");
+    printf("%s after %ld steps: %d bodies, %d contacts; %ld weld%s between %ld more bodies\n", o->scene, o->steps,
+           sadmm_problem_body_count(problems[2]), sadmm_problem_contact_count(problems[2]), o->welds,
+           o->welds == 1 ? "" : "s", 2 * o->welds);
+    printf("us an iteration, without the welds and with them, each as rows; ratio: median over %ld pairs of solves\n",
+           o->pairs);
+    printf("%-6s %-5s %-4s %12s %12s %8s\n", "by", "", "in", "without", "with", "ratio");
     for (int method = 0; method < SADMM_METHOD_COUNT; ++method)
         for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
             struct figures figures;
@@ -199,5 +202,5 @@ int bench_rows(int argc, char **argv)
     for (int k = 0; k < 3; ++k) sadmm_problem_destroy(problems[k]);
     if (status == SADMM_OK) return 0;
     fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
-    return status == SADMM_ERROR_INVALID_ARGUMENT ? 2 : 1;
+    return status == SADMM_ERROR_INVALID_ARGUMENT ? bench_scene_status(o.scene) : 1;
 }

@@ -21,7 +21,7 @@ struct options {
     int method;
     long iterations; /* 0: the scene's */
     long sizes[BENCH_LIST], threads[BENCH_LIST], steps, warm_up, certified, device;
-    int size_count, thread_count;
+    int size_count, thread_count; /* a scene file: one size, 0 */
     double max_seconds;
     const char *csv;
 };
@@ -62,8 +62,10 @@ static void write_header(const struct sinks *out, const struct options *o)
             "medians of up to %ld steps after %ld, ms; solver: all but collide; ncp_max (m/s), momentum: worst of %ld "
             "certified steps\n",
             o->steps, o->warm_up, o->certified);
-    fprintf(out->table, "%-24s %-5s %4s %-4s %9s %5s %9s %9s %9s %9s %9s %9s %5s %8s %8s %16s\n", "scene", "", "thr",
-            "", "contacts", "iter", "collide", "assemble", "solve", "finish", "solver", "step", "steps", "ncp_max",
+    fprintf(out->table,
+            "thr: CPU threads; iter: iterations a step; steps: timed ones; state: hash of it after the last\n");
+    fprintf(out->table, "%-24s %-5s %4s %-4s %9s %5s %9s %9s %9s %9s %9s %9s %5s %8s %8s %16s\n", "scene", "by", "thr",
+            "in", "contacts", "iter", "collide", "assemble", "solve", "finish", "solver", "step", "steps", "ncp_max",
             "momentum", "state");
 }
 
@@ -71,7 +73,8 @@ static void write_csv(FILE *out, const struct row *row)
 {
     const struct scene_timing *t = &row->timing;
     const struct series *s = row->series;
-    fprintf(out, "%s,%s,%d,%s,", row->scene, bench_word_of(bench_backends, (int)s->backend), s->threads,
+    bench_write_csv_scene(out, row->scene);
+    fprintf(out, ",%s,%d,%s,", bench_word_of(bench_backends, (int)s->backend), s->threads,
             bench_precision_name(s->precision));
     bench_write_csv_text(out, s->runs_on);
     if (t->steps > 0)
@@ -120,10 +123,11 @@ static bool run_row(const struct options *o, struct series *s, long size, const 
                                            .certified = (int)o->certified, .seconds = o->max_seconds};
     struct sadmm_scene scene;
     struct sadmm_error error = {SADMM_OK, ""};
-    char spec[96];
-    snprintf(spec, sizeof spec, "%s:%ld", o->scene, size);
+    char sized[96];
+    snprintf(sized, sizeof sized, "%.60s:%ld", o->scene, size);
+    const char *const spec = size > 0 ? sized : o->scene;
     struct row row = {.series = s, .scene = spec, .status = "ok"};
-    double expected_s = s->size > 0 ? s->least_s * (double)size / s->size : 0;
+    double expected_s = s->size > 0 && size > 0 ? s->least_s * (double)size / s->size : 0;
     sadmm_status status = SADMM_OK;
     if (expected_s > o->max_seconds) {
         snprintf(row.status, sizeof row.status, "skipped: would take %.3g s at least, --max-seconds is %g", expected_s,
@@ -194,12 +198,24 @@ static bool run_backend(const struct options *o, sadmm_backend backend, sadmm_pr
 
 /* ---- command line ---------------------------------------------------------------------------------------------- */
 
+/* A file is what it is: one row a series. */
+static int take_file(struct options *o)
+{
+    if (o->size_count > 0) {
+        char size[32];
+        snprintf(size, sizeof size, "%ld", o->sizes[0]);
+        return bench_bad_option(command, "sizes", size, "left out, for a scene file has a size of its own");
+    }
+    o->sizes[o->size_count++] = 0;
+    return bench_check_scenes(command, &o->scene, 1);
+}
+
 static int parse(int argc, char **argv, struct options *o)
 {
     const struct bench_option options[] = {
-        BENCH_TEXT("scene", "NAME", &o->scene, "a scene that takes a size, default sliding_cubes"),
+        BENCH_TEXT("scene", "NAME", &o->scene, "a scene that takes a size, default sliding_cubes; or a scene file"),
         BENCH_NUMBERS("sizes", o->sizes, &o->size_count, 1, 1000000,
-                      "ascending; default 100,500,1000,2000,5000,10000,100000,1000000"),
+                      "ascending; default 100,500,1000,2000,5000,10000,100000,1000000; a file has its own"),
         BENCH_WORD("backend", &o->backend, bench_backends, 4, "all: cpu and cuda (default)"),
         BENCH_NUMBERS("threads", o->threads, &o->thread_count, 1, 1024,
                       "CPU threads at most, default 1,2,4,8,16; more than the machine has are left out"),
@@ -216,6 +232,10 @@ static int parse(int argc, char **argv, struct options *o)
     };
     const int code = bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
     if (code) return code;
+    if (sadmm_scene_is_file(o->scene) || sadmm_scene_is_model(o->scene)) return take_file(o);
+    static const long usual[] = {100, 500, 1000, 2000, 5000, 10000, 100000, 1000000};
+    for (size_t k = 0, given = (size_t)o->size_count; given == 0 && k < sizeof usual / sizeof *usual; ++k)
+        o->sizes[o->size_count++] = usual[k];
     for (int k = 1; k < o->size_count; ++k)
         if (o->sizes[k] <= o->sizes[k - 1]) {
             char sizes[64];
@@ -244,8 +264,6 @@ int bench_scaling(int argc, char **argv)
         .backend = SADMM_BACKEND_AUTO,
         .precision = SADMM_F32,
         .method = SADMM_METHOD_FAST,
-        .sizes = {100, 500, 1000, 2000, 5000, 10000, 100000, 1000000},
-        .size_count = 8,
         .threads = {1, 2, 4, 8, 16},
         .thread_count = 5,
         .steps = 20,

@@ -195,10 +195,7 @@ int bench_stand(int argc, char **argv)
     struct stand s = {.scene = &scene};
     int code = parse(argc, argv, &o);
     if (code) return code < 0 ? 0 : code;
-    if (sadmm_scene_open(o.scene, &scene, &s.error) != SADMM_OK) {
-        fprintf(stderr, "subadmm-bench %s: %s\n", command, s.error.message);
-        return 2;
-    }
+    if ((code = bench_open_scene(command, o.scene, &scene)) != 0) return code;
     sadmm_settings *settings = &scene.def.settings;
     scene.def.backend = (sadmm_backend)o.backend;
     scene.def.precision = (sadmm_precision)o.precision;

@@ -53,8 +53,10 @@ static void print_heading(struct tally *tally)
             "verdict,case,variant,parameter,value,backend,precision,dt,iterations,tolerance,steps,unsolved,measured\n",
             tally->csv);
     if (!outputs_on_stdout())
-        printf("%-5s  %-14s  %-32s  %-8s  %-7s  %-9s  %13s  %6s  %s\n", "", "case", "parameter", "by", "dt",
-               "its./tol.", "unsolved/steps", "s", "measured and bound");
+        printf(
+            "its./tol.: iterations a step at most, and the tolerance, m/s; unsolved: steps that miss it; s: wall time\n"
+            "%-5s  %-14s  %-32s  %-8s  %-7s  %-9s  %13s  %6s  %s\n",
+            "", "case", "parameter", "by", "dt", "its./tol.", "unsolved/steps", "s", "measured and bound");
 }
 
 static void print_row(struct tally *tally, const struct stress *s, double seconds)

@@ -106,6 +106,7 @@ static const struct row *counterpart(const struct rows *rows, const struct row *
 /* paper / fast of some quantity, over problems. */
 struct ratios {
     double log_sum, worst;
+    int pairs;         /* rows of both methods there were */
     int count, bounds; /* bounds: counted with the limit, for paper did not get there */
     int lost;          /* fast did not get there, paper did */
     const char *worst_name;
@@ -121,11 +122,23 @@ static void ratios_add(struct ratios *r, double paper, double fast, const char *
     }
 }
 
-static void ratios_print(const struct ratios *r, const char *what, const char *unreached, FILE *out)
+/* Two decimals, or two digits of what these would round to nothing. */
+static const char *ratio_text(double ratio, char text[24])
 {
-    if (r->count == 0) return;
-    fprintf(out, "- %s: geometric mean %.2f over %d, worst %.2f (%s)", what, exp(r->log_sum / r->count), r->count,
-            r->worst, r->worst_name);
+    snprintf(text, 24, ratio < 0.1 ? "%.2g" : "%.2f", ratio);
+    return text;
+}
+
+/* none: why there is no ratio at all. */
+static void ratios_print(const struct ratios *r, const char *what, const char *unreached, const char *none, FILE *out)
+{
+    char mean[24], worst[24];
+    if (r->pairs == 0) return;
+    fprintf(out, "- %s: ", what);
+    if (r->count == 0) fprintf(out, "nothing to compare, %s", none);
+    else
+        fprintf(out, "geometric mean %s over %d, worst %s (%s)", ratio_text(exp(r->log_sum / r->count), mean), r->count,
+                ratio_text(r->worst, worst), r->worst_name);
     if (r->bounds) fprintf(out, "; in %d of them %s, so that theirs is a lower bound", r->bounds, unreached);
     if (r->lost) fprintf(out, "; **%d not counted that only paper reaches**", r->lost);
     putc('\n', out);
@@ -174,6 +187,7 @@ static void print_cold_ratios(const struct rows *rows, const struct series *seri
             continue;
         const struct row *fast = counterpart(rows, paper, SADMM_METHOD_FAST);
         if (!fast) continue;
+        ++iterations.pairs, ++times.pairs;
         if (fast->iterations == 0) {
             if (paper->iterations) ++iterations.lost;
             continue;
@@ -183,9 +197,9 @@ static void print_cold_ratios(const struct rows *rows, const struct series *seri
         if (paper->iterations) ratios_add(&times, paper->ms, fast->ms, paper->name);
     }
     snprintf(what, sizeof what, "iterations to %g, paper / fast", tolerances[t]);
-    ratios_print(&iterations, what, "paper does not get there within the limit", out);
+    ratios_print(&iterations, what, "paper does not get there within the limit", "fast gets there in none", out);
     snprintf(what, sizeof what, "time to %g, paper / fast (where both get there)", tolerances[t]);
-    ratios_print(&times, what, "", out);
+    ratios_print(&times, what, "", "no problem is one that both get to", out);
 }
 
 static void print_heading(const char *what, const struct series *s, FILE *out)
@@ -205,6 +219,8 @@ void rows_print_cold(const struct rows *rows, const struct series *series, FILE 
         const struct row *r = &rows->rows[k];
         if (!any) {
             print_heading("Cold", series, out);
+            fprintf(out, "Iterations, and ms, from no impulses to a natural map of 1e-3 / 1e-4 / 1e-6 m/s. > N: not "
+                         "within N. -: not reached,\nor not measured.\n\n");
             fprintf(out, "| %-32s | %6s | %11s | %-21s | %-21s | %-21s | %-21s |\n", "problem", "bodies", "constraints",
                     "paper: iterations", "fast: iterations", "paper: ms", "fast: ms");
             fprintf(out, "|---|---|---|---|---|---|---|\n");
@@ -267,6 +283,12 @@ void rows_print_warm(const struct rows *rows, const struct series *series, FILE 
         if (r->method == SADMM_METHOD_FAST && paper) continue;
         if (!any) {
             print_heading("Warm", series, out);
+            fputs("Steps of k iterations that start from the step before; paper / fast. Medians over the last quarter "
+                  "of a run: of the\nnatural map, and of that of the impulses with the velocities that balance "
+                  "momentum. settled: from landing until\nthe natural map stays below 1e-5 m/s, -: it does not. "
+                  "excess: most energy out of nothing, as a height of all\nbodies. limited: steps that slowed an "
+                  "island down.\n\n",
+                  out);
             fprintf(out, "| %-20s | %8s | %4s | %-17s | %-17s | %-13s | %-17s | %-10s | %-13s | |\n", "scene",
                     "contacts", "k", "median, m/s", "balanced, m/s", "settled, s", "excess, mm", "limited, %",
                     "step, ms");
@@ -276,6 +298,7 @@ void rows_print_warm(const struct rows *rows, const struct series *series, FILE 
         print_warm_row(paper, fast, out);
         /* An error below 1e-6 m/s counts as that: less does not matter to anybody. */
         double p = paper ? fmax(paper->ncp_balanced, 1e-6) : NAN, f = fast ? fmax(fast->ncp_balanced, 1e-6) : NAN;
+        ratios.pairs += paper && fast;
         if (p > 1e-6 || f > 1e-6) {
             snprintf(names[pairs], sizeof names[pairs], "%.63s, k = %d", r->name, r->iterations);
             if (p / f > 0) ratios_add(&ratios, p, f, names[pairs]);
@@ -284,6 +307,7 @@ void rows_print_warm(const struct rows *rows, const struct series *series, FILE 
     }
     if (!any) return;
     putc('\n', out);
-    ratios_print(&ratios, "balanced error, paper / fast (not below 1e-6 m/s, one of them above)", "", out);
+    ratios_print(&ratios, "balanced error, paper / fast (not below 1e-6 m/s, one of them above)", "",
+                 "for no error is above 1e-6 m/s", out);
     putc('\n', out);
 }

@@ -7,7 +7,7 @@
 #include "bench.h"
 #include "core/base/memory.h"
 
-static const double moved = 1e-3; /* m */
+const double motion_least = 1e-3;
 
 /* ---- a world's frames ------------------------------------------------------------------------------------------ */
 
@@ -88,7 +88,7 @@ sadmm_status track_compare(const struct track *track, const struct track *refere
             const double distance = largest_distance(track, run, (int)i, reference, NULL);
             const sadmm_body_state *start = &reference->start[(size_t)run * bodies + i];
             out->largest = fmax(out->largest, distance);
-            if (largest_distance(reference, run, (int)i, NULL, start) > moved) distances[count++] = distance;
+            if (largest_distance(reference, run, (int)i, NULL, start) > motion_least) distances[count++] = distance;
         }
     qsort(distances, count, sizeof *distances, bench_compare_doubles);
     if (count > 0) out->median = 0.5 * (distances[(count - 1) / 2] + distances[count / 2]);

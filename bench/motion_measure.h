@@ -27,6 +27,8 @@ struct motion_error {
     double median, largest;
 };
 struct motion_error motion_error_none(void);
+/* m: bodies that move by less are not in the median. */
+extern const double motion_least;
 
 /* Poses along runs of the same scene: `points` times a run, body_count states each, `runs` of them. Starts with these
  * two numbers and the rest zero; motion_run does what else there is to do. */

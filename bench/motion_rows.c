@@ -49,6 +49,8 @@ static void print_head(const struct motion_study *s, const char *runs_on, FILE *
     fprintf(out, "reference: dt %.4g ms, %d iterations; half as fine is %s mm away (at most %s)\n",
             1e3 * reference_dt(plan), plan->reference_iterations, mm_text(median, s->floor.median),
             mm_text(largest, s->floor.largest));
+    fprintf(out, "error: median of the bodies that move by more than %g mm, -: none does; at most: of all\n",
+            1e3 * motion_least);
     fprintf(out, "* none is faster and closer, ** least product of both; solver: to many iterations of the same step; "
                  "step: of those to the reference\n\n");
     fprintf(out, "%-4s %8s %4s %5s %9s  | %8s %8s %8s %8s | %8s %8s %8s %8s %8s %8s  %s\n", "", "", "sub-", "",

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include "run_suite.h"
 
@@ -172,6 +173,62 @@ START_TEST(scaling_says_what_it_skips)
 }
 END_TEST
 
+/* A file has one size, its own, and steps as the scene that it was written of. */
+START_TEST(scaling_takes_a_file)
+{
+    static struct table table, file;
+    static char out[MAX_TEXT];
+    char arguments[512], path[64];
+    const char *const common = "--threads 1 --backend cpu --precision f64 --steps 3 --warm-up 2";
+    snprintf(path, sizeof path, "/tmp/test_bench, %ld.json", (long)getpid()); /* which a CSV must quote */
+    FILE *scene = fopen(path, "w");
+    ck_assert_ptr_nonnull(scene);
+    fputs("{\"format\": \"subadmm scene\", \"format_version\": 1, \"bodies\": [{\"density\": 1000, \"shapes\": ["
+          "{\"type\": \"sphere\", \"size\": [0.1]}], \"position\": [0, 0, 0.1]}, {\"type\": \"static\", \"shapes\": ["
+          "{\"type\": \"plane\"}]}]}",
+          scene);
+    ck_assert_int_eq(fclose(scene), 0);
+    for (int k = 0; k < 2; ++k) { /* with --scene, and as a word */
+        snprintf(arguments, sizeof arguments, "scaling %s '%s' %s --csv %s", k ? "" : "--scene", path, common,
+                 csv_path);
+        const int code = run(arguments, out);
+        ck_assert_msg(code == 0, "exit code %d\n%s", code, out);
+        read_csv(csv_path, k ? &file : &table);
+    }
+    ck_assert_int_eq(table.rows, 1);
+    ck_assert_str_eq(field(&table, 0, "scene"), path);
+    ck_assert_str_eq(field(&table, 0, "status"), "ok");
+    ck_assert(number(&table, 0, "bodies") == 1 && number(&table, 0, "contacts") == 1);
+    ck_assert_str_eq(field(&table, 0, "state_hash"), field(&file, 0, "state_hash"));
+    snprintf(arguments, sizeof arguments, "scaling '%s' --sizes 10", path);
+    ck_assert_int_eq(run(arguments, out), 2);
+    ck_assert_msg(strstr(out, "--sizes 10: must be left out, for a scene file has a size of its own"), "%s", out);
+    /* nothing is written over it, by any command that takes scenes and writes */
+    static const char *const writers[] = {"scaling",   "ablation --quick", "convergence --only warm",
+                                          "precision", "environments",     "motion"};
+    for (size_t k = 0; k < sizeof writers / sizeof *writers; ++k) {
+        snprintf(arguments, sizeof arguments, "%s '%s' --csv '%s'", writers[k], path, path);
+        if (!strcmp(writers[k], "motion")) snprintf(arguments, sizeof arguments, "motion '%s' --json '%s'", path, path);
+        ck_assert_msg(run(arguments, out) == 2 && strstr(out, "is a file that is read: must be another"), "%s: %s",
+                      arguments, out);
+    }
+    /* read once, so that it may come by a pipe */
+    static const char *const once[] = {"stand --steps 2 --threads 1", "queries --rays 10",
+                                       "rows --iterations 2 --pairs 1"};
+    for (size_t k = 0; k < sizeof once / sizeof *once; ++k) {
+        char script[512];
+        snprintf(script, sizeof script, "cat '%s' | %s %s /dev/stdin >/dev/null 2>&1", path, command, once[k]);
+        ck_assert_msg(system(script) == 0, "%s", script);
+    }
+    ck_assert_int_eq(remove(path), 0);
+    snprintf(arguments, sizeof arguments, "scaling '%s'", path);
+    ck_assert_int_eq(run(arguments, out), 1);
+    ck_assert_msg(strstr(out, "could not be opened"), "%s", out);
+    ck_assert_int_eq(run("scaling robot.urdf", out), 1);
+    ck_assert_msg(strstr(out, "python -m subadmm convert robot.urdf robot.json"), "%s", out);
+}
+END_TEST
+
 /* ---- convergence ----------------------------------------------------------------------------------------------- */
 
 static bool is_row(const struct table *table, int row, const char *kind, const char *name, const char *method)
@@ -253,6 +310,33 @@ START_TEST(convergence_measures)
     ck_assert_int_ge(curves, 8 * 2 * 10);
     ck_assert_int_eq(warm, 2 * 4);
     expect_known_counts(&table);
+}
+END_TEST
+
+/* Where no ratio can be made, the table says so, and why. */
+START_TEST(convergence_with_nothing_to_compare)
+{
+    static char out[MAX_TEXT];
+    char arguments[256], path[64];
+    snprintf(path, sizeof path, "/tmp/test_bench_%ld.json", (long)getpid());
+    FILE *scene = fopen(path, "w");
+    ck_assert_ptr_nonnull(scene);
+    fputs("{\"format\": \"subadmm scene\", \"format_version\": 1, \"bodies\": [{\"density\": 1000, \"shapes\": ["
+          "{\"type\": \"sphere\", \"size\": [0.1]}]}]}", /* nothing to touch */
+          scene);
+    ck_assert_int_eq(fclose(scene), 0);
+    snprintf(arguments, sizeof arguments, "convergence '%s' --only warm --seconds 0.02", path);
+    ck_assert_int_eq(run(arguments, out), 0);
+    ck_assert_msg(strstr(out, "one of them above): nothing to compare, for no error is above 1e-6 m/s\n"), "%s", out);
+    ck_assert_int_eq(run("convergence --only cold --limit 1 --problem cards", out), 0);
+    ck_assert_msg(strstr(out, "- iterations to 0.001, paper / fast: nothing to compare, fast gets there in none\n"),
+                  "%s", out);
+    ck_assert_msg(strstr(out, "where both get there): nothing to compare, no problem is one that both get to\n"), "%s",
+                  out);
+    ck_assert_ptr_null(strstr(out, "geometric mean"));
+    ck_assert_int_eq(run("convergence --only cold --limit 1 --problem cards --method fast", out), 0);
+    ck_assert_msg(!strstr(out, "paper / fast"), "%s", out); /* of one method there is nothing to say */
+    ck_assert_int_eq(remove(path), 0);
 }
 END_TEST
 
@@ -370,7 +454,9 @@ static const struct {
     {"scaling --max-seconds 0", "--max-seconds 0: must be in (0, 86400]"},
     {"scaling --max-seconds nan", "--max-seconds nan: must be"},
     {"scaling --device -1", "--device -1: must be"},
-    {"scaling here", "unexpected argument \"here\""},
+    {"scaling here", "scene = \"here:100\": must be one of"},
+    {"scaling pyramid here", "unexpected argument \"here\""},
+    {"scaling --scene pyramid here", "unexpected argument \"here\""},
     {"precision --scene moon", "moon"},
     {"profile --seconds 0", "--seconds 0: must be in (0, 3600]"},
     {"profile --fly", "unrecognized option '--fly'"},
@@ -382,7 +468,12 @@ static const struct {
     {"convergence --budgets 5,0", "--budgets 5,0: must be"},
     {"convergence --scene nowhere", "must be one of"},
     {"convergence --seconds 0", "--seconds 0: must be in (0, 3600]"},
-    {"convergence there", "unexpected argument \"there\""},
+    {"joints", "--reference '': must be the folder of the tables"},
+    {"queries there", "scene = \"there\": must be one of"},
+    {"rows --scene there", "scene = \"there\": must be one of"},
+    {"motion there", "scene = \"there\": must be one of"},
+    {"convergence there", "scene = \"there\": must be one of"},
+    {"kernels there", "unexpected argument \"there\""},
     {"stand --steps 0", "--steps 0: must be in [1, 10000000]"},
     {"stand --scene nowhere", "must be one of"},
     {"stand --dt 0", "--dt 0: must be in (0, 1]"},
@@ -439,8 +530,10 @@ int main(void)
     tcase_add_checked_fixture(cases, make_csv, remove_csv);
     tcase_add_loop_test(cases, scaling_measures, 0, 2);
     tcase_add_test(cases, scaling_says_what_it_skips);
+    tcase_add_test(cases, scaling_takes_a_file);
     tcase_add_test(cases, convergence_measures);
     tcase_add_test(cases, convergence_of_one_problem);
+    tcase_add_test(cases, convergence_with_nothing_to_compare);
     tcase_add_test(cases, precision_against_a_reference);
     tcase_add_test(cases, precision_of_many_iterations);
     tcase_add_test(cases, ablation_measures);

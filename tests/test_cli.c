@@ -134,6 +134,11 @@ static const struct {
     {"run", 2, "SCENE is missing"},
     {"run incline bounce", 2, "unexpected argument 'bounce'"},
     {"run nonsense", 2, "pyramid"},
+    {"run robot.urdf", 1,
+     "robot.urdf: is a robot's file, which the Python package reads: \"python -m subadmm convert robot.urdf robot.j"},
+    {"run ./a.b/robot.XML", 1, "convert ./a.b/robot.XML ./a.b/robot.json\" makes a scene file of it"},
+    {"check robot.usda", 1, "\"python -m subadmm view robot.usda\" shows it run"},
+    {"scenes robot.mjcf", 1, "robot.mjcf: is a robot's file"},
     {"run pyramid:0", 2, "[1, 300]"},
     {"run pyramid:x", 2, "[1, 300]"},
     {"scenes nonsense --json", 2, "pyramid"},
@@ -280,7 +285,7 @@ END_TEST
 START_TEST(run_prints)
 {
     MUST("run pyramid:2 --steps 3 --certify --explain", 0);
-    static const char *const parts[] = {"pyramid:2, 3 bodies", "ms per step", "certificate", "hash", "weights",
+    static const char *const parts[] = {"pyramid:2, 3 dynamic bodies", "ms per step", "certificate", "hash", "weights",
                                         "20 iterations a step (fast)"};
     for (size_t k = 0; k < sizeof parts / sizeof *parts; ++k)
         ck_assert_msg(strstr(out, parts[k]) != NULL, "no '%s' in\n%s", parts[k], out);

@@ -59,7 +59,8 @@ static void expect_exit(int status, int code)
 START_TEST(an_interrupted_run_reports)
 {
     const int number = _i ? SIGTERM : SIGINT;
-    pid_t child = start("$S run pile:300 --steps 100000000 --threads 1 --json r.json --trace t.csv"
+    pid_t child = start("$S run pile:300 --steps 100000000 --threads 1 --json r.json --trace t.csv "
+                        "--contacts-csv c.csv --error-csv e.csv"
 #ifdef SADMM_HAVE_HDF5
                         " --dump-problem 90000000:p.hdf5"
 #endif
@@ -87,7 +88,9 @@ START_TEST(an_interrupted_run_reports)
     }
     ck_assert_int_eq(commas, 0);
     ck_assert_int_eq(rows, (steps + 1) * 300);
-    ck_assert_int_eq(files_here(), 2); /* the step to dump was never reached */
+    ck_assert_int_eq(sh("test $(wc -l <e.csv) = %ld && tail -1 e.csv | grep -q '^%ld,'", steps + 1, steps), 0);
+    ck_assert_int_eq(sh("test -z \"$(tail -c 1 c.csv)\" && ! grep -qv '^[^,]*\\(,[^,]*\\)\\{15\\}$' c.csv"), 0);
+    ck_assert_int_eq(files_here(), 4); /* the step to dump was never reached */
 #ifdef SADMM_HAVE_HDF5
     expect_in("log.err", "p.hdf5: not written");
 #endif

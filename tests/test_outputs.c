@@ -44,6 +44,10 @@ static const struct {
     const char *script, *says;
 } doubles[] = {
     {"$S run incline --steps 1 --json x --trace x", "--trace x: is the same as --json x: must be another"},
+    {"$S run incline --steps 1 --trace x --contacts-csv x", "--contacts-csv x: is the same as --trace x"},
+    {"$S run incline --steps 1 --error-csv to_x --contacts-csv x", "--error-csv to_x: is the same as --contacts-csv x"},
+    {"$S run incline --steps 1 --error-csv - --contacts-csv -", "--error-csv -: is the same as --contacts-csv -"},
+    {"$S run incline --steps 1 --error-csv a --error-csv b", "--error-csv 'b': must be given once"},
     {"$S run incline --steps 1 --json x --trace ./x", "--trace ./x: is the same as --json x"},
     {"$S run incline --steps 1 --json d/x --trace e/x", "--trace e/x: is the same as --json d/x"},
     {"$S run incline --steps 1 --json x --trace to_x", "--trace to_x: is the same as --json x"},
@@ -105,6 +109,8 @@ static const struct {
     {"$S run pile:300 --steps 100000000 --json ''", "--json '': must be the name of a file"},
     {"$S run pile:300 --steps 100000000 --json loop", "--json loop: Too many levels of symbolic links"},
     {"$S run pile:300 --steps 100000000 --json a --trace no/x", "--trace no/x: No such file or directory"},
+    {"$S run pile:300 --steps 100000000 --json a --contacts-csv no/x", "--contacts-csv no/x: No such file"},
+    {"$S run pile:300 --steps 100000000 --trace a --error-csv d", "--error-csv d: Is a directory"},
     {"$S run settled_pile:300000 --steps 100000000 --json no/x", "--json no/x: No such file or directory"},
     {"$S scenes settled_pile:300000 --json no/x", "--json no/x: No such file or directory"},
     {"$S check pile:300 --steps 100000 --json no/x", "--json no/x: No such file or directory"},
@@ -135,6 +141,8 @@ START_TEST(complete_or_not_there)
 {
     static const char *const scripts[] = {
         "$S run incline --steps 200 --quiet --trace old",
+        "$S run incline --steps 200 --quiet --contacts-csv old",
+        "$S run incline --steps 200 --quiet --error-csv old",
         "$S run incline --steps 200 --quiet --json old",
         "$S scenes pile:100 --json old",
         "$B scaling --sizes 10,20,30,40,50 --steps 1 --threads 1 --backend cpu --precision both --csv old",
@@ -172,6 +180,8 @@ static const char *const says_something[] = {
     "$S run incline --steps 1 --json /dev/stdout",
     "$S run incline --steps 100 --quiet --trace /dev/full",
     "$S run incline --steps 1 --quiet --json /dev/full",
+    "$S run incline --steps 1 --error-csv -",
+    "$S run incline --steps 100 --quiet --contacts-csv /dev/full",
     "$S check incline --steps 1",
     "$B --help",
     "$B -h",
@@ -264,6 +274,8 @@ START_TEST(what_is_no_file_is_written_directly)
     }
     ck_assert_int_eq(sh("$B scaling --sizes 10 --steps 1 --threads 1 --backend cpu --csv /dev/stdout >got 2>log.err"),
                      0);
+    ck_assert_int_eq(sh("test $(wc -l <got) = 2"), 0);
+    ck_assert_int_eq(sh("$B environments chain:1 --environments 1 --steps 1 --warm-up 1 --csv - >got 2>log.err"), 0);
     ck_assert_int_eq(sh("test $(wc -l <got) = 2"), 0);
     /* one that takes anything takes two */
     ck_assert_int_eq(sh("$S run incline --steps 2 --json /dev/null --trace /dev/null" LOGGED), 0);

@@ -1,6 +1,8 @@
 /* Scene files: what is written of a world is read to the same world, bit for bit, and written again to the same text.
  * What is refused, and the schema: test_scene_files.py. */
+#include "config.h"
 #include "core/base/memory.h"
+#include "core/math/quat.h"
 #include "core/model/settings.h"
 #include "scene_tools.h"
 
@@ -505,6 +507,128 @@ START_TEST(all_objects_have_names)
 }
 END_TEST
 
+/* ---- density ----------------------------------------------------------------------------------------------------- */
+
+static void expect_vector(const double *a, const double *b, int count, double tolerance)
+{
+    for (int k = 0; k < count; ++k) ck_assert_double_eq_tol(a[k], b[k], tolerance);
+}
+
+/* A point on a body, in the world. */
+static void place_of(sadmm_world *world, sadmm_body_id id, const double local[3], double out[3])
+{
+    const sadmm_body_def def = body_def(world, id);
+    v3_store(v3_add(v3_load(def.position), m3_mul(q_matrix(q_load(def.orientation)), v3_load(local))), out);
+}
+
+/* A box about the origin is the one with its mass and moments, bit for bit. */
+START_TEST(density_is_mass_and_inertia)
+{
+    static const char *const texts[] = {
+        HEAD ", \"bodies\": [{\"density\": 3, \"orientation\": [0.6, 0, 0.8, 0], \"shapes\": [{\"type\": \"box\", "
+             "\"size\": [1, 1, 1]}, {\"type\": \"sphere\", \"size\": [9], \"sensor\": true}]}]}",
+        HEAD ", \"bodies\": [{\"mass\": 24, \"inertia\": [16, 16, 16], \"orientation\": [0.6, 0, 0.8, 0], \"shapes\": ["
+             "{\"type\": \"box\", \"size\": [1, 1, 1]}, {\"type\": \"sphere\", \"size\": [9], \"sensor\": true}]}]}",
+    };
+    char *written[2];
+    size_t lengths[2];
+    for (int k = 0; k < 2; ++k) {
+        struct sadmm_scene scene = open_words(texts[k]);
+        sadmm_world *world = build_scene(&scene);
+        expect_comes_back(&scene, "file", world, 3);
+        written[k] = text_of(&scene, "file", world, &lengths[k]);
+        sadmm_world_destroy(world);
+        sadmm_scene_close(&scene);
+    }
+    ck_assert_ptr_null(strstr(written[0], "density")); /* mass and inertia say it */
+    expect_same(written[0], lengths[0], written[1], lengths[1]);
+    free(written[0]);
+    free(written[1]);
+}
+END_TEST
+
+/* A hammer: a head across the end of a handle, in the frame that it was drawn in. The handle, half lengths 0.1 x 0.1 x
+ * 1, is at the origin; the head, 0.5 x 0.1 x 0.1, around x = 0.2, z = 1. Where its shapes, a joint and a coupling are
+ * in the world stays as drawn, while the body's own frame is that of its principal axes. */
+static const char hammer[] =
+    HEAD ", \"bodies\": [{\"name\": \"hammer\", \"density\": 1000, \"position\": [1, 2, 3], \"orientation\": "
+         "[0.6, 0, 0, 0.8], \"shapes\": [{\"type\": \"box\", \"size\": [0.1, 0.1, 1]}, {\"type\": \"box\", "
+         "\"size\": [0.5, 0.1, 0.1], \"position\": [0.2, 0, 1]}]}], "
+         "\"joints\": [{\"kind\": \"spherical\", \"body_b\": 0, \"position_b\": [0, 0, -1]}], "
+         "\"couplings\": [{\"body\": 0, \"position\": [0.7, 0, 1], \"orientation\": [0, 1, 0, 0]}]}";
+
+START_TEST(density_turns_what_is_on_a_body)
+{
+    static const double at[3] = {1, 2, 3}, turn[4] = {0.6, 0, 0, 0.8}, tolerance = 1e-12; /* rounding */
+    static const double drawn[][3] = {{0, 0, 0}, {0.2, 0, 1}, {0, 0, -1}, {0.7, 0, 1}};
+    struct sadmm_scene scene = open_words(hammer);
+    sadmm_world *world = build_scene(&scene);
+    const sadmm_body_id id = body_at(world, 0);
+    const sadmm_body_def body = body_def(world, id);
+    /* 1000 x (0.2 x 0.2 x 2 + 1 x 0.2 x 0.2) */
+    ck_assert_double_eq_tol(body.mass, 80 + 40, 1e-10);
+    /* the centre: (0.2, 0, 1) x 40 / 120, turned about z by the cosine 0.6^2 - 0.8^2 and the sine 2 x 0.6 x 0.8 */
+    const double x = 0.2 / 3;
+    const double centre[3] = {1 - 0.28 * x, 2 + 0.96 * x, 3 + 1.0 / 3};
+    expect_vector(body.position, centre, 3, tolerance);
+    /* the trace of the moments: of both, and twice the mass times the square of the arm */
+    const double own = 2 * 80.0 / 3 * (0.01 + 0.01 + 1) + 2 * 40.0 / 3 * (0.25 + 0.01 + 0.01);
+    const double arms = 2 * (80.0 * 40 / 120) * (0.2 * 0.2 + 1);
+    ck_assert_double_eq_tol(body.inertia[0] + body.inertia[1] + body.inertia[2], own + arms, 1e-10);
+    const mat3 frame = q_matrix(q_load(turn));
+    sadmm_joint_id joint;
+    sadmm_joint_def joint_def;
+    sadmm_coupling_id coupling;
+    sadmm_coupling_def coupling_def;
+    MUST(world, sadmm_world_joint_at(world, 0, &joint));
+    MUST(world, sadmm_world_joint_def(world, joint, &joint_def));
+    MUST(world, sadmm_world_coupling_at(world, 0, &coupling));
+    MUST(world, sadmm_world_coupling_def(world, coupling, &coupling_def));
+    for (int k = 0; k < 4; ++k) {
+        double wanted[3], got[3];
+        sadmm_shape_id shape;
+        sadmm_shape_def shape_def;
+        v3_store(v3_add(v3_load(at), m3_mul(frame, v3_load(drawn[k]))), wanted);
+        if (k < 2) {
+            MUST(world, sadmm_world_shape_at(world, k, &shape));
+            MUST(world, sadmm_world_shape_def(world, shape, &shape_def, NULL));
+            /* and turned back: the boxes have the orientation of the drawing's frame */
+            const quat both = q_mul(q_load(body.orientation), q_load(shape_def.orientation));
+            const double sign = both.w < 0 ? -1 : 1, got_turn[4] = {both.w, both.x, both.y, both.z};
+            for (int i = 0; i < 4; ++i) ck_assert_double_eq_tol(sign * got_turn[i], turn[i], tolerance);
+        }
+        place_of(world, id, k < 2 ? shape_def.position : k == 2 ? joint_def.position_b : coupling_def.position, got);
+        expect_vector(got, wanted, 3, tolerance);
+    }
+    expect_comes_back(&scene, "file", world, 3);
+    sadmm_world_destroy(world);
+    sadmm_scene_close(&scene);
+}
+END_TEST
+
+#ifdef SADMM_HAVE_QHULL
+/* A hull has the mass of the box that it is, in a frame away from its middle. */
+START_TEST(density_of_hulls)
+{
+    struct sadmm_scene scene = open_words(
+        HEAD ", \"bodies\": [{\"density\": 1000, \"shapes\": [{\"type\": \"hull\", \"hull\": 0}]}], \"hulls\": ["
+             "{\"points\": [[0, 0, 0], [1, 0, 0], [0, 2, 0], [1, 2, 0], [0, 0, 3], [1, 0, 3], [0, 2, 3], "
+             "[1, 2, 3]]}]}");
+    sadmm_world *world = build_scene(&scene);
+    const sadmm_body_def body = body_def(world, body_at(world, 0));
+    static const double middle[3] = {0.5, 1, 1.5};
+    double sum = 0;
+    ck_assert_double_eq_tol(body.mass, 6000, 1e-9);
+    expect_vector(body.position, middle, 3, 1e-12);
+    for (int k = 0; k < 3; ++k) sum += body.inertia[k];
+    ck_assert_double_eq_tol(sum, 6000.0 / 6 * (1 + 4 + 9), 1e-8); /* twice the mass over 12 times the edges' squares */
+    expect_comes_back(&scene, "file", world, 2);
+    sadmm_world_destroy(world);
+    sadmm_scene_close(&scene);
+}
+END_TEST
+#endif
+
 /* The numbers of a method: those of settings for their own, and what the file says of others. */
 START_TEST(methods_have_their_numbers)
 {
@@ -607,13 +731,12 @@ START_TEST(arguments_are_checked)
 END_TEST
 
 /* Each allocation of the library fails once: nothing is lost, and nothing is left in hand. */
-START_TEST(memory_may_run_out)
+/* Wherever it runs out as the text is read and a world built. */
+static void expect_said_without_memory(const char *text, size_t length)
 {
-    struct sadmm_scene scene, file;
-    sadmm_world *world = world_with_everything(&scene), *copy;
-    size_t length;
-    char *text = text_of(&scene, "everything", world, &length);
+    struct sadmm_scene file;
     struct sadmm_error error;
+    sadmm_world *copy;
     bool built = false;
     for (long allocations = 0; !built; ++allocations) {
         ck_assert_int_lt(allocations, 5000);
@@ -627,6 +750,17 @@ START_TEST(memory_may_run_out)
         if (built) sadmm_world_destroy(copy);
         if (opened) sadmm_scene_close(&file);
     }
+}
+
+START_TEST(memory_may_run_out)
+{
+    struct sadmm_scene scene;
+    sadmm_world *world = world_with_everything(&scene);
+    size_t length;
+    char *text = text_of(&scene, "everything", world, &length);
+    struct sadmm_error error;
+    expect_said_without_memory(text, length);
+    expect_said_without_memory(hammer, strlen(hammer));
     bool written = false;
     for (long allocations = 0; !written; ++allocations) {
         ck_assert_int_lt(allocations, 100);
@@ -655,6 +789,11 @@ int main(void)
     tcase_add_test(tests, what_is_left_out_is_the_default);
     tcase_add_test(tests, names_stand_for_bodies);
     tcase_add_test(tests, all_objects_have_names);
+    tcase_add_test(tests, density_is_mass_and_inertia);
+    tcase_add_test(tests, density_turns_what_is_on_a_body);
+#ifdef SADMM_HAVE_QHULL
+    tcase_add_test(tests, density_of_hulls);
+#endif
     tcase_add_test(tests, methods_have_their_numbers);
     tcase_add_test(tests, files_have_no_script);
     tcase_add_test(tests, arguments_are_checked);

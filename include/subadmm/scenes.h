@@ -40,9 +40,9 @@ SADMM_API sadmm_status sadmm_scene_library_at(int32_t index, const char **name, 
                                               const char **description);
 
 /* *out: the scene, the caller's until sadmm_scene_destroy; NULL after an error. Errors: INVALID_ARGUMENT (an unknown
- * name: the message lists the valid ones; N or M out of the scene's range; of a file the message names the line, or the
- * path of the member, its value and what is allowed), IO, LIMIT (a file of more than 4 GiB), UNAVAILABLE (files, in a
- * build without jansson), OUT_OF_MEMORY. */
+ * name: the message lists the valid ones; N or M out of the scene's range; a robot's file (.urdf, .xml, .usd...), which
+ * the Python package reads; of a file the message names the line, or the path of the member, its value and what is
+ * allowed), IO, LIMIT (a file of more than 4 GiB), UNAVAILABLE (files, in a build without jansson), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_scene_create(const char *spec, sadmm_scene **out);
 /* The same of the text of a scene file, `length` bytes that are only read while the call lasts. name: what messages
  * call it; NULL: nothing. */

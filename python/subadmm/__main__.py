@@ -2,21 +2,24 @@
 import argparse
 import math
 import os
-import signal
 import sys
-import threading
 import time
-from contextlib import contextmanager
+import warnings
+from contextlib import contextmanager, nullcontext
 
 import subadmm
 from subadmm._core import _names
-from subadmm.convert import MODELS, read_by
+from subadmm.convert import is_model, read_by
+from subadmm.ending import Ended, Signals
 from subadmm.given import real, whole
-from subadmm.output import Output
+from subadmm.output import Output, Refused
 
 
 def _arguments():
-    parser = argparse.ArgumentParser(prog="python -m subadmm", description="Scenes to look at, and robots as scenes.")
+    parser = argparse.ArgumentParser(prog="python -m subadmm", description="Scenes to look at, and robots as scenes.",
+                                     epilog="Exit status: 0 done; 1 something failed or could not be written; 2 wrong "
+                                            "usage; 130 or 143: interrupted (SIGINT, SIGTERM), with what was recorded "
+                                            "until then, or the picture of where it was.")
     parser.add_argument("--version", action="version", version=f"subadmm {subadmm.__version__} ({subadmm.build_commit()})")
     commands = parser.add_subparsers(dest="command", required=True)
     view = commands.add_parser("view", help="open a page with the running scene (needs: pip install 'viser<2')")
@@ -38,9 +41,11 @@ def _arguments():
         command.add_argument("--iterations", type=int, help="a step; default: the scene's")
         command.add_argument("--threads", type=int, help="at most so many; 0: OpenMP's default; default: the scene's")
     for command in (record, picture):
-        command.add_argument("-o", "--output", required=True, help="the file to write")
+        command.add_argument("-o", "--output", required=True,
+                             help="the file to write; -: standard output" + (" (.html)" if command is record else ""))
         length = command.add_mutually_exclusive_group()
-        length.add_argument("--seconds", type=float, help="simulated time; default: the scene's duration")
+        length.add_argument("--seconds", type=float, help="simulated time, s, rounded up to whole steps; default: the "
+                                                             "scene's duration")
         length.add_argument("--steps", type=int, help="instead of --seconds")
     record.add_argument("--fps", type=float, default=30, help="frames a simulated second (30)")
     record.add_argument("--contacts", type=int, default=0, metavar="N",
@@ -55,8 +60,8 @@ def _arguments():
     convert = commands.add_parser("convert",
                                   help="write a robot's file (MJCF, URDF, USD) or a scene as a scene file (.json)")
     convert.add_argument("source", help="a .xml, .urdf, .usd... file, a scene as 'pile:300', or a scene file")
-    convert.add_argument("output", help="the scene file to write, for 'subadmm run' and others")
-    convert.add_argument("--report", metavar="FILE", help="also write what is not carried over to a file, as JSON")
+    convert.add_argument("output", help="the scene file to write, for 'subadmm run' and others; -: standard output")
+    convert.add_argument("--report", metavar="FILE", help="also write what is not carried over to a file, as JSON; -: standard output")
     convert.add_argument("--duration", type=float,
                          help="how long the scene is meant to be run for, s (default: its own, or 10)")
     convert.add_argument("--floating", action="store_true", help="URDF: the base is free")
@@ -79,12 +84,33 @@ def _arguments():
 _DURATION = 10.0  # s, of worlds that do not say
 
 
+class _Usage(Exception):
+    """Wrong usage, by its exit status; other errors are failures."""
+
+
+@contextmanager
+def _usage():
+    try:
+        yield
+    except ValueError as error:
+        raise _Usage(error) from None
+
+
+def _standard(path):
+    """Of "-": standard output, by its name as a file."""
+    return "/dev/stdout" if path == "-" else path
+
+
 def _steps(world, given):
-    """How many to make."""
+    """How many to make: those that cover --seconds, but for the rounding of it and of dt."""
     if given.steps is not None:
         return given.steps
-    seconds = given.seconds if given.seconds is not None else world.duration or _DURATION
-    return round(seconds / world.settings.dt)
+    dt = world.settings.dt
+    if given.seconds is None:
+        return round((world.duration or _DURATION) / dt)
+    exact = given.seconds / dt
+    nearest = round(exact)
+    return nearest if abs(exact - nearest) <= 1e-12 * exact else math.ceil(exact)
 
 
 def _check_run(given):
@@ -95,13 +121,24 @@ def _check_run(given):
         whole("--steps", given.steps, 0, 2**63 - 1)
 
 
-def _record(build, given):
+def _record(build, given, signals):
     from subadmm import show
-    from subadmm.show.recording import check_ending, check_frames, check_video
+    from subadmm.show.recording import check_ending, check_frames, check_video, count_frames
 
-    check_ending("--output", given.output)
-    check_frames(given.fps, given.contacts, "--")
-    _check_run(given)
+    path = "a.html" if given.output == "-" else given.output  # by its ending
+    options = {}
+    with _usage():
+        check_ending("--output", path)
+        check_frames(given.fps, given.contacts, "--")
+        _check_run(given)
+        if path.endswith(".mp4"):
+            width, height = _size(given.size)
+            options = {"width": width, "height": height}
+            check_video(**options)
+        if given.steps == 0 or given.seconds == 0:
+            raise ValueError(f"--{'steps' if given.steps == 0 else 'seconds'}: 0; a recording must have some")
+        if given.seconds:
+            count_frames(given.seconds, given.fps, "--")
     said = [0.0]
 
     def progress(frame, frames):
@@ -112,12 +149,7 @@ def _record(build, given):
                 f"\rframe {frame + 1} of {frames}", end="\n" if frame + 1 == frames else "", file=sys.stderr, flush=True
             )
 
-    options = {}
-    if given.output.endswith(".mp4"):
-        width, height = _size(given.size)
-        options = {"width": width, "height": height}
-        check_video(**options)
-    with Output("--output", given.output, read_by(given.scene)) as file:
+    with Output("--output", _standard(given.output), read_by(given.scene)) as file:
         source = build()
         world = getattr(source, "world", source)
         if given.certify:
@@ -125,8 +157,12 @@ def _record(build, given):
             settings.certify = True
             world.settings = settings
         seconds = _steps(world, given) * world.settings.dt
-        made = show.record(source, seconds, given.fps, title=given.scene, contacts=given.contacts, after_frame=progress)
-        file.write(made.data(given.output, **options))
+        with _usage():
+            count_frames(seconds, given.fps, "--")
+        with signals.checked():
+            made = show.record(source, seconds, given.fps, title=given.scene, contacts=given.contacts,
+                               after_frame=progress, ended=lambda: signals.asked)
+        file.write(made.data(path, **options))
 
 
 def _size(given):
@@ -138,31 +174,36 @@ def _size(given):
     return width, height
 
 
-def _picture(build, given):
+def _picture(build, given, signals):
     from subadmm import show
     from subadmm.show.camera import check_place
     from subadmm.show.picture import check_size
     from subadmm.show.png import png_of
+    from subadmm.show.recording import step_until
 
-    if not given.output.endswith(".png"):
-        raise ValueError(f"--output: {given.output}; must end in .png")
-    width, height = _size(given.size)
-    check_size(width, height, "--size: ")
-    check_place(given.azimuth, given.elevation, given.zoom, "--")
-    _check_run(given)
-    with Output("--output", given.output, read_by(given.scene)) as file:
+    with _usage():
+        if given.output != "-" and not given.output.endswith(".png"):
+            raise ValueError(f"--output: {given.output}; must end in .png, or be -")
+        width, height = _size(given.size)
+        check_size(width, height, "--size: ")
+        check_place(given.azimuth, given.elevation, given.zoom, "--")
+        _check_run(given)
+    with Output("--output", _standard(given.output), read_by(given.scene)) as file:
         source = build()
         world = getattr(source, "world", source)
-        world.step(_steps(world, given))
+        with signals.checked():
+            step_until(world, _steps(world, given), lambda: signals.asked)
         description = show.describe(source, collision=given.collision)
         camera = show.looking_at(description, given.azimuth, given.elevation, given.zoom)
         file.write(png_of(show.picture(source, width, height, camera=camera, description=description)))
 
 
-def _view(build, given):
+def _view(build, given, _):
     from subadmm.show.view import serve
 
-    copies, one = whole("--copies", given.copies, 1, 10000), build
+    with _usage():
+        copies, port = whole("--copies", given.copies, 1, 10000), whole("--port", given.port, 0, 65535)
+    one = build
     if copies > 1:
         def build():
             source = one()
@@ -170,82 +211,113 @@ def _view(build, given):
             if world.has_script:
                 world.script = False
             return subadmm.replicate(source, copies)
-    serve(build, os.path.basename(given.scene), host=given.host, port=whole("--port", given.port, 0, 65535))
+    serve(build, os.path.basename(given.scene), host=given.host, port=port)
 
 
-def _hands(build, given):
+def _hands(build, given, _):
     from .hands.page import serve
 
-    serve(build, os.path.basename(given.scene), host=given.host, port=whole("--port", given.port, 0, 65535),
-          certificate=given.certificate, key=given.key, stand=given.stand,
-          yaw=math.radians(real("--yaw", given.yaw, -3600, 3600)), scale=given.scale)
+    with _usage():
+        port, yaw = whole("--port", given.port, 0, 65535), math.radians(real("--yaw", given.yaw, -3600, 3600))
+    serve(build, os.path.basename(given.scene), host=given.host, port=port, certificate=given.certificate,
+          key=given.key, stand=given.stand, yaw=yaw, scale=given.scale)
 
 
 def _convert(given):
     from .convert import convert
 
-    if not given.output.endswith(".json"):
-        raise ValueError(f"output: {given.output}; must end in .json")
-    if given.duration is not None:
-        real("--duration", given.duration, 0, 1e9)
     options = {name: getattr(given, name) for name in ("floating", "keyframe", "decompose") if getattr(given, name)}
-    notes = convert(given.source, given.output, report=given.report, duration=given.duration, **options)
+    with _usage():
+        if given.output != "-" and not given.output.endswith(".json"):
+            raise ValueError(f"output: {given.output}; must end in .json, or be -")
+        if given.duration is not None:
+            real("--duration", given.duration, 0, 1e9)
+        if options and not is_model(given.source):
+            raise ValueError(f"--{next(iter(options))}: a scene has none; it is of MJCF, URDF or USD files")
+    with nullcontext() if is_model(given.source) or _is_file(given.source) else _usage():
+        notes = convert(given.source, _standard(given.output), report=given.report and _standard(given.report),
+                        duration=given.duration, **options)
     if notes:
-        print(f"not carried over, or not exactly ({len(notes)}):")
-        print(notes)
+        out = sys.stderr if {"-", "/dev/stdout"} & {given.output, given.report} else sys.stdout
+        print(f"not carried over, or not exactly ({len(notes)}):\n{notes}", file=out)
 
 
-class _Ended(BaseException):
-    """By SIGTERM: what is not complete is dropped on the way out."""
+def _is_file(scene):
+    """As the command: a path by its ending or its slash, else a name."""
+    return scene.endswith(".json") or "/" in scene
 
 
-@contextmanager
-def _ended_by_signals():
-    def end(*_):
-        raise _Ended
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def main(arguments=None):
-    """The command; gives its exit status."""
-    given = _arguments().parse_args(arguments)
-
-    def build():
-        settings = {name: getattr(given, name) for name in ("iterations", "threads")
-                    if getattr(given, name) is not None}
-        if given.scene.endswith(MODELS):
-            loaded = subadmm.load(given.scene, backend=given.backend, precision=given.precision or "f64")
-            changed = loaded.world.settings
-            for name, value in {**settings, **({"method": given.method} if given.method else {})}.items():
-                setattr(changed, name, value)
-            loaded.world.settings = changed
-            return loaded
+def _build(given):
+    """The world of a scene, or what load() makes of a robot's file."""
+    settings = {name: getattr(given, name) for name in ("iterations", "threads") if getattr(given, name) is not None}
+    if is_model(given.scene):
+        loaded = subadmm.load(given.scene, backend=given.backend, precision=given.precision or "f64")
+        changed = loaded.world.settings
+        for name, value in {**settings, **({"method": given.method} if given.method else {})}.items():
+            setattr(changed, name, value)
+        loaded.world.settings = changed
+        return loaded
+    with nullcontext() if _is_file(given.scene) else _usage():
         return subadmm.scene(given.scene, backend=given.backend, precision=given.precision, method=given.method,
                              settings=settings)
 
+
+def _run(given, signals):
+    if given.command == "convert":
+        _convert(given)
+        return
+    with _usage():
+        if given.iterations is not None:
+            whole("--iterations", given.iterations, 1, 1000000)
+        if given.threads is not None:
+            whole("--threads", given.threads, 0, 1024)
+    act = {"record": _record, "picture": _picture, "view": _view, "hands": _hands}[given.command]
+    act(lambda: _build(given), given, signals)
+
+
+def _fail(status, error):
+    if isinstance(error, OSError) and error.strerror:  # without its number
+        error = error.strerror + (f": {error.filename}" if error.filename else "")
+    print(f"subadmm: {error}", file=sys.stderr)
+    return status
+
+
+def main(arguments=None):
+    """The command; gives its exit status: 0 done, 1 failed, 2 wrong usage, 130 and 143 interrupted."""
+    given = _arguments().parse_args(arguments)
+    with Signals() as signals:
+        try:
+            _run(given, signals)
+            return _fail(signals.status, "interrupted") if signals.asked else 0
+        except (_Usage, Refused) as error:
+            return _fail(2, error)
+        except (subadmm.Error, ValueError, ImportError, OSError) as error:
+            return _fail(1, error)
+        except (MemoryError, RecursionError) as error:
+            return _fail(1, f"{given.command}: {str(error) or 'out of memory'}")
+        except (KeyboardInterrupt, Ended):
+            return signals.status if signals.asked else 130
+
+
+def _exit():
+    """As the command: what standard output did not take is a failure, and said."""
+    shown = warnings.showwarning
+    warnings.showwarning = lambda message, *_, **__: print(f"subadmm: warning: {message}", file=sys.stderr)
     try:
-        with _ended_by_signals():
-            if given.command == "convert":
-                _convert(given)
-            else:
-                {"record": _record, "picture": _picture, "view": _view, "hands": _hands}[given.command](build, given)
-    except (subadmm.Error, ValueError, ImportError, OSError) as error:
-        print(f"subadmm: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
-    except _Ended:
-        return 143
-    return 0
+        status = main()
+    except SystemExit as ended:  # --help, and what argparse refuses
+        status = ended.code
+    finally:
+        warnings.showwarning = shown
+    try:
+        if sys.stdout:
+            sys.stdout.flush()
+    except OSError as error:
+        print(f"subadmm: standard output could not be written: {error.strerror}", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is still in its buffer goes there
+        status = status or 1
+    sys.exit(status)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    _exit()

@@ -13,6 +13,11 @@ from .output import Output
 MODELS = (".xml", ".mjcf", ".urdf", ".usd", ".usda", ".usdc", ".usdz")
 
 
+def is_model(source):
+    """Does it end as a robot's file does?"""
+    return os.path.splitext(source)[1].lower() in MODELS
+
+
 def _collect(path, files, folders, names):
     """Of an MJCF or URDF file: itself and what it includes, the folders that it gives, the files that it names."""
     if path in files:
@@ -59,7 +64,7 @@ def open_source(source, **options):
     """
     from . import scene
 
-    if os.path.splitext(source)[1].lower() not in MODELS:
+    if not is_model(source):
         given = [name for name, value in options.items() if value]
         if given:
             raise ValueError(f"{given[0]}: a scene has none; it is of MJCF, URDF or USD files")

@@ -35,11 +35,15 @@ def _stat(path):
         return None
 
 
+class Refused(ValueError):
+    """It must not be written."""
+
+
 class Output:
     """A file that is written, open from the beginning. As a context: complete at its end, and after an error what was
     there before.
 
-    name: of the argument, for messages. reads: paths that are read; others: Outputs of the same run. Raises ValueError
+    name: of the argument, for messages. reads: paths that are read; others: Outputs of the same run. Raises Refused
     (must not be written), OSError (cannot be).
     """
 
@@ -47,7 +51,7 @@ class Output:
         self._stream = self._temporary = None
         self.name, self.path = name, os.fsdecode(path)
         if not self.path or "\0" in self.path:
-            raise ValueError(f"{name} = {self.path!r}: must be the name of a file")
+            raise Refused(f"{name} = {self.path!r}: must be the name of a file")
         try:
             self._target = _follow(self.path)
             self._old = _stat(self._target)
@@ -79,11 +83,12 @@ class Output:
             except (OSError, ValueError):  # what is not there is not read either
                 continue
             if self._old and os.path.samestat(info, self._old):
-                raise ValueError(f"{self.name} = {self.path!r}: is a file that is read: must be another")
+                raise Refused(f"{self.name} = {self.path!r}: is a file that is read: must be another")
         for other in others:
-            if self._place() == other._place() and not (self._old and stat.S_ISCHR(self._old.st_mode)):
-                raise ValueError(f"{self.name} = {self.path!r}: is the same as {other.name} = {other.path!r}: "
-                                 f"must be another")
+            alike = _is_descriptor(self._target) and _is_descriptor(other._target)  # which may be a terminal
+            if self._place() == other._place() and (alike or not (self._old and stat.S_ISCHR(self._old.st_mode))):
+                raise Refused(f"{self.name} = {self.path!r}: is the same as {other.name} = {other.path!r}: "
+                              f"must be another")
 
     def _open_direct(self):
         for number in (1, 2):
@@ -113,7 +118,10 @@ class Output:
 
     def write(self, data):
         """Text (UTF-8) or bytes."""
-        self._stream.write(data.encode() if isinstance(data, str) else data)
+        try:
+            self._stream.write(data.encode() if isinstance(data, str) else data)
+        except OSError as error:
+            raise OSError(error.errno, f"{self.name}: {error.strerror}", self.path) from None
 
     def close(self):
         """It is complete: put it in its place."""

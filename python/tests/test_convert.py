@@ -113,14 +113,14 @@ def test_a_scene_is_what_the_command_writes(spec, tmp_path, capsys):
 
 
 def test_errors_are_one_line(tmp_path, capsys):
-    for arguments, words in (
-        (["none.xml", str(tmp_path / "a.json")], "no file none.xml"),
-        (["no_such_scene", str(tmp_path / "a.json")], "must be one of"),
-        (["pile:3", str(tmp_path / "a.txt")], "must end in .json"),
-        (["pile:3", str(tmp_path / "a.json"), "--keyframe", "up"], "keyframe: a scene has none"),
-        (["pile:3", str(tmp_path / "a.json"), "--duration", "-1"], "--duration: -1"),
-        (["pile:3", str(tmp_path / "none" / "a.json")], "a.json"),
+    for arguments, status, words in (
+        (["none.xml", str(tmp_path / "a.json")], 1, "no file none.xml"),
+        (["no_such_scene", str(tmp_path / "a.json")], 2, "must be one of"),
+        (["pile:3", str(tmp_path / "a.txt")], 2, "must end in .json"),
+        (["pile:3", str(tmp_path / "a.json"), "--keyframe", "up"], 2, "keyframe: a scene has none"),
+        (["pile:3", str(tmp_path / "a.json"), "--duration", "-1"], 2, "--duration: -1"),
+        (["pile:3", str(tmp_path / "none" / "a.json")], 1, "a.json"),
     ):
-        assert main(["convert", *arguments]) == 1
+        assert main(["convert", *arguments]) == status
         said = capsys.readouterr().err
         assert words in said and said.count("\n") == 1, said

@@ -171,14 +171,14 @@ def test_what_is_wrong_is_said(tmp_path, capsys):
     ]:
         with pytest.raises(TypeError, match=said):
             call()
-    for arguments, said in [
-        (["picture", "nothing", "-o", "a.png"], "nothing"),
-        (["picture", "pile:3", "-o", "a.gif"], "a.gif"),
-        (["record", "pile:3", "-o", str(tmp_path / "no" / "a.html"), "--steps", "1"], "no"),
-        (["picture", "pile:3", "-o", "a.png", "--size", "4"], "--size: 4"),
-        (["picture", "pile:3", "-o", "a.png", "--threads", "1025"], "threads = 1025: must be in [0, 1024]"),
+    for arguments, status, said in [
+        (["picture", "nothing", "-o", "a.png"], 2, "nothing"),
+        (["picture", "pile:3", "-o", "a.gif"], 2, "a.gif"),
+        (["record", "pile:3", "-o", str(tmp_path / "no" / "a.html"), "--steps", "1"], 1, "no"),
+        (["picture", "pile:3", "-o", "a.png", "--size", "4"], 2, "--size: 4"),
+        (["picture", "pile:3", "-o", "a.png", "--threads", "1025"], 2, "--threads: 1025; must be a whole number"),
     ]:
-        assert main(arguments) == 1
+        assert main(arguments) == status
         assert said in capsys.readouterr().err
 
 

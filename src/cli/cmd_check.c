@@ -157,7 +157,8 @@ static void print_rows(const char *spec, const struct check_reference *r, const 
         if (reasons[p]) printf("%s\n", reasons[p]);
     printf("one step: problems of steps");
     for (size_t k = 0; k < r->frozen_count; ++k) printf(" %ld", r->frozen[k].step);
-    printf(" frozen, differences relative to the largest velocity and impulse\n");
+    printf(
+        " frozen, differences relative to the largest velocity and impulse; kernels: the same after one iteration\n");
     printf("%zu agree, %zu disagree, %zu failed, %zu skipped\n", count_rows(rows, count, AGREES),
            count_rows(rows, count, DISAGREES), count_rows(rows, count, FAILED), count_rows(rows, count, SKIPPED));
 }

@@ -13,14 +13,13 @@
 #include "fclib/fclib.h"
 #include "interrupt.h"
 #include "open_scene.h"
-#include "run_record.h"
-#include "run_trace.h"
+#include "run_csv.h"
 
 enum {
-    OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_SUBSTEPS, OPTION_METHOD,
-    OPTION_ITERATIONS, OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_NCP_POINTS, OPTION_PENALTY_PERIOD,
+    OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_SECONDS, OPTION_DT, OPTION_SUBSTEPS,
+    OPTION_METHOD, OPTION_ITERATIONS, OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_NCP_POINTS, OPTION_PENALTY_PERIOD,
     OPTION_THREADS, OPTION_SET, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE,
-    OPTION_DUMP, OPTION_QUIET
+    OPTION_CONTACTS_CSV, OPTION_ERROR_CSV, OPTION_DUMP, OPTION_QUIET
 };
 
 static const struct cli_option options[] = {
@@ -28,6 +27,7 @@ static const struct cli_option options[] = {
     [OPTION_DEVICE] = {"device", "N", "which accelerator (default 0)"},
     [OPTION_PRECISION] = {"precision", "P", "f32 or f64 (default the scene's)"},
     [OPTION_STEPS] = {"steps", "N", "number of steps (default the scene's duration / dt)"},
+    [OPTION_SECONDS] = {"seconds", "S", "simulated time instead of --steps, s: S / dt steps, rounded up"},
     [OPTION_DT] = {"dt", "S", "time step, s (default the scene's)"},
     [OPTION_SUBSTEPS] = {"substeps", "N", "sub-steps of a step, which share its iterations (default the scene's)"},
     [OPTION_METHOD] = {"method", "NAME", "paper or fast (default fast)"},
@@ -45,6 +45,8 @@ static const struct cli_option options[] = {
     [OPTION_EXPLAIN] = {"explain", NULL, "say what the last step ran, what it left out and why"},
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
     [OPTION_TRACE] = {"trace", "FILE", "write every body's state after every step as CSV (-: to standard output)"},
+    [OPTION_CONTACTS_CSV] = {"contacts-csv", "FILE", "write every contact of every step as CSV"},
+    [OPTION_ERROR_CSV] = {"error-csv", "FILE", "write every step's true error, iterations and time as CSV; certifies"},
     [OPTION_DUMP] = {"dump-problem", "STEP:FILE",
                      "write the contact problem of a step (1: the first; of its last sub-step) as FCLIB HDF5; "
                      "up to 16"},
@@ -67,9 +69,10 @@ struct run_options {
     long check_period, substeps;                     /* 0: the scene's */
     long ncp_points;                                 /* -1: the scene's */
     double dt, tolerance;                            /* 0: the scene's */
+    double seconds;                                  /* -1: not given */
     long device;
     bool no_warm_start, certify, explain, quiet, precision_given, method_given;
-    const char *json, *trace;
+    const char *json, *csv[RUN_CSV_KINDS];
     struct run_dump dumps[MOST_DUMPS];
     size_t dump_count;
     const char *set[MOST_SET];
@@ -119,6 +122,7 @@ static int set_option(void *target, size_t index, const char *value)
         o->precision_given = true;
         break;
     case OPTION_STEPS: ok = cli_read_int("--steps", value, 0, 1000000000, &o->steps); break;
+    case OPTION_SECONDS: ok = cli_read_real("--seconds", value, 0, 1e9, &o->seconds); break;
     case OPTION_DT: ok = cli_read_real("--dt", value, 1e-6, 1, &o->dt); break;
     case OPTION_SUBSTEPS: ok = cli_read_int("--substeps", value, 1, SADMM_MOST_SUBSTEPS, &o->substeps); break;
     case OPTION_METHOD:
@@ -138,7 +142,11 @@ static int set_option(void *target, size_t index, const char *value)
     case OPTION_CERTIFY: o->certify = true; break;
     case OPTION_EXPLAIN: o->explain = true; break;
     case OPTION_JSON: ok = cli_read_output("--json", value, &o->json); break;
-    case OPTION_TRACE: ok = cli_read_output("--trace", value, &o->trace); break;
+    case OPTION_TRACE: ok = cli_read_output("--trace", value, &o->csv[RUN_CSV_TRACE]); break;
+    case OPTION_CONTACTS_CSV:
+        ok = cli_read_output("--contacts-csv", value, &o->csv[RUN_CSV_CONTACTS]);
+        break;
+    case OPTION_ERROR_CSV: ok = cli_read_output("--error-csv", value, &o->csv[RUN_CSV_ERROR]); break;
     case OPTION_DUMP: ok = read_dump(o, value); break;
     case OPTION_QUIET: o->quiet = true; break;
     }
@@ -161,7 +169,7 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     if (o->penalty_period >= 0) s->penalty_period = (int)o->penalty_period;
     if (o->threads >= 0) s->threads = (int)o->threads;
     if (o->no_warm_start) s->warm_start = false;
-    if (o->certify) s->certify = true;
+    if (o->certify || o->csv[RUN_CSV_ERROR]) s->certify = true;
     for (size_t k = 0; k < o->set_count; ++k) cli_read_setting(o->set[k], s);
 }
 
@@ -238,16 +246,6 @@ static bool prepare_last_step(sadmm_world *world)
 }
 
 /* After a step, or before the first. */
-static int trace_step(struct run_record *record, sadmm_world *world, double time, struct output *trace)
-{
-    if (!trace) return CLI_DONE;
-    FILE *stream = output_stream(trace);
-    if (!run_trace_step(stream, record, world, time)) return CLI_FAILED;
-    if (!ferror(stream)) return CLI_DONE;
-    return fail(record, "step %zu: the trace could not be written", record->steps);
-}
-
-/* After a step, or before the first. */
 static int observe(const struct sadmm_scene *scene, sadmm_world *world, struct run_record *record)
 {
     struct sadmm_error error = {0};
@@ -256,12 +254,11 @@ static int observe(const struct sadmm_scene *scene, sadmm_world *world, struct r
 }
 
 static int step_all(struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world,
-                    struct run_record *record, struct output *trace)
+                    struct run_record *record, struct run_csv *csv)
 {
     struct progress progress = {0};
     bool watched = !o->quiet && isatty(STDERR_FILENO);
-    if (trace) run_trace_begin(output_stream(trace));
-    int code = trace_step(record, world, 0, trace);
+    int code = run_csv_begin(csv, record, world);
     if (code == CLI_DONE) code = observe(scene, world, record);
     for (long step = 0; code == CLI_DONE && step < o->steps && !interrupted(); ++step) {
         struct sadmm_error error = {0};
@@ -272,7 +269,7 @@ static int step_all(struct run_options *o, const char *spec, const struct sadmm_
         } else if (!run_record_step(record, world)) {
             code = CLI_FAILED;
         } else {
-            code = trace_step(record, world, record->last.time, trace);
+            code = run_csv_step(csv, record, world);
             if (code == CLI_DONE) code = observe(scene, world, record);
             if (code == CLI_DONE) code = dump_problems(o, step + 1, spec, world, record);
         }
@@ -303,44 +300,66 @@ static void say_missing_dumps(const struct run_options *o, const struct run_reco
 }
 
 static int run_world(struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world,
-                     struct output *json, struct output *trace)
+                     struct output *json, struct run_csv *csv)
 {
     struct run_record record = {0};
     bool mixed = outputs_on_stdout();
     int code = run_record_start(&record, world) ? CLI_DONE : CLI_FAILED;
     if (code == CLI_DONE) {
-        code = step_all(o, spec, scene, world, &record, trace);
+        code = step_all(o, spec, scene, world, &record, csv);
         if (*record.failure) cli_error(CLI_FAILED, "%s", record.failure);
         say_missing_dumps(o, &record);
         if (!run_record_finish(&record, world) || !record.finite) code = CLI_FAILED;
         if (o->explain) explain(world, mixed ? stderr : stdout);
         if (!o->quiet && !mixed) run_record_print(&record, spec, scene);
-        /* A step that failed ends the run: its trace is whole. */
-        int traced = output_close(trace);
+        /* A step that failed ends the run: what was written step by step is whole. */
+        int listed = run_csv_close(csv);
         int written = json ? cli_write_json(run_record_json(&record, spec, scene), json) : CLI_DONE;
-        if (code == CLI_DONE) code = traced != CLI_DONE ? traced : written;
+        if (code == CLI_DONE) code = listed != CLI_DONE ? listed : written;
     }
     run_record_free(&record);
     return code;
 }
 
-static int open_outputs(struct run_options *o, struct output **json, struct output **trace)
+static int open_outputs(struct run_options *o, struct output **json, struct run_csv **csv)
 {
     struct sadmm_error error = {0};
-    *trace = NULL;
     if (o->dump_count > 0 && !sadmm_fclib_available()) {
         sadmm_fclib_save(NULL, NULL, NULL, &error);
         return cli_error(CLI_FAILED, "--dump-problem: %s", error.message);
     }
     int code = cli_open_json(o->json, json);
-    if (code == CLI_DONE && o->trace) code = output_open("--trace", o->trace, OUTPUT_STREAM, trace);
+    if (code == CLI_DONE) code = run_csv_open(o->csv, csv);
     for (size_t k = 0; k < o->dump_count && code == CLI_DONE; ++k)
         code = output_open("--dump-problem", o->dumps[k].path, OUTPUT_FILE, &o->dumps[k].output);
     return code;
 }
 
-static int check_options(const struct run_options *o, const struct sadmm_scene *scene)
+/* Steps that cover `seconds`: rounded up, but for the rounding of the two numbers and of their quotient. */
+static int count_steps(double seconds, double dt, long *steps)
 {
+    static const double rounding = 1e-12, most = 1e9;
+    if (!(dt > 0)) return CLI_DONE; /* the world refuses it */
+    const double exact = seconds / dt, nearest = round(exact);
+    const double count = fabs(exact - nearest) <= rounding * exact ? nearest : ceil(exact);
+    if (count > most)
+        return cli_error(CLI_USAGE, "--seconds %g: are %.0f steps of %g s, must be %.0f at most", seconds, count, dt,
+                         most);
+    *steps = (long)count;
+    return CLI_DONE;
+}
+
+static int check_options(struct run_options *o, const struct sadmm_scene *scene)
+{
+    const double dt = scene->def.settings.dt;
+    if (o->steps >= 0 && o->seconds >= 0)
+        return cli_error(CLI_USAGE, "--steps %ld and --seconds %g: must be one of them", o->steps, o->seconds);
+    if (o->seconds >= 0) {
+        const int code = count_steps(o->seconds, dt, &o->steps);
+        if (code != CLI_DONE) return code;
+    } else if (o->steps < 0) {
+        o->steps = lround(fmin(scene->duration / dt, 1e9));
+    }
     if (o->penalty_period >= 0 && scene->def.settings.method != SADMM_METHOD_PAPER)
         return cli_error(CLI_USAGE, "--penalty-period %ld: takes --method paper, %s has no penalty updates",
                          o->penalty_period, cli_method_name(scene->def.settings.method));
@@ -354,26 +373,27 @@ static int check_options(const struct run_options *o, const struct sadmm_scene *
 static int run(int argc, char **argv)
 {
     struct run_options o = {
-        .steps = -1, .iterations = -1, .penalty_period = -1, .threads = -1, .ncp_points = -1};
+        .steps = -1, .seconds = -1, .iterations = -1, .penalty_period = -1, .threads = -1, .ncp_points = -1};
     struct sadmm_scene scene;
     struct sadmm_error error = {0};
-    struct output *json, *trace;
+    struct output *json;
+    struct run_csv *csv = NULL;
     sadmm_world *world = NULL;
     const char *spec;
     int code = cli_parse(&cli_run, argc, argv, set_option, &o, &spec);
     if (code >= 0) return code;
     if ((code = cli_open_scene(spec, &scene)) != CLI_DONE) return code;
     apply(&o, &scene);
-    if (o.steps < 0) o.steps = lround(fmin(scene.duration / scene.def.settings.dt, 1e9));
     code = check_options(&o, &scene);
     if (code == CLI_DONE) {
         interrupts_expect();
         cli_protect_scene(spec);
-        code = open_outputs(&o, &json, &trace);
+        code = open_outputs(&o, &json, &csv);
     }
     if (code == CLI_DONE && sadmm_scene_build(&scene, &world, &error) != SADMM_OK)
         code = cli_error(CLI_FAILED, "%s", error.message);
-    if (code == CLI_DONE) code = run_world(&o, spec, &scene, world, json, trace);
+    if (code == CLI_DONE) code = run_world(&o, spec, &scene, world, json, csv);
+    run_csv_free(csv);
     sadmm_world_destroy(world);
     sadmm_scene_close(&scene);
     return code;

@@ -161,8 +161,10 @@ static void print_outcome(const char *path, const struct solve_options *o, const
     if (o->plan.settings.method == SADMM_METHOD_PAPER)
         printf(", penalty offset %.3g kg, %d tried", out->offset, out->offsets_tried);
     printf(")\n");
-    printf("siconos        %.3g (tolerance %g)\n", c->siconos, o->plan.tolerance);
-    printf("certificate    ncp %.3g m/s at most, %.3g mean; momentum %.3g\n", c->ncp_max, c->ncp_mean, c->momentum_max);
+    printf("siconos        %.3g (tolerance %g): the error as Siconos measures it\n", c->siconos, o->plan.tolerance);
+    printf("certificate    ncp %.3g m/s at most, %.3g mean: distance of a contact or joint from its law\n"
+           "               momentum %.3g: of a body, what impulses do not explain, over the largest\n",
+           c->ncp_max, c->ncp_mean, c->momentum_max);
     printf("velocities u   closing %.3g m/s at most, sliding %.3g m/s at most\n", closing < 0 ? -closing : 0, sliding);
     printf("impulses r     normal %.3g N s at most\n", largest);
 }

@@ -12,6 +12,23 @@ static const char *const phase_names[RUN_PHASES] = {
     [RUN_SOLVE] = "solve", [RUN_FINISH] = "finish",
 };
 
+static const char *const error_words[SADMM_STEP_ERROR_COUNT] = {
+    [SADMM_STEP_ERROR_NONE] = "",
+    [SADMM_STEP_ERROR_LAW] = ", of a contact's or joint's law",
+    [SADMM_STEP_ERROR_MOMENTUM] = ", of a body's momentum",
+    [SADMM_STEP_ERROR_LIMITER] = ", of a body's momentum, for islands were slowed down",
+    [SADMM_STEP_ERROR_JOINTS] = ", of a joint that is open",
+};
+
+/* What a reader of the table cannot know. */
+static const char *const phase_words[RUN_PHASES] = {
+    [RUN_TOTAL] = "",
+    [RUN_COLLIDE] = "   contacts are found",
+    [RUN_ASSEMBLE] = "   their equations are set up",
+    [RUN_SOLVE] = "   iterations",
+    [RUN_FINISH] = "   bodies are moved",
+};
+
 static json_t *times_json(const struct run_record *record)
 {
     json_t *o = json_object();
@@ -139,6 +156,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     set_or_null(o, "couplings", record, json_integer(last->couplings));
     json_object_set_new(o, "contacts", contacts_json(record));
     json_object_set_new(o, "steps", json_integer((json_int_t)record->steps));
+    json_object_set_new(o, "seconds", cli_json_real((double)record->steps * scene->def.settings.dt));
     json_object_set_new(o, "dt", cli_json_real(scene->def.settings.dt));
     json_object_set_new(o, "substeps", json_integer(scene->def.settings.substeps));
     json_object_set_new(o, "iterations", json_integer(scene->def.settings.iterations));
@@ -149,7 +167,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     else json_object_set_new(o, "residual", json_null());
     json_object_set_new(o, "certificate", certificate_json(record));
     json_object_set_new(o, "stop", stop_json(record, &scene->def.settings));
-    set_or_null(o, "error", record, record->error >= 0 ? cli_json_real(record->error) : json_null());
+    set_or_null(o, "error_max", record, record->error >= 0 ? cli_json_real(record->error) : json_null());
     set_or_null(o, "error_kind", record,
                 record->error >= 0 ? json_string(sadmm_step_error_names[record->error_kind]) : json_null());
     set_or_null(o, "limited_steps", record, json_integer((json_int_t)record->limited_steps));
@@ -173,37 +191,39 @@ void run_record_print(const struct run_record *record, const char *spec, const s
 {
     const sadmm_step_report *last = &record->last;
     const sadmm_certificate *c = &last->certificate;
-    printf("scene          %s, %zu bodies\n", spec, record->body_count);
+    printf("scene          %s, %zu dynamic bod%s\n", spec, record->body_count, record->body_count == 1 ? "y" : "ies");
     if (scene->loaded) printf("file           a world at its beginning: no script, no measure of success\n");
     printf("steps          %zu of %g s", record->steps, scene->def.settings.dt);
     if (scene->def.settings.substeps > 1) printf(" in %d sub-steps", scene->def.settings.substeps);
+    printf(", %g s in all", (double)record->steps * scene->def.settings.dt);
     printf("%s\n", interrupted() ? ", interrupted" : "");
     if (record->steps > 0) {
         printf("backend        %s %s, %d thread%s, %d iterations a step (%s)\n", cli_backend_name(last->backend),
                cli_precision_name(last->precision), last->threads, last->threads == 1 ? "" : "s",
                scene->def.settings.iterations, cli_method_name(scene->def.settings.method));
-        printf("contacts       %.1f mean, %d max\n", record->contacts_sum / (double)record->steps,
-               record->contacts_max);
+        printf("contacts       %.1f points a step in the mean, %d at most\n",
+               record->contacts_sum / (double)record->steps, record->contacts_max);
         printf("ms per step    %10s %10s\n", "median", "p95");
     }
     for (int k = 0; k < RUN_PHASES; ++k) {
         double median, p95;
         if (record->steps > 0 && run_percentiles(record->ms[k], record->steps, &median, &p95))
-            printf("  %-12s %10.4f %10.4f\n", phase_names[k], median, p95);
+            printf("  %-12s %10.4f %10.4f%s\n", phase_names[k], median, p95, phase_words[k]);
     }
     if (record->steps > 0 && last->residual.primal >= 0)
-        printf("residual       primal %.3g m/s, dual %.3g N s (last step)\n", last->residual.primal,
-               last->residual.dual);
+        printf("residual       primal %.3g m/s, dual %.3g N s: of the last step's iterations, not its true error\n",
+               last->residual.primal, last->residual.dual);
     if (record->steps > 0 && c->ncp_max != -1)
-        printf("certificate    ncp %.3g m/s (largest of the run %.3g), momentum %.3g (%.3g)\n", c->ncp_max,
-               record->ncp_max, c->momentum_max, record->momentum_max);
+        printf("certificate    ncp %.3g m/s in the last step, %.3g in the run: of a contact or joint from its law\n"
+               "               momentum %.3g, %.3g: of a body, what impulses do not explain, over the largest\n",
+               c->ncp_max, record->ncp_max, c->momentum_max, record->momentum_max);
     if (record->steps > 0 && scene->def.settings.tolerance > 0)
         printf("tolerance      %g m/s met in %zu steps of %zu, %.1f iterations in the mean; last step: %d at most, "
                "%" PRId64 " islands unsolved\n",
                scene->def.settings.tolerance, record->met, record->steps,
                record->iterations_sum / (double)record->steps, last->iterations, last->unsolved);
     if (record->steps > 0 && record->error >= 0)
-        printf("error          %.3g m/s at most (%s)\n", record->error, sadmm_step_error_names[record->error_kind]);
+        printf("error          %.3g m/s at most%s\n", record->error, error_words[record->error_kind]);
     if (record->limited_steps > 0)
         printf("limited        %zu steps slowed islands down to the energy contacts can leave: too few iterations\n",
                record->limited_steps);
@@ -211,8 +231,7 @@ void run_record_print(const struct run_record *record, const char *spec, const s
         printf("repeated       %" PRId64 " steps, which outgrew the capacities or the plan they were begun with\n",
                last->repeated);
     if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);
-    if (last->joints > 0)
-        printf("joints         off by %.3g m at most\n", record->joint_drift);
+    if (last->joints > 0) printf("joints         open by %.3g m at most\n", record->joint_drift);
     printf("final state    fastest %.3g m/s, moved %.3g m at most, %s, hash %016" PRIx64 "\n", record->speed_max,
            record->displacement_max, record->finite ? "finite" : "NOT FINITE", record->hash);
     print_result(&record->result);

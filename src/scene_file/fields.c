@@ -73,6 +73,7 @@ TABLE(sadmm_settings_fields, "settings", settings_list);
 static const struct sadmm_field body_list[] = {
     OTHER("index"),
     SADMM_BODY_FIELDS(LISTED, sadmm_body_def)
+    OTHER("density"),
     OTHER("force"), /* sadmm_load_fields */
     OTHER("torque"),
     OTHER("move"),

@@ -7,6 +7,7 @@
 #include "orientation.h"
 #include "read_forms.h"
 #include "read_parts.h"
+#include "read_shape.h"
 #include "scene_file.h"
 
 /* ---- bodies ------------------------------------------------------------------------------------------------------ */
@@ -29,8 +30,7 @@ static sadmm_status read_dynamic(const struct sadmm_filler *f, const json_t *obj
     return SADMM_OK;
 }
 
-static sadmm_status read_body_def(const struct sadmm_filler *f, const json_t *object, size_t number,
-                                  sadmm_body_def *def)
+static sadmm_status read_body_def(struct sadmm_filler *f, const json_t *object, size_t number, sadmm_body_def *def)
 {
     static const char *const needed[] = {"mass", "inertia"};
     *def = sadmm_body_def_default();
@@ -45,9 +45,14 @@ static sadmm_status read_body_def(const struct sadmm_filler *f, const json_t *ob
                                 number, (long long)index);
     }
     TRY(read_dynamic(f, object, &sadmm_dynamic_fields, def->type, def));
+    if (is_given(object, "density")) {
+        if (def->type == SADMM_BODY_DYNAMIC) return sadmm_read_density(f, object, number, def);
+        return sadmm_refuse(&f->reader, "density", "must be null or left out, for the body is %s",
+                            sadmm_body_type_names[def->type]);
+    }
     for (int k = 0; k < 2 && def->type == SADMM_BODY_DYNAMIC; ++k)
         if (!json_object_get(object, needed[k]))
-            return sadmm_refuse(&f->reader, needed[k], "is missing: a dynamic body has mass and inertia");
+            return sadmm_refuse(&f->reader, needed[k], "is missing: a dynamic body has mass and inertia, or density");
     return SADMM_OK;
 }
 
@@ -99,7 +104,8 @@ static sadmm_status read_bodies(struct sadmm_filler *f)
     f->bodies = (sadmm_body_id *)sadmm_alloc(count, sizeof *f->bodies);
     f->body_types = (sadmm_body_type *)sadmm_alloc(count, sizeof *f->body_types);
     f->first_shape = (size_t *)sadmm_alloc(count + 1, sizeof *f->first_shape);
-    if (!f->bodies || !f->body_types || !f->first_shape)
+    f->masses = (sadmm_mass *)sadmm_alloc(count, sizeof *f->masses);
+    if (!f->bodies || !f->body_types || !f->masses || !f->first_shape)
         return sadmm_fail_memory(f->reader.error, "the bodies of a scene file");
     for (size_t k = 0; k < count; ++k) {
         json_t *shapes;
@@ -159,39 +165,12 @@ static sadmm_status order_shapes(struct sadmm_filler *f, const struct place *pla
     return SADMM_OK;
 }
 
-/* The hull or mesh of a shape that is one; others have none. */
-static sadmm_status read_form(const struct sadmm_filler *f, const json_t *object, sadmm_shape_def *def)
-{
-    int64_t number;
-    if (def->type == SADMM_SHAPE_HULL) {
-        TRY(sadmm_read_number_in(f, object, "hull", f->hull_count, &number));
-        def->hull = f->hulls[number];
-    } else if (json_object_get(object, "hull")) {
-        return sadmm_refuse(&f->reader, "hull", "must be left out, for the shape is a %s",
-                            sadmm_shape_type_names[def->type]);
-    }
-    if (def->type == SADMM_SHAPE_MESH) {
-        TRY(sadmm_read_number_in(f, object, "mesh", f->mesh_count, &number));
-        def->mesh = f->meshes[number];
-    } else if (json_object_get(object, "mesh")) {
-        return sadmm_refuse(&f->reader, "mesh", "must be left out, for the shape is a %s",
-                            sadmm_shape_type_names[def->type]);
-    }
-    return SADMM_OK;
-}
-
 static sadmm_status read_shape(struct sadmm_filler *f, const json_t *object, size_t body, sadmm_shape_id *id)
 {
-    sadmm_shape_def def = sadmm_shape_def_default();
-    TRY(sadmm_read_fields(&f->reader, object, &sadmm_shape_fields, &def));
-    if (!json_object_get(object, "type")) return sadmm_refuse(&f->reader, "type", "is missing");
-    const size_t sizes = (size_t)sadmm_shape_sizes[def.type];
-    const json_t *size = json_object_get(object, "size");
-    if (sizes > 0 && !size)
-        return sadmm_refuse(&f->reader, "size", "is missing, %zu number%s", sizes, sizes > 1 ? "s" : "");
-    if (size) TRY(sadmm_read_reals(&f->reader, "size", size, def.size, sizes));
-    TRY(read_form(f, object, &def));
+    sadmm_shape_def def;
+    TRY(sadmm_read_shape_def(f, object, &def));
     TRY(sadmm_read_object_name(f, object, &def.name));
+    sadmm_pose_in_body(f, (int64_t)body, def.position, def.orientation);
     sadmm_before_unit(def.orientation);
     return sadmm_refuse_world(f, sadmm_world_add_shape(f->world, f->bodies[body], &def, id), ": ");
 }
@@ -231,6 +210,7 @@ static void free_filler(struct sadmm_filler *f)
     sadmm_free(f->meshes);
     sadmm_free(f->bodies);
     sadmm_free(f->body_types);
+    sadmm_free(f->masses);
     sadmm_free(f->shapes);
     sadmm_free(f->first_shape);
     sadmm_free(f->joints);
@@ -238,9 +218,9 @@ static void free_filler(struct sadmm_filler *f)
 
 static sadmm_status fill(struct sadmm_filler *f)
 {
-    TRY(read_bodies(f));
     TRY(sadmm_read_hulls(f));
     TRY(sadmm_read_meshes(f));
+    TRY(read_bodies(f));
     TRY(read_shapes(f));
     return sadmm_read_parts(f);
 }

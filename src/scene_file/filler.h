@@ -13,6 +13,7 @@ struct sadmm_filler {
     sadmm_world *world;
     sadmm_body_id *bodies;
     sadmm_body_type *body_types;
+    sadmm_mass *masses; /* by body: of its shapes, in the frame of the file; mass 0: it has no density */
     size_t body_count;
     sadmm_shape_id *shapes; /* body by body */
     size_t *first_shape;    /* by body: its first one there; body_count + 1 */

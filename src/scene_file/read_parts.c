@@ -4,6 +4,7 @@
 #include "core/base/memory.h"
 #include "orientation.h"
 #include "read_parts.h"
+#include "read_shape.h"
 
 static sadmm_body_id body_of(const struct sadmm_filler *f, int64_t number)
 {
@@ -123,6 +124,8 @@ static sadmm_status read_joint(struct sadmm_filler *f, const json_t *object, siz
     TRY(sadmm_read_object_name(f, object, &def.name));
     def.body_a = body_of(f, bodies[0]);
     def.body_b = body_of(f, bodies[1]);
+    sadmm_pose_in_body(f, bodies[0], def.position_a, def.orientation_a);
+    sadmm_pose_in_body(f, bodies[1], def.position_b, def.orientation_b);
     sadmm_before_unit(def.orientation_a);
     sadmm_before_unit(def.orientation_b);
     TRY(sadmm_refuse_world(f, sadmm_world_add_joint(f->world, &def, &f->joints[number]), ": "));
@@ -155,6 +158,7 @@ static sadmm_status read_coupling(struct sadmm_filler *f, const json_t *object, 
     if (!moves(f, body)) return sadmm_refuse(&f->reader, "body", "must be a dynamic body");
     TRY(sadmm_read_object_name(f, object, &def.name));
     def.body = body_of(f, body);
+    sadmm_pose_in_body(f, body, def.position, def.orientation);
     sadmm_before_unit(def.orientation);
     sadmm_before_unit(def.target_orientation);
     return sadmm_refuse_world(f, sadmm_world_add_coupling(f->world, &def, NULL), ": ");

@@ -90,6 +90,7 @@ static sadmm_status write_bodies(struct sadmm_writer *w)
         sadmm_put(w, body, "index", json_integer(k));
         sadmm_put(w, body, "name", json_string(def.name));
         sadmm_put(w, body, "shapes", json_array());
+        json_object_del(body, "density"); /* mass and inertia say it */
         TRY(write_dynamic(w, body, id, &def));
         TRY(write_move(w, body, id));
     }

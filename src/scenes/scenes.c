@@ -100,6 +100,33 @@ struct sadmm_scene_loaded {
 
 bool sadmm_scene_is_file(const char *spec) { return spec && sadmm_scene_file_is_path(spec); }
 
+static bool ends_in(const char *text, const char *end)
+{
+    const size_t length = strlen(text), enough = strlen(end);
+    if (length < enough) return false;
+    for (text += length - enough; *text; ++text, ++end)
+        if (tolower((unsigned char)*text) != *end) return false;
+    return true;
+}
+
+bool sadmm_scene_is_model(const char *spec)
+{
+    static const char *const ends[] = {".urdf", ".xml", ".mjcf", ".usd", ".usda", ".usdc", ".usdz"};
+    for (size_t k = 0; spec && k < sizeof ends / sizeof *ends; ++k)
+        if (ends_in(spec, ends[k])) return true;
+    return false;
+}
+
+static sadmm_status refuse_model(const char *path, struct sadmm_error *error)
+{
+    const int stem = (int)(strrchr(path, '.') - path);
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                      "%.60s: is a robot's file, which the Python package reads: \"python -m subadmm convert %.60s "
+                      "%.*s.json\" makes a scene file of it, \"python -m subadmm view %.60s\" shows it run; in Python, "
+                      "subadmm.load",
+                      path, path, stem < 60 ? stem : 60, path, path);
+}
+
 /* A scene of a file that has been read, and that belongs to it. */
 static sadmm_status take_file(struct sadmm_scene_file *file, struct sadmm_scene *scene, struct sadmm_error *error)
 {
@@ -183,6 +210,7 @@ sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struc
 
     if (!spec) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = NULL: must be a string");
     if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "out = NULL: must be given");
+    if (sadmm_scene_is_model(spec)) return refuse_model(spec, error);
     if (sadmm_scene_is_file(spec)) return sadmm_scene_open_file(spec, scene, error);
     colon = strchr(spec, ':');
     family = find(spec, colon ? (size_t)(colon - spec) : strlen(spec));

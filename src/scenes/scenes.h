@@ -31,9 +31,13 @@ const struct sadmm_scene_info *sadmm_scene_at(size_t index);
 /* Is this spec the path of a scene file? */
 bool sadmm_scene_is_file(const char *spec);
 
+/* Does it end as a robot's file does, which the Python package reads (.urdf, .xml, .usd...)? */
+bool sadmm_scene_is_model(const char *spec);
+
 /* Parse `spec` and fill `scene`. What is opened is to be closed; a scene of the library has nothing to be freed.
- * Errors: INVALID_ARGUMENT (unknown name: the message lists the valid ones; N or M out of the scene's range), and of a
- * file those of sadmm_scene_open_file. Nothing is to be closed after an error. */
+ * Errors: INVALID_ARGUMENT (unknown name: the message lists the valid ones; N or M out of the scene's range; a robot's
+ * file: the message says what reads it), and of a file those of sadmm_scene_open_file. Nothing is to be closed after an
+ * error. */
 sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struct sadmm_error *error);
 
 /* Fill `scene` from a scene file, or from `length` bytes of its text (name: what messages call it; NULL: nothing). Its

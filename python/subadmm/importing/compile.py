@@ -1,6 +1,7 @@
 """Files to MuJoCo's compiled models."""
 
 import xml.etree.ElementTree as tree
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,7 +29,7 @@ class LinkVisual:
 def compile_file(path, report, floating=False):
     """(the mujoco.MjModel of an MJCF or URDF file, a URDF's visuals or None); floating: a URDF's base is free.
 
-    Raises FileNotFoundError (also for a URDF's mesh), ValueError (with MuJoCo's message)."""
+    Raises FileNotFoundError (also for a URDF's mesh), ValueError (with MuJoCo's message, on one line)."""
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"path: there is no file {path}")
@@ -39,11 +40,22 @@ def compile_file(path, report, floating=False):
     if root.tag == "mujoco":
         if floating:
             raise ValueError(f"floating: {path} is MJCF, which has free joints itself")
-        return mujoco.MjModel.from_xml_path(str(path)), None
+        with _said_of(path):
+            return mujoco.MjModel.from_xml_path(str(path)), None
     if root.tag == "robot":
         visuals = _visuals_of(root, path, report)
-        return _compile_urdf(root, path, report, floating), visuals
+        with _said_of(path):
+            return _compile_urdf(root, path, report, floating), visuals
     raise ValueError(f"path: {path} is neither MJCF nor URDF: its root is <{root.tag}>")
+
+
+@contextmanager
+def _said_of(path):
+    """What MuJoCo says names neither the file nor ends on its line."""
+    try:
+        yield
+    except (ValueError, mujoco.FatalError) as error:
+        raise ValueError(f"path: {path}: {' '.join(str(error).split())}") from error
 
 
 def _values(element, name, default):

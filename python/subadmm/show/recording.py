@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -113,22 +114,42 @@ def check_frames(fps, contacts, prefix=""):
     return real(f"{prefix}fps", fps, 0, 1000, above=True), whole(f"{prefix}contacts", contacts, 0, 2**31 - 1)
 
 
+def count_frames(seconds, fps, prefix=""):
+    """Frames of so many seconds, the first at their beginning; or an error, with the prefix before its names."""
+    frames = int(np.floor(seconds * fps + 1e-9)) + 1
+    if frames > MOST_FRAMES:
+        raise ValueError(f"{prefix}seconds: {seconds:g}; with {fps:g} frames a second that is {frames} frames, and "
+                         f"must be {MOST_FRAMES} at most")
+    return frames
+
+
+def step_until(world, steps, ended=None):
+    """Make steps, and between them, ten times a second and more, ask ended(); true: enough. Are all of them made?"""
+    some = 1
+    while steps > 0 and not (ended and ended()):
+        some, begun = min(some, steps) if ended else steps, time.perf_counter()
+        world.step(some)
+        steps -= some
+        if time.perf_counter() - begun < 0.03:
+            some *= 2
+    return steps == 0
+
+
 def record(world: Any, seconds: float, fps: float = 30.0, title: str = "", contacts: int = 0,
-           after_frame: Callable[[int, int], None] | None = None) -> Recording:
+           after_frame: Callable[[int, int], None] | None = None,
+           ended: Callable[[], bool] | None = None) -> Recording:
     """Step a world, or what load() returned, for a time (s, simulated) and keep its poses `fps` times a second, at the
     nearest step; the first frame is the world as it is. contacts: so many of the largest contact forces are
     kept a frame, with their errors
     where settings ask for certificates. seconds: in (0, 1e9], fps: in (0, 1000], MOST_FRAMES frames at most.
-    after_frame(frame, frames): called after each."""
+    after_frame(frame, frames): called after each. ended(): asked between steps; true ends the recording with the
+    frames before."""
     seconds = real("seconds", seconds, 0, 1e9, above=True)
     fps, contacts = check_frames(fps, contacts)
     source = world
     world, _ = world_of(source)
     dt = world.settings.dt
-    frames = int(np.floor(seconds * fps + 1e-9)) + 1
-    if frames > MOST_FRAMES:
-        raise ValueError(f"seconds: {seconds:g}; with {fps:g} frames a second that is {frames} frames, and "
-                         f"must be {MOST_FRAMES} at most")
+    frames = count_frames(seconds, fps)
     at = np.unique(np.rint(np.arange(frames) / (fps * dt)).astype(np.int64))
     description = describe(source)
     step = position_step(description)
@@ -138,8 +159,9 @@ def record(world: Any, seconds: float, fps: float = 30.0, title: str = "", conta
     measures = {name: np.full(len(at), np.nan) for name in MEASURES}
     before, forces = None, []
     for k, steps in enumerate(at):
-        if k:
-            world.step(int(steps - at[k - 1]))
+        if k and not step_until(world, int(steps - at[k - 1]), ended):
+            at = at[:k]
+            break
         state = world.get("body_state")
         place, turn = description.poses(state)
         place = np.rint(place / step)
@@ -162,5 +184,6 @@ def record(world: Any, seconds: float, fps: float = 30.0, title: str = "", conta
             forces.append(forces_of(world, contacts))
         if after_frame:
             after_frame(k, len(at))
-    measures = {name: values for name, values in measures.items() if np.isfinite(values[1:]).any()}
-    return Recording(description, title, step, at * dt, positions, turns, measures, forces)
+    made = len(at)
+    measures = {name: values[:made] for name, values in measures.items() if np.isfinite(values[1:made]).any()}
+    return Recording(description, title, step, at * dt, positions[:made], turns[:made], measures, forces)
