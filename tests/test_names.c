@@ -290,6 +290,35 @@ START_TEST(saved_worlds_have_names)
 }
 END_TEST
 
+/* Errors about an object say its name. */
+START_TEST(errors_name_objects)
+{
+    const struct machine m = build(true);
+    const double x[3] = {0}, q[4] = {1, 0, 0, 0};
+    sadmm_body_id gate;
+    sadmm_joint_def joint = sadmm_joint_def_default();
+    sadmm_coupling_def coupling = sadmm_coupling_def_default();
+    int32_t count;
+    MUST(m.world, add_named(m.world, "gate", &gate));
+#define NAMES(call, named)                                                                                           \
+    do {                                                                                                             \
+        ck_assert_int_eq(call, SADMM_ERROR_INVALID_ARGUMENT);                                                        \
+        ck_assert_msg(strstr(sadmm_world_message(m.world), named) != NULL, "%s", sadmm_world_message(m.world));      \
+    } while (0)
+    NAMES(sadmm_world_set_body_wrench(m.world, gate, x, x), "generation 1, \"gate\"): is static, and must be dynamic");
+    NAMES(sadmm_world_move_body(m.world, m.bodies[1], x, q), "\"pinion\"): must be kinematic");
+    joint.body_a = gate;
+    NAMES(sadmm_world_add_joint(m.world, &joint, NULL), "\"gate\"), def->body_b = (slot 0, generation 0, \"\")");
+    joint.body_b = gate;
+    NAMES(sadmm_world_add_joint(m.world, &joint, NULL), "\"gate\"): must be two bodies");
+    coupling.body = gate;
+    NAMES(sadmm_world_add_coupling(m.world, &coupling, NULL), "\"gate\"): must be dynamic, it is static");
+    NAMES(sadmm_world_sensor_overlaps(m.world, m.shapes[1], 0, NULL, &count), "\"teeth\"): must be a shape defined as");
+#undef NAMES
+    sadmm_world_destroy(m.world);
+}
+END_TEST
+
 START_TEST(worlds_without_pay_nothing)
 {
     const struct machine plain = build(false), named = build(true);
@@ -348,6 +377,7 @@ int main(void)
     tcase_add_test(cases, a_name_is_of_one_object);
     tcase_add_test(cases, names_are_utf8);
     tcase_add_test(cases, saved_worlds_have_names);
+    tcase_add_test(cases, errors_name_objects);
     tcase_add_test(cases, worlds_without_pay_nothing);
     tcase_add_test(cases, memory_may_run_out);
     suite_add_tcase(suite, cases);

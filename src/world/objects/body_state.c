@@ -60,8 +60,9 @@ sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id id, const d
     TRY(sadmm_check_given(position, "position", error));
     TRY(sadmm_check_given(orientation, "orientation", error));
     if (body->type != SADMM_BODY_KINEMATIC)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id = (slot %u, generation %u): must be kinematic",
-                          id.slot, id.generation);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "id = (slot %u, generation %u, \"%s\"): must be kinematic", id.slot, id.generation,
+                          sadmm_world_body_name(world, id));
     TRY(sadmm_numbers_check(SADMM_BODY_FIELD(position), position, "position", error));
     TRY(sadmm_world_check_turn("orientation", orientation, unit, error));
     memcpy(body->target.position, position, sizeof body->target.position);
@@ -91,13 +92,14 @@ sadmm_status sadmm_world_body_move(sadmm_world *world, sadmm_body_id id, bool *p
 
 /* ---- forces and mass --------------------------------------------------------------------------------------------- */
 
-static sadmm_status check_dynamic(const struct sadmm_world_body *body, sadmm_body_id id, const char *why,
-                                  struct sadmm_error *error)
+/* Of a body that there is. */
+static sadmm_status check_dynamic(sadmm_world *world, sadmm_body_id id, const char *why)
 {
-    if (body->type == SADMM_BODY_DYNAMIC) return SADMM_OK;
-    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                      "id = (slot %u, generation %u): is %s, and must be dynamic: %s", id.slot, id.generation,
-                      sadmm_body_type_names[body->type], why);
+    const sadmm_body_type type = world->bodies[id.slot - 1].type;
+    if (type == SADMM_BODY_DYNAMIC) return SADMM_OK;
+    return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
+                      "id = (slot %u, generation %u, \"%s\"): is %s, and must be dynamic: %s", id.slot, id.generation,
+                      sadmm_world_body_name(world, id), sadmm_body_type_names[type], why);
 }
 
 sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
@@ -109,7 +111,7 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(force, "force", error));
     TRY(sadmm_check_given(torque, "torque", error));
-    TRY(check_dynamic(body, id, "no wrench moves it", error));
+    TRY(check_dynamic(world, id, "no wrench moves it"));
     TRY(sadmm_world_check_wrench(force, torque, error));
     if (body->system_body < 0) TRY(sadmm_world_detach(world));
     memcpy(body->rigid.wrench, force, 3 * sizeof *force);
@@ -138,7 +140,7 @@ sadmm_status sadmm_world_set_body_gravity_scale(sadmm_world *world, sadmm_body_i
     struct sadmm_error *error = &world->error;
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
-    TRY(check_dynamic(body, id, "gravity does not move it", error));
+    TRY(check_dynamic(world, id, "gravity does not move it"));
     TRY(sadmm_numbers_check(SADMM_BODY_FIELD(gravity_scale), &scale, "scale", error));
     if (body->system_body < 0) TRY(sadmm_world_detach(world));
     body->rigid.gravity_scale = scale;
@@ -152,7 +154,7 @@ sadmm_status sadmm_world_set_body_damping(sadmm_world *world, sadmm_body_id id, 
     struct sadmm_error *error = &world->error;
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
-    TRY(check_dynamic(body, id, "it has no motion to damp", error));
+    TRY(check_dynamic(world, id, "it has no motion to damp"));
     TRY(sadmm_numbers_check(SADMM_BODY_FIELD(linear_damping), &linear, "linear", error));
     TRY(sadmm_numbers_check(SADMM_BODY_FIELD(angular_damping), &angular, "angular", error));
     if (body->system_body < 0) TRY(sadmm_world_detach(world));
@@ -198,7 +200,7 @@ sadmm_status sadmm_world_apply_body_impulse_at(sadmm_world *world, sadmm_body_id
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(impulse, "impulse", error));
     TRY(sadmm_check_given(point, "point", error));
-    TRY(check_dynamic(body, id, "no impulse moves it", error));
+    TRY(check_dynamic(world, id, "no impulse moves it"));
     TRY(sadmm_check_vector("impulse", impulse, 3, HUGE_VAL, error));
     TRY(sadmm_numbers_check(SADMM_BODY_FIELD(position), point, "point", error));
     TRY(sadmm_world_body_state(world, id, &state));
@@ -218,7 +220,7 @@ sadmm_status sadmm_world_set_body_mass(sadmm_world *world, sadmm_body_id id, dou
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(inertia, "inertia", error));
-    TRY(check_dynamic(body, id, "it has no mass", error));
+    TRY(check_dynamic(world, id, "it has no mass"));
     TRY(sadmm_world_check_mass(world, mass, inertia, error));
     TRY(sadmm_world_detach(world));
     body->rigid.mass = mass;

@@ -47,8 +47,9 @@ static sadmm_status check_def(const sadmm_world *world, const sadmm_coupling_def
     if (!body) return SADMM_ERROR_STALE_ID;
     if (body->type != SADMM_BODY_DYNAMIC)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->body = (slot %u, generation %u): must be dynamic, it is %s", def->body.slot,
-                          def->body.generation, sadmm_body_type_names[body->type]);
+                          "def->body = (slot %u, generation %u, \"%s\"): must be dynamic, it is %s", def->body.slot,
+                          def->body.generation, sadmm_world_body_name(world, def->body),
+                          sadmm_body_type_names[body->type]);
     return sadmm_fields_check(sadmm_coupling_table, SADMM_COUPLING_FIELDS_COUNT, def, "def->", error);
 }
 

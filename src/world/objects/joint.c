@@ -104,13 +104,14 @@ static sadmm_status find_sides(const sadmm_world *world, const sadmm_joint_def *
     TRY(find_side(world, def->body_b, "def->body_b", &slots[1], error));
     if (slots[0] == slots[1] && slots[0] >= 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->body_a = def->body_b = (slot %u, generation %u): must be two bodies", def->body_a.slot,
-                          def->body_a.generation);
+                          "def->body_a = def->body_b = (slot %u, generation %u, \"%s\"): must be two bodies",
+                          def->body_a.slot, def->body_a.generation, sadmm_world_body_name(world, def->body_a));
     if (!moves(world, slots[0]) && !moves(world, slots[1]))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->body_a = (slot %u, generation %u), def->body_b = (slot %u, generation %u): one at "
-                          "least must be dynamic", def->body_a.slot, def->body_a.generation, def->body_b.slot,
-                          def->body_b.generation);
+                          "def->body_a = (slot %u, generation %u, \"%s\"), def->body_b = (slot %u, generation %u, "
+                          "\"%s\"): one at least must be dynamic", def->body_a.slot, def->body_a.generation,
+                          sadmm_world_body_name(world, def->body_a), def->body_b.slot, def->body_b.generation,
+                          sadmm_world_body_name(world, def->body_b));
     return SADMM_OK;
 }
 

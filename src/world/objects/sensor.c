@@ -52,8 +52,8 @@ sadmm_status sadmm_world_sensor_overlaps(sadmm_world *world, sadmm_shape_id sens
     if (!shape) return SADMM_ERROR_STALE_ID;
     if (!shape->sensor)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "sensor = (slot %u, generation %u): must be a shape defined as a sensor", sensor.slot,
-                          sensor.generation);
+                          "sensor = (slot %u, generation %u, \"%s\"): must be a shape defined as a sensor",
+                          sensor.slot, sensor.generation, sadmm_world_shape_name(world, sensor));
     TRY(sadmm_world_check_overlap_room(capacity, shapes, count, error));
     TRY(sadmm_world_list_seen(world, sensor.slot - 1, &found));
     sadmm_world_give_overlaps(world, found, capacity, shapes, count);
