@@ -7,7 +7,7 @@
  * A program runs with a library that is newer or older than the headers it was compiled with, as long as both have the
  * same major version. Of these structs, and no others, later versions have more members, at the end:
  *
- *   Definitions, settings, filters: they begin with `struct_size`, their size in the program, bytes. The _default
+ *   Definitions, settings, filters, sadmm_draw: they begin with `struct_size`, their size in the program. The _default
  *       functions set it; a struct with another value there is refused. What the program does not know keeps its
  *       default. What the library does not know must be 0.
  *   Reports and infos: functions that write them, or definitions that are read back, are given the size in the program
