@@ -417,8 +417,8 @@ void bind_joints(nb::module_ &m, nb::class_<world> &w);
 void bind_queries(nb::class_<world> &w);
 void bind_events(nb::module_ &m, nb::class_<world> &w);
 void bind_manifold(nb::module_ &m, nb::class_<world> &w);
-// A world's callback may hold the world.
-nb::type_slots collected_world();
+// Of a world that no call is being made on.
+void end_callback(world &w);
 void bind_scenes(nb::module_ &m, nb::class_<world> &w);
 void bind_environments(nb::module_ &m);
 void bind_draw(nb::module_ &m);

@@ -86,7 +86,7 @@ nb::dict debug_draw(world &w, nb::object what, const whole &segments, double for
     std::string message;
     {
         nb::gil_scoped_release release;
-        std::lock_guard<std::mutex> lock(w.mutex);
+        world_lock lock(w);
         status = sadmm_world_prepare_draw(w.handle);
         if (status != SADMM_OK) {
             message = sadmm_world_message(w.handle);

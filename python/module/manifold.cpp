@@ -46,27 +46,10 @@ static void set_callback(world &w, nb::object function)
     w.decide = none ? nb::object() : std::move(function);
 }
 
-static int traverse_world(PyObject *self, visitproc visit, void *arg) noexcept
+void end_callback(world &w)
 {
-    Py_VISIT(Py_TYPE(self));
-    if (nb::inst_ready(self)) Py_VISIT(nb::inst_ptr<world>(self)->decide.ptr());
-    return 0;
-}
-
-static int clear_world(PyObject *self) noexcept
-{
-    if (!nb::inst_ready(self)) return 0;
-    world &w = *nb::inst_ptr<world>(self); // no call is being made, or that would hold it
     if (w.decide.is_valid()) sadmm_world_set_manifold_callback(w.handle, nullptr, nullptr);
     nb::object dropped = std::move(w.decide);
-    return 0;
-}
-
-nb::type_slots collected_world()
-{
-    static PyType_Slot slots[] = {
-        {Py_tp_traverse, (void *)&traverse_world}, {Py_tp_clear, (void *)&clear_world}, {0, nullptr}};
-    return nb::type_slots(slots);
 }
 
 void bind_manifold(nb::module_ &m, nb::class_<world> &w)

@@ -47,19 +47,24 @@ void kept_objects::sweep(world &w)
     }
 }
 
+// What a caller gave a world may hold the world: objects as user data, the callback for manifolds.
 static int traverse_world(PyObject *self, visitproc visit, void *arg) noexcept
 {
     Py_VISIT(Py_TYPE(self));
-    if (nb::inst_ready(self))
-        for (const auto &[key, value] : nb::inst_ptr<world>(self)->user_data.by_key) Py_VISIT(value.ptr());
+    if (!nb::inst_ready(self)) return 0;
+    const world &w = *nb::inst_ptr<world>(self);
+    for (const auto &[key, value] : w.user_data.by_key) Py_VISIT(value.ptr());
+    Py_VISIT(w.decide.ptr());
     return 0;
 }
 
 static int clear_world(PyObject *self) noexcept
 {
     if (!nb::inst_ready(self)) return 0;
+    world &w = *nb::inst_ptr<world>(self);
     std::unordered_map<uintptr_t, nb::object> dropped;
-    dropped.swap(nb::inst_ptr<world>(self)->user_data.by_key);
+    dropped.swap(w.user_data.by_key);
+    end_callback(w); // no call is being made: that would hold the world
     return 0;
 }
 
