@@ -219,8 +219,11 @@ def _hands(build, given, _):
 
     with _usage():
         port, yaw = whole("--port", given.port, 0, 65535), math.radians(real("--yaw", given.yaw, -3600, 3600))
+        scale = real("--scale", given.scale, 1e-3, 1e3)
+        if (given.certificate is None) != (given.key is None):
+            raise ValueError("--certificate, --key: one must be given with the other")
     serve(build, os.path.basename(given.scene), host=given.host, port=port, certificate=given.certificate,
-          key=given.key, stand=given.stand, yaw=yaw, scale=given.scale)
+          key=given.key, stand=given.stand, yaw=yaw, scale=scale)
 
 
 def _convert(given):

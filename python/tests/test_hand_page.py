@@ -401,9 +401,10 @@ def test_the_command(monkeypatch, capsys):
     monkeypatch.setattr(of_page.HandPage, "frame", end)
     assert main(["hands", "pyramid:2", "--port", "0", "--stand", "0", "0", "-1", "--yaw", "90"]) == 130
     assert "pyramid:2: http://127.0.0.1:" in capsys.readouterr().out
-    for wrong in (["--port", "-1"], ["--scale", "0"], ["--certificate", "a.pem"], ["--yaw", "nan"],
-                  ["--host", "no.such.host.invalid"]):
-        assert main(["hands", "pyramid:2", *wrong]) == 1
+    for wrong, status_ in ((["--port", "-1"], 2), (["--scale", "0"], 2), (["--certificate", "a.pem"], 2),
+                           (["--yaw", "nan"], 2), (["--host", "no.such.host.invalid"], 1),
+                           (["--certificate", "none.pem", "--key", "none.pem"], 1)):
+        assert main(["hands", "pyramid:2", *wrong]) == status_
         assert capsys.readouterr().err.count("\n") == 1
 
 

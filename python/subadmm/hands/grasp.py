@@ -1,4 +1,8 @@
 """Hands by how far they are open: what a controller's trigger stands for, and recordings that are made up."""
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 
 from ..given import point, real
@@ -29,7 +33,8 @@ def _bent(root, bones, tip, bow):
     return [root + along * way + off * outward / np.linalg.norm(outward), end, tip]
 
 
-def grasping(side, position, orientation=(1, 0, 0, 0), opening=WIDEST):
+def grasping(side: str, position: Any, orientation: Any = (1, 0, 0, 0),
+             opening: float = WIDEST) -> np.ndarray:
     """21 x 3 joints, m, of a hand with the pads of thumb and fingers face to face.
 
     position: the middle between the tips, m; orientation, w x y z, of the hand's frame: x to where its fingers point, z
