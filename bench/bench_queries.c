@@ -46,18 +46,25 @@ static sadmm_status of_world(const struct bench *b, sadmm_status status)
     return status == SADMM_OK ? status : sadmm_fail(b->error, status, "%s", sadmm_world_message(b->world));
 }
 
+static sadmm_status run_scene(struct bench *b, const struct options *o, struct sadmm_scene *scene)
+{
+    TRY(sadmm_scene_build(scene, &b->world, b->error));
+    for (long k = 0; k < o->steps; ++k) {
+        TRY(sadmm_scene_before_step(scene, b->world, k, b->error));
+        TRY(of_world(b, sadmm_world_step(b->world)));
+    }
+    return SADMM_OK;
+}
+
 static sadmm_status make_world(struct bench *b, const struct options *o)
 {
     struct sadmm_scene scene;
     TRY(sadmm_scene_open(o->scene, &scene, b->error));
     scene.def.backend = SADMM_BACKEND_CPU;
     scene.def.settings.threads = (int)o->threads;
-    TRY(sadmm_scene_build(&scene, &b->world, b->error));
-    for (long k = 0; k < o->steps; ++k) {
-        TRY(sadmm_scene_before_step(&scene, b->world, k, b->error));
-        TRY(of_world(b, sadmm_world_step(b->world)));
-    }
-    return SADMM_OK;
+    const sadmm_status status = run_scene(b, o, &scene);
+    sadmm_scene_close(&scene);
+    return status;
 }
 
 static sadmm_status find_box(struct bench *b)
