@@ -4,7 +4,7 @@
 
 #include "core/base/memory.h"
 
-enum { BOX, PLANE, MESH, HULL_FREE_KINDS };
+enum { BOX, PLANE, MESH, KINDS };
 static const double TURNED = 0.6; /* rad, of a belt's shape about z */
 
 static double solved(int solver) { return solvers[solver].precision == SADMM_F32 ? 2e-5 : 1e-8; }
@@ -58,7 +58,7 @@ START_TEST(a_surface_drags_by_friction)
 {
     enum { STEPS = 40 };
     const double mu = 0.4, speed = 0.8, mass = 2;
-    const int solver = _i % SOLVERS, kind = _i / SOLVERS % HULL_FREE_KINDS, kinematic = _i / SOLVERS / HULL_FREE_KINDS;
+    const int solver = _i % SOLVERS, kind = _i / SOLVERS % KINDS, kinematic = _i / SOLVERS / KINDS;
     if (kinematic && kind == PLANE) return; /* planes are on static bodies */
     const sadmm_world_def def = bodies_def();
     const double dt = def.settings.dt;
@@ -526,7 +526,7 @@ int main(void)
     Suite *suite = suite_create("decide");
     TCase *cases = tcase_create("decide");
     tcase_set_timeout(cases, 120);
-    tcase_add_loop_test(cases, a_surface_drags_by_friction, 0, 2 * HULL_FREE_KINDS * SOLVERS);
+    tcase_add_loop_test(cases, a_surface_drags_by_friction, 0, 2 * KINDS * SOLVERS);
     tcase_add_loop_test(cases, a_surface_is_a_body_that_is_set_back, 0, SOLVERS);
     tcase_add_loop_test(cases, what_rides_is_solved, 0, SOLVERS);
     tcase_add_loop_test(cases, hits_feel_the_surface, 0, SOLVERS);

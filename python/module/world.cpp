@@ -53,7 +53,6 @@ static sadmm_status step_once(world &w, bool wait, std::string &message)
     return status;
 }
 
-// Many, with a look at whether the user has interrupted them now and then.
 // Has the last step missed its tolerance, for the first time? Then what the warning says.
 static bool misses_tolerance(world &w, std::string &warning)
 {
@@ -70,6 +69,7 @@ static bool misses_tolerance(world &w, std::string &warning)
     return w.warned = true;
 }
 
+// Many, with a look at whether the user has interrupted them now and then.
 static void step(world &w, const whole &steps, bool wait)
 {
     const int64_t n = steps.in("n", 0, INT64_MAX);
