@@ -20,10 +20,12 @@ static __device__ __forceinline__ bool shape_is_there(const hits_view &v, int32_
 static __device__ __forceinline__ bool pair_presses(const hits_view &v, const struct sadmm_contact_pair &pair)
 {
     if (!shape_is_there(v, pair.shape_a) || !shape_is_there(v, pair.shape_b)) return false;
-    if (pair.revision != word_of_pair(v.c.proxies[pair.shape_a].revision, v.c.proxies[pair.shape_b].revision))
-        return false;
+    const struct sadmm_proxy &a = v.c.proxies[pair.shape_a], &b = v.c.proxies[pair.shape_b];
+    if (pair.revision != word_of_pair(a.revision, b.revision)) return false;
+    const double mass_a = a.system_body >= 0 ? v.step.before[a.system_body].mass : 0,
+                 mass_b = b.system_body >= 0 ? v.step.before[b.system_body].mass : 0;
     for (int32_t k = pair.first; k < pair.first + pair.count; ++k)
-        if (sadmm_normal_impulse(&pair, &v.c.before.points[k]) > 0) return true;
+        if (swept_body_presses(&pair, &v.c.before.points[k], &a, mass_a, &b, mass_b)) return true;
     return false;
 }
 

@@ -38,8 +38,9 @@ struct finish_shared {
 static __device__ __forceinline__ void report_touch(const island_view &islands, int32_t body, int32_t label,
                                                     bool anchored_outside, int touch)
 {
-    add_touch(islands, body, label, anchored_outside ? touch & TOUCH_OF_BODY : touch);
-    if (!anchored_outside) islands.again[AGAIN] = 1;
+    const int exceptions = touch & TOUCH_PENETRATES; /* a body that rocks too fast (core/model/forces.h) */
+    add_touch(islands, body, label, anchored_outside ? (touch & TOUCH_OF_BODY) | exceptions : touch);
+    if (!anchored_outside || exceptions) islands.again[AGAIN] = 1;
     if (!(touch & TOUCH_SUPPORTED)) islands.again[AGAIN_UNPRESSED] = 1;
 }
 

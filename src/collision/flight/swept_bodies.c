@@ -5,17 +5,24 @@
 #include "collision/find/contact_emit.h"
 #include "collision/find/pipeline.h"
 #include "fast_pair.h"
+#include "swept_body.h"
 
-/* Does it press? Its first point mostly decides. */
-static bool presses(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
+static double mass_of(const struct sadmm_rigid *bodies, const struct sadmm_proxy *shape)
+{
+    return shape->system_body >= 0 ? bodies[shape->system_body].mass : 0;
+}
+
+/* Its first point mostly decides. */
+static bool presses(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair,
+                    const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct sadmm_rigid *bodies)
 {
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
-        if (sadmm_normal_impulse(pair, &contacts->points[k]) > 0) return true;
+        if (swept_body_presses(pair, &contacts->points[k], a, mass_of(bodies, a), b, mass_of(bodies, b))) return true;
     return false;
 }
 
 void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const struct sadmm_contact_set *contacts,
-                                  unsigned char *kinds)
+                                  const struct sadmm_rigid *bodies, unsigned char *kinds)
 {
     const struct sadmm_candidates *c = &collision->candidates;
     for (size_t p = 0; p < contacts->pair_count; ++p) {
@@ -26,7 +33,7 @@ void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const
         const struct sadmm_proxy *a = &c->proxies[pair->shape_a], *b = &c->proxies[pair->shape_b];
         unsigned char *of_a = &kinds[a->body], *of_b = &kinds[b->body];
         if ((*of_a != SADMM_SWEPT_DYNAMIC && *of_b != SADMM_SWEPT_DYNAMIC) ||
-            pair->revision != word_of_pair(a->revision, b->revision) || !presses(contacts, pair))
+            pair->revision != word_of_pair(a->revision, b->revision) || !presses(contacts, pair, a, b, bodies))
             continue;
         if (*of_a == SADMM_SWEPT_DYNAMIC) *of_a = SADMM_SWEPT_NONE;
         if (*of_b == SADMM_SWEPT_DYNAMIC) *of_b = SADMM_SWEPT_NONE;

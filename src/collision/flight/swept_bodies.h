@@ -14,10 +14,12 @@ extern "C" {
 enum sadmm_swept_kind { SADMM_SWEPT_NONE, SADMM_SWEPT_FIXED, SADMM_SWEPT_DYNAMIC };
 
 struct sadmm_pair_list;
+struct sadmm_rigid;
 
-/* Bodies that a contact of the last set presses on become SADMM_SWEPT_NONE. After find_candidates. */
+/* Bodies that a contact of the last set presses on become SADMM_SWEPT_NONE. bodies: the system's. After
+ * find_candidates. */
 void sadmm_collision_mark_pressed(const struct sadmm_collision *collision, const struct sadmm_contact_set *contacts,
-                                  unsigned char *kinds);
+                                  const struct sadmm_rigid *bodies, unsigned char *kinds);
 
 /* The pairs of shapes, as (a << 32 | b) in the order of pairs, that approach faster than the threshold, at least as far
  * as their velocities and boxes show, and of which either has restitution (bounces: any shape has), or which pass

@@ -10,6 +10,8 @@
 #include "collision/base/bounds.h"
 #include "collision/base/manifold.h"
 #include "collision/shapes/geometry.h"
+#include "collision/shapes/proxy.h"
+#include "core/base/contact_set.h"
 #include "core/math/hit.h"
 #include "core/math/rigid.h"
 #include "core/model/forces.h"
@@ -27,6 +29,22 @@ struct swept_body {
     bool passes;   /* it may go through what is thin: the hits it has had are kept then, */
     bool ended;    /* and what comes after them is left to the solve */
 };
+
+/* ---- what is supported ------------------------------------------------------------------------------------------- */
+
+/* Does a point of the last step's contacts press on its bodies? By more than what rounding of single precision leaves
+ * of their speeds there, some hundred times over. mass: 0 of what is not dynamic. */
+#define SWEPT_BODY_ROUNDING 1e-5
+SADMM_INLINE bool swept_body_presses(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point,
+                                     const struct sadmm_proxy *a, double mass_a, const struct sadmm_proxy *b,
+                                     double mass_b)
+{
+    const double push = sadmm_normal_impulse(pair, point),
+                 gives = push * ((mass_a > 0 ? 1 / mass_a : 0) + (mass_b > 0 ? 1 / mass_b : 0)),
+                 speed = size3(a->velocity) + size3(a->angular) * size3(point->arm_a) + size3(b->velocity) +
+                         size3(b->angular) * size3(point->arm_b);
+    return push > 0 && gives > SWEPT_BODY_ROUNDING * speed;
+}
 
 /* ---- ways -------------------------------------------------------------------------------------------------------- */
 

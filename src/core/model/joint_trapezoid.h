@@ -56,7 +56,7 @@ SADMM_INLINE struct joint_trapezoid joint_trapezoid_of(const struct sadmm_rigid 
     if (rigid) spin_before(rigid, dt, before);
     for (k = 0; k < 6; ++k) {
         out.velocity[k] = rigid ? velocity[k] : 0;
-        out.correction[k] = rigid ? (velocity[k] - before[k]) / 2 : 0;
+        out.correction[k] = rigid && !(k < 3 && rigid->was_hit) ? (velocity[k] - before[k]) / 2 : 0;
     }
     return out;
 }
@@ -153,14 +153,22 @@ SADMM_INLINE int joint_row_touches(const struct sadmm_joint_source *source, doub
     return joint_limit_penetrates(source, lambda, row_a, row_b, bodies, settings) ? bits | ISLAND_TRAPEZOID_OFF : bits;
 }
 
-/* Position, orientation and velocity at the end, by the solution v. halfway: its orientation then (spin.h). */
+/* Does a body of an island with joints move by the mean of its velocities (sadmm_rigid.mean)? */
+SADMM_INLINE bool joint_moves_by_mean(const struct sadmm_rigid *from, bool trapezoid_off)
+{
+    return !trapezoid_off && !from->was_hit;
+}
+
+/* Position, orientation and velocity at the end, by the solution v. halfway: its orientation then (spin.h). What was
+ * hit, which no joint holds, goes to its place by the velocity that it ends with. */
 SADMM_INLINE void joint_move(const struct sadmm_rigid *from, const double halfway[4], const double v[6],
                              bool trapezoid_off, double dt, double position[3], double orientation[4],
                              double velocity[6])
 {
     double mean[6];
     int k;
-    for (k = 0; k < 6; ++k) mean[k] = trapezoid_off ? v[k] : (from->velocity[k] + v[k]) / 2;
+    for (k = 0; k < 6; ++k)
+        mean[k] = trapezoid_off || (k < 3 && from->was_hit) ? v[k] : (from->velocity[k] + v[k]) / 2;
     spin_move_from(from, halfway, v, mean, trapezoid_off, dt, position, orientation, velocity);
 }
 

@@ -277,7 +277,7 @@ static void mark_bodies(struct taking *t)
         kinds[slot] = sadmm_ids_has(&world->body_ids, slot) ? swept_kind(&world->bodies[slot], t->settings.dt)
                                                             : SADMM_SWEPT_FIXED;
     sadmm_world_mark_held(world, kinds, SADMM_SWEPT_NONE);
-    sadmm_collision_mark_pressed(world->collision, &world->contacts, kinds);
+    sadmm_collision_mark_pressed(world->collision, &world->contacts, world->start.rigid, kinds);
 }
 
 /* The orientation that a body has at its last hit, from which contact finding turns it by its velocity. */

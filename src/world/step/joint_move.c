@@ -101,8 +101,8 @@ static void move_bodies(sadmm_world *world, double dt)
         const bool off = island & ISLAND_TRAPEZOID_OFF;
         if (from->rolls & ROLLING_IS_STIFFENED) world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
         if (!(island & ISLAND_ARTICULATED)) continue;
-        next->mean = !off;
-        if (world->spins_known && !off) {
+        next->mean = joint_moves_by_mean(from, off);
+        if (world->spins_known && next->mean) {
             several[count++] =
                 (struct joint_movement){from, &world->spins[i].orientation.w, velocity, next};
             if (count < most) continue;
