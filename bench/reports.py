@@ -3,6 +3,7 @@
 Times are medians over the repeats of the median step; errors are measured in runs of their own, since the certificate
 takes time. A backend is a column of some reports: their rows on a GPU are measured by themselves, Tools.backend.
 """
+import concurrent.futures
 import csv
 import io
 import json
@@ -278,9 +279,15 @@ def rows_stress(tools):
         yield from tools.rows("stress", allowed=(0, 1))
         return
     listed = re.findall(r"^\w+", tools.output([tools.bench, "stress", "--list"]), re.M)
-    for case in tools.choose(listed, ["two_balls"]):
+
+    def rows_of(case):
         shorter = ("--quick",) if case in LONG_CASES and not tools.quick else ()
-        yield from tools.rows("stress", "--backend", "cuda", "--case", case, *shorter, allowed=(0, 1))
+        return list(tools.rows("stress", "--backend", "cuda", "--case", case, *shorter, allowed=(0, 1)))
+
+    # side by side: no time of theirs is shown
+    with concurrent.futures.ThreadPoolExecutor(min(8, os.cpu_count() or 1)) as pool:
+        for rows in pool.map(rows_of, tools.choose(listed, ["two_balls"])):
+            yield from rows
 
 
 def rows_peers(tools):

@@ -96,6 +96,7 @@ static void gyroscope(struct stress *s)
 #define LIMIT(most, why) .precisions = STRESS_BOTH, .bound = most, .reason = why
 #define TURNS            "a joint that turns by more than 0.1 rad in a step loses energy (docs/guide/limits.md)"
 #define ADDS_UP          "errors of second order in a step's turn add up in 1,000 s: half the step leaves a quarter"
+#define GAINS            "a gain of the step's fifth order adds up in 1,000 s: half the step leaves a thirtieth"
 #define NODS             "its axis nods by several radians a step: steps of 1 ms follow it"
 
 static const struct stress_case cases[] = {
@@ -131,6 +132,7 @@ static const struct stress_case cases[] = {
                 {.check = "joint open, share of the arm", .from = 0, .to = 1e5, .variants = 1, LIMIT(0.1, TURNS)},
                 {.check = "off the level, share of the arm", .from = 0, .to = 300, .variants = 2, LIMIT(0.2, ADDS_UP)},
                 {.check = "rate of going round, share", .from = 0, .to = 300, .variants = 2, LIMIT(0.2, ADDS_UP)},
+                {.check = "energy over the start, share", .from = 30, .to = 30, .variants = 2, LIMIT(1e-3, GAINS)},
                 {.check = "off the level, share of the arm", .from = 1e3, .to = 1e4, .variants = 2, LIMIT(1.01, TURNS)},
                 {.check = "rate of going round, share", .from = 1e3, .to = 1e4, .variants = 2, LIMIT(500, TURNS)}}},
 };
