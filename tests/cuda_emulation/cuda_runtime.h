@@ -134,7 +134,9 @@ inline unsigned char *poisoned(size_t bytes)
 {
     void *block = nullptr;
     if (posix_memalign(&block, 256, bytes ? bytes : 1) != 0) return nullptr;
-    memset(block, 0xff, bytes ? bytes : 1);
+    const uint16_t poison = 0x7ff8; /* in a row: not a number, in both precisions, and an index far out of bounds */
+    for (size_t k = 0; k < bytes; k += sizeof poison)
+        memcpy((unsigned char *)block + k, &poison, bytes - k < sizeof poison ? bytes - k : sizeof poison);
     return (unsigned char *)block;
 }
 

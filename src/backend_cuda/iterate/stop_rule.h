@@ -28,7 +28,8 @@ static __device__ __forceinline__ bool rows_stopped(const model_view &model, con
                                                     const island_view &islands, int32_t checks,
                                                     const row_constraint &rows)
 {
-    return checks > 0 && island_stopped(graph, islands, checks, rows.body_a < model.bodies ? rows.body_a : rows.body_b);
+    const int32_t body = rows.body_a < model.bodies ? rows.body_a : rows.body_b;
+    return checks > 0 && body < model.bodies && island_stopped(graph, islands, checks, body);
 }
 
 /* Had all islands of the slots [first, end), which are whole ones? */

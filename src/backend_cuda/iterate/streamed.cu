@@ -33,12 +33,13 @@ static __device__ __forceinline__ void load_numbers_once(real (&to)[4 * COUNT], 
     unpack(to, four);
 }
 
-/* How far a part of the iteration goes in the island of a body. */
+/* How far a part of the iteration goes in the island of a body. there: else nothing is read: in a step that was aborted
+ * islands may have no names, and what a joint has room for, but no rows, has no body. */
 template <bool FAST>
 static __device__ __forceinline__ real relaxed(const cuda_view &v, const cuda_args &args, enum cuda_relax what,
-                                               int32_t body)
+                                               bool there, int32_t body)
 {
-    if (!FAST || !(args.relax & what)) return 1;
+    if (!FAST || !there || !(args.relax & what)) return 1;
     if (args.relax & RELAX_WARM && !v.islands.info[v.graph.label[body]].warm) return 1;
     return (real)v.model.settings->relaxation;
 }
@@ -110,8 +111,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const int32_t begin = live ? v.graph.offsets[i] : 0, end = live ? v.graph.offsets[i + 1] : 0;
     const real ratio = JOIN && args.rescaled ? (real)*v.iteration.ratio : (real)1,
                relaxation = FAST ? (real)v.model.settings->relaxation : (real)1,
-               multipliers = relaxed<FAST>(v, args, RELAX_MULTIPLIERS, (int32_t)at),
-               velocity = relaxed<FAST>(v, args, RELAX_VELOCITY, (int32_t)at);
+               multipliers = relaxed<FAST>(v, args, RELAX_MULTIPLIERS, there, (int32_t)at),
+               velocity = relaxed<FAST>(v, args, RELAX_VELOCITY, there, (int32_t)at);
     const solver_real *line = v.bodies.lines + at * LINE;
     solver_real *const b_row = (FAST ? v.bodies.momentum_residual : v.bodies.b) + at * ROW,
                 *const state_row = v.bodies.state + at * ROW;
@@ -209,7 +210,7 @@ static __global__ void __launch_bounds__(THREADS)
     if (FAST && all_stopped(v.islands, args.checks)) return;
     if (t.there) {
         const bool on = t.live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, pair.ends));
-        const real factor = relaxed<FAST>(v, args, RELAX_MULTIPLIERS,
+        const real factor = relaxed<FAST>(v, args, RELAX_MULTIPLIERS, true,
                                           first_dynamic(v.model, pair.ends.body_a, pair.ends.body_b));
         primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, pair,
                                                                 t.lane, on, factor);
@@ -227,11 +228,11 @@ static __global__ void __launch_bounds__(THREADS)
     double primal = 0;
     if (FAST && all_stopped(v.islands, args.checks)) return;
     if (k < live_rows(v.model, v.rows) &&
-        !(FAST && rows_stopped(v.model, v.graph, v.islands, args.checks, v.rows.constraints[k])))
+        !(FAST && rows_stopped(v.model, v.graph, v.islands, args.checks, v.rows.constraints[k]))) {
+        const int32_t body = first_dynamic(v.model, v.rows.constraints[k].body_a, v.rows.constraints[k].body_b);
         primal = sweep_rows<MEASURE, FAST>(v.model, v.bodies, v.rows, v.iteration, k,
-                                           relaxed<FAST>(v, args, RELAX_MULTIPLIERS,
-                                                         first_dynamic(v.model, v.rows.constraints[k].body_a,
-                                                                       v.rows.constraints[k].body_b)));
+                                           relaxed<FAST>(v, args, RELAX_MULTIPLIERS, body < v.model.bodies, body));
+    }
     if (MEASURE) reduce_max(primal, v.iteration.residual);
 }
 
