@@ -219,6 +219,8 @@ def test_a_second_signal_ends_at_once(tmp_path, monkeypatch):
 
     path = tmp_path / "a.html"
     path.write_text("old")
+    default = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background has it ignored
+    monkeypatch.setattr(signal, "default_int_handler", default)  # put back at the end
     with Signals() as signals:
         with signals.checked():
             os.kill(os.getpid(), signal.SIGTERM)
