@@ -33,13 +33,13 @@ static __device__ __forceinline__ void load_numbers_once(real (&to)[4 * COUNT], 
     unpack(to, four);
 }
 
-/* How far a part of the iteration goes in the island of a body. there: else nothing is read: in a step that was aborted
- * islands may have no names, and what a joint has room for, but no rows, has no body. */
+/* How far a part of the iteration goes in the island of a body; model.bodies: of none, whose island must not be asked
+ * for. (In a step that was aborted islands may have no labels; what a joint has room for, but no rows, has no body.) */
 template <bool FAST>
 static __device__ __forceinline__ real relaxed(const cuda_view &v, const cuda_args &args, enum cuda_relax what,
-                                               bool there, int32_t body)
+                                               int32_t body)
 {
-    if (!FAST || !there || !(args.relax & what)) return 1;
+    if (!FAST || !(args.relax & what) || body >= v.model.bodies) return 1;
     if (args.relax & RELAX_WARM && !v.islands.info[v.graph.label[body]].warm) return 1;
     return (real)v.model.settings->relaxation;
 }
@@ -107,12 +107,13 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const bool there = i < live_bodies(v.model);
     /* Threads without a body come along, for the other lanes' sake. */
     const size_t at = !there ? 0 : args.in_order ? (size_t)i : (size_t)v.graph.body_of[i];
+    const int32_t body = there ? (int32_t)at : v.model.bodies;
     const bool live = there && !(FAST && island_stopped(v.graph, v.islands, args.checks, (int32_t)at));
     const int32_t begin = live ? v.graph.offsets[i] : 0, end = live ? v.graph.offsets[i + 1] : 0;
     const real ratio = JOIN && args.rescaled ? (real)*v.iteration.ratio : (real)1,
                relaxation = FAST ? (real)v.model.settings->relaxation : (real)1,
-               multipliers = relaxed<FAST>(v, args, RELAX_MULTIPLIERS, there, (int32_t)at),
-               velocity = relaxed<FAST>(v, args, RELAX_VELOCITY, there, (int32_t)at);
+               multipliers = relaxed<FAST>(v, args, RELAX_MULTIPLIERS, body),
+               velocity = relaxed<FAST>(v, args, RELAX_VELOCITY, body);
     const solver_real *line = v.bodies.lines + at * LINE;
     solver_real *const b_row = (FAST ? v.bodies.momentum_residual : v.bodies.b) + at * ROW,
                 *const state_row = v.bodies.state + at * ROW;
@@ -210,7 +211,7 @@ static __global__ void __launch_bounds__(THREADS)
     if (FAST && all_stopped(v.islands, args.checks)) return;
     if (t.there) {
         const bool on = t.live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, pair.ends));
-        const real factor = relaxed<FAST>(v, args, RELAX_MULTIPLIERS, true,
+        const real factor = relaxed<FAST>(v, args, RELAX_MULTIPLIERS,
                                           first_dynamic(v.model, pair.ends.body_a, pair.ends.body_b));
         primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, pair,
                                                                 t.lane, on, factor);
@@ -228,11 +229,11 @@ static __global__ void __launch_bounds__(THREADS)
     double primal = 0;
     if (FAST && all_stopped(v.islands, args.checks)) return;
     if (k < live_rows(v.model, v.rows) &&
-        !(FAST && rows_stopped(v.model, v.graph, v.islands, args.checks, v.rows.constraints[k]))) {
-        const int32_t body = first_dynamic(v.model, v.rows.constraints[k].body_a, v.rows.constraints[k].body_b);
+        !(FAST && rows_stopped(v.model, v.graph, v.islands, args.checks, v.rows.constraints[k])))
         primal = sweep_rows<MEASURE, FAST>(v.model, v.bodies, v.rows, v.iteration, k,
-                                           relaxed<FAST>(v, args, RELAX_MULTIPLIERS, body < v.model.bodies, body));
-    }
+                                           relaxed<FAST>(v, args, RELAX_MULTIPLIERS,
+                                                         first_dynamic(v.model, v.rows.constraints[k].body_a,
+                                                                       v.rows.constraints[k].body_b)));
     if (MEASURE) reduce_max(primal, v.iteration.residual);
 }
 

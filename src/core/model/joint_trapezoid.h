@@ -53,11 +53,13 @@ SADMM_INLINE struct joint_trapezoid joint_trapezoid_of(const struct sadmm_rigid 
     double before[6];
     int k;
     out.rigid = rigid;
-    if (rigid) spin_before(rigid, dt, before);
     for (k = 0; k < 6; ++k) {
         out.velocity[k] = rigid ? velocity[k] : 0;
-        out.correction[k] = rigid && !(k < 3 && rigid->was_hit) ? (velocity[k] - before[k]) / 2 : 0;
+        out.correction[k] = 0;
     }
+    if (!rigid) return out;
+    spin_before(rigid, dt, before);
+    body_trapezoid(rigid, before, velocity, out.correction);
     return out;
 }
 
@@ -151,12 +153,6 @@ SADMM_INLINE int joint_row_touches(const struct sadmm_joint_source *source, doub
     const int bits = (joint_mooring(source, lambda, bodies) ? ISLAND_MOORED : 0) | (powers ? ISLAND_POWERED : 0);
     if (source->slack == INFINITY) return bits | ISLAND_TRAPEZOID_OFF | ISLAND_TURNS;
     return joint_limit_penetrates(source, lambda, row_a, row_b, bodies, settings) ? bits | ISLAND_TRAPEZOID_OFF : bits;
-}
-
-/* Does a body of an island with joints move by the mean of its velocities (sadmm_rigid.mean)? */
-SADMM_INLINE bool joint_moves_by_mean(const struct sadmm_rigid *from, bool trapezoid_off)
-{
-    return !trapezoid_off && !from->was_hit;
 }
 
 /* Position, orientation and velocity at the end, by the solution v. halfway: its orientation then (spin.h). What was

@@ -101,7 +101,7 @@ static void move_bodies(sadmm_world *world, double dt)
         const bool off = island & ISLAND_TRAPEZOID_OFF;
         if (from->rolls & ROLLING_IS_STIFFENED) world->joint_touch[world->joint_labels[i]] |= ISLAND_STRAYS;
         if (!(island & ISLAND_ARTICULATED)) continue;
-        next->mean = joint_moves_by_mean(from, off);
+        next->mean = body_moves_by_mean(from, off ? TRAPEZOID_OFF : TRAPEZOID_OWN);
         if (world->spins_known && next->mean) {
             several[count++] =
                 (struct joint_movement){from, &world->spins[i].orientation.w, velocity, next};
