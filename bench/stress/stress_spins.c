@@ -130,9 +130,9 @@ static const struct stress_case cases[] = {
      .limits = {{.check = "off the level, share of the arm", .from = 0, .to = 1e5, .variants = 1, LIMIT(1.01, TURNS)},
                 {.check = "rate of going round, share", .from = 0, .to = 1e5, .variants = 1, LIMIT(1e3, TURNS)},
                 {.check = "joint open, share of the arm", .from = 0, .to = 1e5, .variants = 1, LIMIT(0.1, TURNS)},
-                {.check = "off the level, share of the arm", .from = 0, .to = 300, .variants = 2, LIMIT(0.2, ADDS_UP)},
-                {.check = "rate of going round, share", .from = 0, .to = 300, .variants = 2, LIMIT(0.2, ADDS_UP)},
-                {.check = "energy over the start, share", .from = 30, .to = 30, .variants = 2, LIMIT(1e-3, GAINS)},
+                {.check = "off the level, share of the arm", .from = 300, .to = 300, .variants = 2,
+                 LIMIT(0.02, ADDS_UP)},
+                {.check = "energy over the start, share", .from = 30, .to = 30, .variants = 2, LIMIT(5e-4, GAINS)},
                 {.check = "off the level, share of the arm", .from = 1e3, .to = 1e4, .variants = 2, LIMIT(1.01, TURNS)},
                 {.check = "rate of going round, share", .from = 1e3, .to = 1e4, .variants = 2, LIMIT(500, TURNS)}}},
 };
