@@ -50,11 +50,12 @@ def test_host_and_device_agree():
         for many in (host, device):
             push(many, step)
             many.step(4)
-        # both to the tolerance of a step, 1e-6 m/s, in 160 ms at most
+        # both solve a step to 1e-6 m/s: angular velocities to that over an arm of 0.05 m
         np.testing.assert_allclose(numbers(device.array("body_state")), host.array("body_state"), atol=2e-5)
     assert not device.failed.any() and (device.error >= 0).all() and (device.error < 1e-6).all()
     for name in ("gravity", "body_inertia", "joint_position", "joint_wrench", "body_contact_wrench"):
         ours, theirs = device.get(name), host.get(name)
+        # forces: 2e-6 m/s of 1 kg in a step of 4 ms are 5e-4 N
         np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-3 * max(np.abs(theirs).max(), 1), err_msg=name)
 
 
@@ -145,11 +146,12 @@ def test_contacts_and_rays():
     many.record_contacts()
     many.step(200)
     one = many.contacts(1)
-    assert len(one) >= 4 and sum(one["force"][one["force"][:, 2] > 0, 2]) > 0.9 * 9.81 * 0.3 * 8
+    crate = 300 * 0.2**3  # kg; the walker comes on top of it
+    assert len(one) >= 4 and sum(one["force"][one["force"][:, 2] > 0, 2]) > 0.9 * 9.81 * crate
     distance, point, normal = many.cast_rays([[3.0, 3, 2]], [0, 0, -1.0], types=("static",))
     np.testing.assert_allclose(distance, 2, atol=1e-12)
     onto, _, _ = many.cast_rays([[-1.0, 0.5, 2]], [0, 0, -1.0])
-    np.testing.assert_allclose(onto, 1.8, atol=1e-3)
+    np.testing.assert_allclose(onto, 1.8, atol=1e-3)  # the crate, as deep in the ground as contacts leave it
 
 
 @pytest.mark.parametrize("name", ["CartPole", "Ant", "LiftCube", "TurnCube", "Quadruped"])
@@ -161,12 +163,12 @@ def test_tasks_run(name):
 
     host, device = (getattr(subadmm.gym, name)(4, episode=20, backend=backend) for backend in ("cpu", "cuda"))
     seen = [numbers(torch.as_tensor(task.reset(seed=[5] * 4)[0])) for task in (host, device)]
-    np.testing.assert_allclose(seen[1], seen[0], atol=1e-5)
+    np.testing.assert_allclose(seen[1], seen[0], atol=1e-5)  # no step yet: rounding, of angles from sines
     for step in range(25):
         action = np.random.default_rng(step).uniform(-1, 1, host.action_space.shape)
         given = [task.step(action) for task in (host, device)]
         ours, theirs = ([numbers(torch.as_tensor(x)) for x in g[:2]] for g in reversed(given))
         assert np.isfinite(ours[0]).all() and np.isfinite(ours[1]).all()
-        if step < 2:
+        if step < 2:  # steps are solved to 1e-6 m/s: what is taken from another place differs by its size
             np.testing.assert_allclose(ours[0], theirs[0], atol=1e-2, err_msg=f"{name}, step {step}")
             np.testing.assert_allclose(ours[1], theirs[1], atol=1e-2, err_msg=f"{name}, step {step}")

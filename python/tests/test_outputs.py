@@ -214,13 +214,19 @@ def test_a_run_that_is_asked_to_end_keeps_what_it_has(tmp_path, command, number,
         assert path.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_second_signal_ends_at_once(tmp_path, monkeypatch):
+@pytest.fixture
+def interruptible():
+    """What runs in a shell's background has SIGINT ignored, and Signals leaves alone what is."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_a_second_signal_ends_at_once(tmp_path, monkeypatch, interruptible):
     from subadmm.ending import Ended, Signals
 
     path = tmp_path / "a.html"
     path.write_text("old")
-    default = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background has it ignored
-    monkeypatch.setattr(signal, "default_int_handler", default)  # put back at the end
     with Signals() as signals:
         with signals.checked():
             os.kill(os.getpid(), signal.SIGTERM)
