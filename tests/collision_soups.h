@@ -29,11 +29,17 @@ struct both {
     struct sadmm_contact_set host_set, device_set;
 };
 
+/* In the place of the number of shapes from which there is a tree. */
+enum { BY_GROUPS = -1 };
+
 /* radix: with the sort and the scan of large scenes, whatever the capacities, and their stores. */
 static inline struct both both_new_tuned(int32_t tree_from, bool radix)
 {
     struct both b = {0};
-    struct sadmm_cuda_collision_tuning tuning = {.tree_from = tree_from, .by_warp_from = radix, .radix_from = radix};
+    struct sadmm_cuda_collision_tuning tuning = {.tree_from = tree_from,
+                                                 .group_leaves = tree_from == BY_GROUPS ? INT32_MAX : -1,
+                                                 .by_warp_from = radix,
+                                                 .radix_from = radix};
     OK(sadmm_collision_create(&b.host, error));
     OK(COLLISION(create)(0, &b.device, error));
     COLLISION(tune)(b.device, &tuning);
@@ -190,7 +196,7 @@ struct soup_kind {
     double density;         /* expected overlaps grow with it */
     double size_low, size_high;
     double static_share, filter_share, disabled_share, friction_share, dead_share;
-    int steps, tree_from;
+    int steps, tree_from; /* or BY_GROUPS */
     int subshapes;          /* of a geometry, at most; 0: one */
     int hulls;              /* forms of hulls; 0: no shape is one */
     int meshes;             /* forms of meshes, what static bodies are; 0: none is */

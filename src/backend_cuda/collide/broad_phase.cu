@@ -483,6 +483,39 @@ static __global__ void __launch_bounds__(TREE_THREADS) walk_kernel(const __grid_
     finish_batches(v, out);
 }
 
+/* Where groups are small: a leaf against the planes, the later leaves of its group, and those of every group. */
+static __device__ void find_in_group(const collision_view &v, int32_t at, struct batch *out)
+{
+    const struct collision_step step = step_of(v);
+    const double dt = time_of_candidates(v, step);
+    const uint64_t own = v.grouped[at];
+    const struct collision_leaf leaf = v.placed[(uint32_t)own];
+    const int32_t first_shared = v.leaf_count - v.shared_leaves;
+    add_planes(v, step, out, leaf);
+    for (int32_t next = at + 1; next < v.leaf_count;) {
+        const uint64_t number = v.grouped[next];
+        if (next < first_shared && number >> 32 != own >> 32) {
+            next = first_shared;
+            continue;
+        }
+        const struct collision_leaf other = v.placed[(uint32_t)number];
+        if (leaves_overlap(leaf, other) & leaves_meet(v, leaf, other, dt))
+            add_pair(v, out, candidate_key(v, leaf, other), candidates_of(v, leaf.subshapes, other.subshapes));
+        ++next;
+    }
+}
+
+static __global__ void __launch_bounds__(TREE_THREADS) groups_kernel(const __grid_constant__ collision_view v)
+{
+    pdl_wait_if(v.pdl);
+    const int64_t thread = collision_thread(TREE_THREADS);
+    struct batch out;
+    if (aborted(v)) return;
+    out.count = 0;
+    if (thread < v.leaf_count) find_in_group(v, (int32_t)thread, &out);
+    finish_batches(v, out);
+}
+
 /* All pairs, in tiles: ROWS leaves, one a thread, against COLUMNS others, which lie in shared memory; later ones only.
  * A row's first block has the planes instead. */
 template <int COLUMNS> struct tile {
@@ -584,6 +617,7 @@ void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
     kernels->refit = {refit_kernel, TREE_THREADS, 0, "boxes of the tree"};
     kernels->clear = {clear_kernel, COLLISION_THREADS, 0, "reset of the candidates"};
     kernels->walk = {walk_kernel, TREE_THREADS, sizeof(struct walk_leaves), "candidates by the tree"};
+    kernels->groups = {groups_kernel, TREE_THREADS, 0, "candidates of environments"};
     kernels->tiles = {tiles_kernel<TILE_ROWS, TILE_COLUMNS>, TILE_ROWS, sizeof(struct tile<TILE_COLUMNS>),
                       "candidates of all pairs"};
     kernels->small_tiles = {tiles_kernel<SMALL_TILE_ROWS, SMALL_TILE_COLUMNS>, SMALL_TILE_ROWS,

@@ -134,6 +134,34 @@ static sadmm_status list_planes(struct sadmm_cuda_collision *c, const struct sad
     return upload_input(c, PLANES, c->planes, count, sizeof *c->planes, false, error);
 }
 
+/* Leaves by group, those of every group last; where groups are so small that each leaf is tested against all others of
+ * its own. */
+static sadmm_status list_groups(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
+                                struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    const size_t count = (size_t)v->leaf_count;
+    size_t most = 0, shared = 0;
+    v->grouped = nullptr;
+    if (v->group_bits == 0) return SADMM_OK;
+    if (!SADMM_GROW(c->grouped, 0, count)) return sadmm_fail_memory(error, "collision's list of environments");
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t group = input->bodies[input->shapes[c->present[i]].body].environment;
+        c->grouped[i] = (uint64_t)(uint32_t)group << 32 | i;
+        shared += group < 0;
+    }
+    std::sort(c->grouped, c->grouped + count);
+    for (size_t i = 0, first = 0; i < count - shared; ++i) {
+        if (c->grouped[i] >> 32 != c->grouped[first] >> 32) first = i;
+        most = std::max(most, i - first + 1);
+    }
+    if ((int64_t)(most + shared) > c->group_leaves) return SADMM_OK;
+    TRY(upload_input(c, GROUPED, c->grouped, count, sizeof *c->grouped, false, error));
+    v->grouped = in<uint64_t>(c, GROUPED);
+    v->shared_leaves = (int32_t)shared;
+    return SADMM_OK;
+}
+
 static int32_t group_bits(const struct sadmm_collision_input *input)
 {
     int32_t last = 0, bits = 0;
@@ -196,7 +224,9 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
         c->hull_revision = input->hull_revision;
     }
     if (!bodies) TRY(upload_input(c, BODIES, input->bodies, input->body_count, sizeof *input->bodies, true, error));
+    v->group_bits = group_bits(input);
     TRY(list_planes(c, input, error));
+    TRY(list_groups(c, input, error));
     TRY(find_seams(c, input, changed, error));
     TRY(upload_input(c, DISABLED_PAIRS, input->disabled_body_pairs, input->disabled_body_pair_count,
                      sizeof *input->disabled_body_pairs, false, error));
@@ -210,7 +240,6 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
     v->hulls = input->hulls ? in<double>(c, HULLS) : nullptr;
     v->bodies = bodies ? bodies : in<struct sadmm_collision_body>(c, BODIES);
     v->body_count = (int32_t)input->body_count;
-    v->group_bits = group_bits(input);
     v->abort_code = nullptr;
     v->dt = v->gravity = nullptr;
     v->gravities = {};

@@ -27,11 +27,11 @@ enum buffer_name {
     HIT_STATE, HIT_MARKS, HIT_HELD, HIT_KINDS, HIT_SWEPT_BODIES, HIT_SINCE, HIT_IMPULSES, HIT_BOXES, HIT_NEAR,
     HIT_LISTED, HIT_FORESEEN, HIT_TAKEN, HIT_RECORDS_OF_STEPS, HIT_GROUPS, HIT_PROGRESS, HIT_GROUP_BODIES,
     HIT_GROUP_LEAVES, HIT_SHARED_LEAVES, HIT_GROUP_OF,
-    SHAPES, GEOMETRIES, HULLS, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
+    SHAPES, GEOMETRIES, HULLS, BODIES, PRESENT, PLANES, GROUPED, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
     SEAMS, SEAM_NEIGHBOURS,
     /* pinned: first what was uploaded to the last buffers above, in their order */
-    PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_HULLS, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS,
-    PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_SEAMS, PINNED_SEAM_NEIGHBOURS,
+    PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_HULLS, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_GROUPED,
+    PINNED_DISABLED_PAIRS, PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_SEAMS, PINNED_SEAM_NEIGHBOURS,
     PINNED_PAIRS, PINNED_POINTS, PINNED_MIGRATIONS, PINNED_PAIR_KEYS, PINNED_COUNTS, PINNED_TOUCHING,
     PINNED_COPIES,
     BUFFERS
@@ -54,10 +54,12 @@ static const char *const buffer_names[BUFFERS] = {
     "impulses of hits", "boxes after hits", "pairs after hits", "fast pairs", "foreseen hits", "hits taken",
     "list of hits",
     "groups", "progress of groups", "bodies of groups", "shapes of groups", "shapes of all groups", "groups of bodies",
-    "shapes", "geometries", "hulls", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs",
+    "shapes", "geometries", "hulls", "bodies", "list of shapes", "planes", "shapes by environment", "disabled pairs",
+    "friction pairs",
     "friction values",
     "neighbours by shape", "neighbours",
     "staged shapes", "staged geometries", "staged hulls", "staged bodies", "staged list of shapes", "staged planes",
+    "staged shapes by environment",
     "staged disabled pairs",
     "staged friction pairs", "staged friction values", "staged neighbours by shape", "staged neighbours",
     "staged contact pairs", "staged contact points", "staged migrations",
@@ -119,7 +121,7 @@ struct sadmm_cuda_collision {
     bool pending;
     const char *kernel;         /* launched last: what an asynchronous error is about, or what ran before it */
 
-    int32_t tree_from, by_warp_from;
+    int32_t tree_from, by_warp_from, group_leaves;
     int64_t radix_from;
     int64_t candidate_capacity, point_capacity;
     int temp_leaves, temp_candidates; /* what TEMP is large enough for */
@@ -131,6 +133,7 @@ struct sadmm_cuda_collision {
     /* host arrays, made when shapes change */
     uint32_t *present;
     uint64_t *planes;
+    uint64_t *grouped;
     double *radii;
 };
 

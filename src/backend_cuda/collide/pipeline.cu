@@ -13,7 +13,7 @@
 
 /* Shapes from which the tree pays, and stores by the warp (fewer wait 1.4 us for them); capacity from which the radix
  * sort does. */
-enum { TREE_FROM = 6144, BY_WARP_FROM = 16384 };
+enum { TREE_FROM = 6144, BY_WARP_FROM = 16384, GROUP_LEAVES = 64 };
 static const int64_t RADIX_FROM = 16385;
 
 static sadmm_status make_branch(struct sadmm_cuda_collision *c, struct sadmm_error *error)
@@ -41,6 +41,7 @@ extern "C" sadmm_status COLLISION(create)(int device, struct sadmm_cuda_collisio
     if (!c) return sadmm_fail_memory(error, "collision detection on the device");
     c->device = device;
     c->tree_from = TREE_FROM;
+    c->group_leaves = GROUP_LEAVES;
     c->by_warp_from = BY_WARP_FROM;
     c->radix_from = RADIX_FROM;
     for (size_t &bytes : c->input_bytes) bytes = SIZE_MAX;
@@ -78,6 +79,7 @@ extern "C" void COLLISION(destroy)(struct sadmm_cuda_collision *c)
     }
     sadmm_free(c->present);
     sadmm_free(c->planes);
+    sadmm_free(c->grouped);
     sadmm_free(c->radii);
     sadmm_seams_free(&c->seams);
     COLLISION(free_hits)(c);
@@ -244,6 +246,7 @@ extern "C" struct sadmm_cuda_collision_stats COLLISION(stats)(const struct sadmm
 extern "C" void COLLISION(tune)(struct sadmm_cuda_collision *c, const struct sadmm_cuda_collision_tuning *tuning)
 {
     c->tree_from = tuning->tree_from > 0 ? tuning->tree_from : TREE_FROM;
+    c->group_leaves = tuning->group_leaves != 0 ? tuning->group_leaves : GROUP_LEAVES;
     c->by_warp_from = tuning->by_warp_from > 0 ? tuning->by_warp_from : BY_WARP_FROM;
     c->radix_from = tuning->radix_from > 0 ? tuning->radix_from : RADIX_FROM;
     if (tuning->first_capacity > 0)

@@ -97,6 +97,11 @@ static void use_sets(struct sadmm_cuda_collision *c, int from, int into)
 }
 
 /* Memory that sorts and scans of these sizes need. */
+static bool has_tree(const struct sadmm_cuda_collision *c)
+{
+    return !c->view.grouped && c->view.leaf_count >= c->tree_from;
+}
+
 static sadmm_status reserve_temp(struct sadmm_cuda_collision *c, int leaves, int candidates,
                                    struct sadmm_error *error)
 {
@@ -163,7 +168,9 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, b
 {
     const struct collision_view *v = &c->view;
     if (clear && !ranked(c)) TRY(launch(c, c->kernels.clear, v->candidate_capacity, error));
-    if (tree) {
+    if (v->grouped) {
+        TRY(launch(c, c->kernels.groups, v->leaf_count, error));
+    } else if (tree) {
         TRY(launch(c, c->kernels.walk, v->leaf_count, error));
     } else {
         const bool small = v->leaf_count < SMALL_TILES_BELOW;
@@ -263,7 +270,7 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
                                    struct sadmm_cuda_contact_counts *counts, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
-    const bool tree = v->leaf_count >= c->tree_from;
+    const bool tree = has_tree(c);
     struct sadmm_cuda_contact_counts *const staged = in<struct sadmm_cuda_contact_counts>(c, PINNED_COUNTS);
     const int64_t first = std::max((int64_t)1024, (int64_t)8 * v->leaf_count);
     if (c->candidate_capacity == 0) c->candidate_capacity = std::min(first, MOST_CANDIDATES);
@@ -313,7 +320,7 @@ extern "C" sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *c, void *
     c->view.dt = dt;
     c->view.gravity = gravity;
     c->shape_slots = input->shape_count;
-    return reserve_shape(c, input->shape_count, c->view.leaf_count >= c->tree_from, error);
+    return reserve_shape(c, input->shape_count, has_tree(c), error);
 }
 
 extern "C" void COLLISION(use_gravities)(struct sadmm_cuda_collision *c, const struct cuda_gravities *gravities)
@@ -394,7 +401,7 @@ extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, bool 
 extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void *stream,
                                            const struct sadmm_cuda_find *find, struct sadmm_error *error)
 {
-    const bool tree = c->view.leaf_count >= c->tree_from;
+    const bool tree = has_tree(c);
     c->stream = (cudaStream_t)stream;
     c->view.pdl = find->pdl;
     c->pending = true;
@@ -417,7 +424,7 @@ extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void 
 extern "C" sadmm_status COLLISION(enqueue_hits)(struct sadmm_cuda_collision *c, void *stream,
                                                 const struct sadmm_cuda_find *find, struct sadmm_error *error)
 {
-    const bool tree = c->view.leaf_count >= c->tree_from;
+    const bool tree = has_tree(c);
     int32_t *const abort_code = c->view.abort_code;
     c->stream = (cudaStream_t)stream;
     c->view.pdl = find->pdl;

@@ -178,6 +178,9 @@ struct collision_view {
     int32_t leaf_count, plane_count, disabled_count, friction_count;
     int32_t mesh_count;                            /* shapes */
     int32_t shared_planes;                         /* the first ones: of group -1 */
+    int32_t shared_leaves;                         /* the last ones of `grouped`: likewise */
+    const uint64_t *grouped;                       /* group << 32 | number of a leaf, sorted; NULL: pairs are not found
+                                                      group by group */
     struct collision_step step;
     int32_t substeps, substep;                     /* of the step; 1: what concerns sub-steps is left out */
     int32_t group_bits;                            /* of the leaf keys */
@@ -326,7 +329,7 @@ struct narrow_kernels {
 /* The kernels, each beside what it does. */
 struct collision_kernels {
     struct collision_launch place[2], place_first[2], place_again[2]; /* of few shapes, of many (by_warp_from) */
-    struct collision_launch grid, build, refit, clear, walk, tiles, small_tiles, rank,
+    struct collision_launch grid, build, refit, clear, walk, tiles, small_tiles, groups, rank,
         expand, expand_first, seams, listed_seams, emit, emit_few, emit_general, carry;
     struct narrow_kernels plain, with_hulls, with_meshes, with_smooth; /* by what kinds of shapes there are */
     int expand_warps; /* expand is launched for */
