@@ -2,6 +2,7 @@
  * fails is marked and alone; resets begin again. */
 #include "cuda_worlds.h"
 #include "environment_tools.h"
+#include "momentum_worlds.h"
 #include "world/environments/environment_types.h"
 
 enum { FEW = 4 };
@@ -177,6 +178,36 @@ START_TEST(environments_step_as_if_alone)
     }
     destroy_all(all, own, origin);
     free(state);
+}
+END_TEST
+
+/* So many that the device does otherwise what it does for one: mechanisms in flight that balls run into, whose momentum
+ * is restored. */
+START_TEST(thousands_are_as_one)
+{
+    enum { MANY = EMULATED ? 36 : 1600, STEPS = 6 };
+    sadmm_world_def def = sadmm_world_def_default();
+    def.backend = SADMM_BACKEND_CPU;
+    def.precision = (sadmm_precision)_i;
+    sadmm_world *origin = create_world(&def);
+    add_mechanism(origin, MECHANISM_FALLS, true, 0.5);
+    origin->def.backend = SADMM_BACKEND_CUDA;
+    use_device(origin, _i, 0);
+    sadmm_environments *all = replicate(origin, MANY), *one = replicate(origin, 1);
+    const struct view states = view_of(all, SADMM_ARRAY_BODY_STATE), state = view_of(one, SADMM_ARRAY_BODY_STATE);
+    const size_t n = numbers_of(all, SADMM_ARRAY_BODY_STATE);
+    for (int step = 0; step < STEPS; ++step) {
+        MUST_ALL(all, sadmm_environments_step(all, 1));
+        MUST_ALL(one, sadmm_environments_step(one, 1));
+        const double *of_all = look(all, &states), *of_one = look(one, &state);
+        for (int32_t e = 0; e < MANY; ++e) expect_same(of_all + n * (size_t)e, of_one, n, "step", e, step);
+    }
+    ck_assert(all->merged.world->resident.loaded); /* nothing has gone by way of the host */
+    free(states.host);
+    free(state.host);
+    sadmm_environments_destroy(all);
+    sadmm_environments_destroy(one);
+    sadmm_world_destroy(origin);
 }
 END_TEST
 
@@ -737,6 +768,7 @@ int main(void)
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     Suite *suite = suite_create("cuda_environments");
     ADD_CASE(suite, environments_step_as_if_alone, 0, SCENES * tested_precisions());
+    ADD_CASE(suite, thousands_are_as_one, 0, tested_precisions());
     ADD_CASE(suite, resets_begin_again, 0, tested_precisions());
     ADD_CASE(suite, what_goes_wrong_stays_alone, 0, tested_precisions());
     ADD_CASE(suite, what_is_set_is_seen, 0, tested_precisions());

@@ -273,7 +273,7 @@ static __global__ void __launch_bounds__(ARTICULATION_THREADS)
             return;
         }
     }
-    const articulation_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
+    const articulation_view p = view_of_part<SMALL>(v, (int32_t)blockIdx.x, (double *)(shared + 1));
     if (v.joints.apart) pdl_wait();
     load_rows(v, p);
     load_inertia(v, p);

@@ -43,11 +43,11 @@ static __device__ __forceinline__ int32_t row_in_world(const articulation_view &
     return p.s.constraint[r / SADMM_MAX_ROWS] * SADMM_MAX_ROWS + r % SADMM_MAX_ROWS;
 }
 
-/* The block's part. SMALL: in the block's own memory; else its structure and its work are where they are. */
-template <bool SMALL> static __device__ __forceinline__ articulation_view view_of_block(const cuda_view &v,
-                                                                                        double *memory)
+/* A part. SMALL: in the block's own memory; else its structure and its work are where they are. */
+template <bool SMALL> static __device__ __forceinline__ articulation_view view_of_part(const cuda_view &v, int32_t k,
+                                                                                       double *memory)
 {
-    const struct cuda_articulation_part part = v.joints.parts[blockIdx.x];
+    const struct cuda_articulation_part part = v.joints.parts[k];
     const int32_t *numbers = v.joints.structures + part.first_number;
     if (SMALL) copy(part.numbers, (int32_t *)memory, [&](int32_t k) { return numbers[k]; });
     __syncthreads(); /* flags, too */

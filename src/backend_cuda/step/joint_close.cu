@@ -1,7 +1,9 @@
 /* What is locked, closed at the end of a (sub-)step (core/model/joint_close.h) by the rule of the host
- * (world/step/joint_close.c): a thread block a part, which leaves at once where no loop of it folds and its islands may
- * not be opened by more than the order of the step. Bodies get their place where they are moved (move_articulated.h),
+ * (world/step/joint_close.c): a thread block a part, where a loop of it folds or its islands may
+ * be opened by more than the order of the step. Bodies get their place where they are moved (move_articulated.h),
  * once their island has paid for it (joint_momentum.cu). */
+#include <algorithm>
+
 #include "backend_cuda/device/double.h"
 
 #include "articulation_block.h"
@@ -10,10 +12,14 @@
 #include "joint_place.h"
 #include "world.h"
 
-/* What a part's threads share. */
+/* Blocks of a multiprocessor; parts that one asks at once. */
+enum { CLOSE_BLOCKS = 4, CLOSE_AT_ONCE = 32 };
+
+/* What a part's threads share. open: a bit for each of the parts asked. */
 struct close_shared {
     unsigned long long most;
     int32_t flag;
+    int open;
 };
 
 /* Bits of a body's island: a part with joints that are not enabled may be of several. What other parts of the same
@@ -132,27 +138,21 @@ static __device__ __forceinline__ bool close_part(const cuda_view &v, const arti
     return any;
 }
 
-template <bool SMALL>
-static __global__ void __launch_bounds__(ARTICULATION_THREADS)
-    joint_close_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* Is there anything to be closed in part k, as far as is known before its joints are looked at? A warp asks. */
+static __device__ __forceinline__ bool may_open(const cuda_view &v, int32_t k)
 {
-    CUDA_DYNAMIC_SHARED(memory);
-    struct close_shared *shared = (struct close_shared *)memory;
-    pdl_wait();
-    pdl_trigger();
-    if (v.model.live->abort_code) return;
-    const struct cuda_articulation_part part = v.joints.parts[blockIdx.x];
-    const bool folds = v.joints.folds[blockIdx.x];
-    if (threadIdx.x == 0) shared->flag = folds;
-    __syncthreads();
-    each(part.body_count, [&](int32_t k) {
-        if (joint_island_may_open(bits_of(v, v.joints.members[part.first_body + k]))) shared->flag = 1;
-    });
-    __syncthreads();
-    const bool inspects = shared->flag;
-    __syncthreads();
-    if (!inspects) return;
-    const articulation_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
+    const struct cuda_articulation_part part = v.joints.parts[k];
+    bool opens = v.joints.folds[k];
+    for (int32_t i = (int32_t)threadIdx.x % WARP; i < part.body_count; i += WARP)
+        opens = opens || joint_island_may_open(bits_of(v, v.joints.members[part.first_body + i]));
+    return __ballot_sync((unsigned)ALL_LANES, opens) != 0;
+}
+
+template <bool SMALL>
+static __device__ __noinline__ void close_one(const cuda_view &v, int32_t k, struct close_shared *shared)
+{
+    const bool folds = v.joints.folds[k];
+    const articulation_view p = view_of_part<SMALL>(v, k, (double *)(shared + 1));
     if (!close_part(v, p, folds, shared) && !folds) return;
     each(p.s.bodies, [&](int32_t e) { add_energy(v, p.s.body[e], true); });
     __syncthreads();
@@ -160,12 +160,42 @@ static __global__ void __launch_bounds__(ARTICULATION_THREADS)
     each(p.s.bodies, [&](int32_t e) { atomicOr(&v.joints.touch[articulation_label(v, p.s.body[e])], ISLAND_CLOSED); });
 }
 
+/* Parts of a block: CLOSE_AT_ONCE are asked by its warps side by side, then those that may open are closed by all of
+ * it. args.count: parts. */
+template <bool SMALL>
+static __global__ void __launch_bounds__(ARTICULATION_THREADS)
+    joint_close_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    CUDA_DYNAMIC_SHARED(memory);
+    struct close_shared *shared = (struct close_shared *)memory;
+    pdl_wait();
+    pdl_trigger();
+    if (v.model.live->abort_code) return;
+    const int32_t stride = (int32_t)gridDim.x, warp = (int32_t)threadIdx.x / WARP;
+#pragma unroll 1
+    for (int32_t first = (int32_t)blockIdx.x; first < args.count; first += CLOSE_AT_ONCE * stride) {
+        __syncthreads();
+        if (threadIdx.x == 0) shared->open = 0;
+        __syncthreads();
+        for (int32_t i = warp; i < CLOSE_AT_ONCE; i += ARTICULATION_THREADS / WARP) {
+            const int32_t k = first + i * stride;
+            if (k < args.count && may_open(v, k) && threadIdx.x % WARP == 0) atomicOr(&shared->open, (int)(1u << i));
+        }
+        __syncthreads();
+        for (unsigned open = (unsigned)shared->open; open != 0; open &= open - 1) {
+            close_one<SMALL>(v, first + (__ffs((int)open) - 1) * stride, shared);
+            __syncthreads();
+        }
+    }
+}
+
 sadmm_status CUDA(launch_joint_close)(struct sadmm_context *c, struct sadmm_error *error)
 {
-    const cuda_args args = {};
+    cuda_args args = {};
     struct cuda_partition blocks = {};
     if (c->view.joints.count == 0 || c->step->articulations == 0) return SADMM_OK;
-    blocks.parts = c->step->articulations;
+    args.count = c->step->articulations;
+    blocks.parts = std::min(args.count, (int)CLOSE_BLOCKS * c->multiprocessors);
     blocks.cluster = 1;
     blocks.threads = ARTICULATION_THREADS;
     blocks.shared = sizeof(struct close_shared) + c->step->articulation_bytes; /* less than that of articulations */

@@ -1,7 +1,8 @@
 /* Momentum and energy of islands with joints (core/model/joint_momentum.h) on the device. A thread block an island,
  * once it is known where its joints let it go: what closing has cost, which it pays; then what each body adds, then
  * sums over the bodies, in the order of the host (world/step/joint_momentum.c). Bodies get what restores it where they
- * are moved (move_articulated.h). Beside them a thread a joint: how far that is off. */
+ * are moved (move_articulated.h). Beside them a thread a joint: how far that is off. Where islands are many their parts
+ * of this are kernels of their own. */
 #include <algorithm>
 
 #include "backend_cuda/device/double.h"
@@ -15,8 +16,9 @@
 #include "joint_place.h"
 #include "world.h"
 
-/* Threads of an island's block: many where islands are few, a warp where a thousand of them fill the device anyhow. */
-enum { ISLAND_THREADS = 128, ISLAND_BLOCKS = 1024, MANY_THREADS = 32, MANY_BLOCKS = 16384 };
+/* Threads of an island's block, where islands are few. Where there are so many for each multiprocessor that they fill
+ * it, a thread does what is of a body, whichever island it is in, and a warp what is of the islands of 32 bodies. */
+enum { ISLAND_THREADS = 128, ISLAND_BLOCKS = 1024, ISLANDS_FILL = 8, ISLAND_WARPS = 16 };
 enum { FETCHED = 8 /* at once, of a sum */ };
 
 /* Its bodies, ascending. part: where joints are apart (device/step.h), else NULL. */
@@ -132,21 +134,13 @@ static __device__ __forceinline__ void pay_island(const cuda_view &v, const stru
     __syncthreads();
 }
 
-/* Every thread of the block comes here. */
-static __device__ __forceinline__ void restore_island(const cuda_view &v, const struct joint_island &island)
+/* Over its bodies, to the one that the island is named after. */
+static __device__ __forceinline__ void add_bodies(const cuda_view &v, const struct joint_island &island)
 {
     static_assert(offsetof(struct joint_momentum, factor) == JOINT_MOMENTUM_SUMS * sizeof(double),
                   "numbers are added one by one");
-    const int32_t t = (int32_t)threadIdx.x, threads = (int32_t)blockDim.x;
     double *to = (double *)&v.joints.momentum[island.label];
-    __syncthreads(); /* all have seen its bits */
-    for (int32_t k = t; k < island.count && !island.part; k += threads)
-        if (anchors(v, island.body[k])) atomicOr(&v.joints.touch[island.label], ISLAND_ANCHORED);
-    __syncthreads();
-    if (__ldcg(&v.joints.touch[island.label]) & ISLAND_ANCHORED) return;
-    for (int32_t k = t; k < island.count; k += threads) store_body(v, island, island.body[k]);
-    __syncthreads();
-    for (int32_t n = t; n < JOINT_MOMENTUM_SUMS; n += threads) {
+    for (int32_t n = (int32_t)threadIdx.x; n < JOINT_MOMENTUM_SUMS; n += (int32_t)blockDim.x) {
         double sum = to[n];
         for (int32_t first = 1; first < island.count; first += FETCHED) {
             double next[FETCHED];
@@ -160,10 +154,28 @@ static __device__ __forceinline__ void restore_island(const cuda_view &v, const 
         }
         to[n] = sum;
     }
+}
+
+static __device__ __noinline__ void find_restoring(const cuda_view &v, int32_t label, int32_t bits)
+{
+    joint_restoring(&v.joints.momentum[label], bits, v.model.settings->dt);
+    v.joints.touch[label] = bits | ISLAND_RESTORED;
+}
+
+/* Every thread of the block comes here. */
+static __device__ __forceinline__ void restore_island(const cuda_view &v, const struct joint_island &island)
+{
+    const int32_t t = (int32_t)threadIdx.x, threads = (int32_t)blockDim.x;
+    __syncthreads(); /* all have seen its bits */
+    for (int32_t k = t; k < island.count && !island.part; k += threads)
+        if (anchors(v, island.body[k])) atomicOr(&v.joints.touch[island.label], ISLAND_ANCHORED);
     __syncthreads();
-    if (t > 0) return;
-    joint_restoring(&v.joints.momentum[island.label], island.bits, v.model.settings->dt);
-    v.joints.touch[island.label] |= ISLAND_RESTORED;
+    if (__ldcg(&v.joints.touch[island.label]) & ISLAND_ANCHORED) return;
+    for (int32_t k = t; k < island.count; k += threads) store_body(v, island, island.body[k]);
+    __syncthreads();
+    add_bodies(v, island);
+    __syncthreads();
+    if (t == 0) find_restoring(v, island.label, island.bits);
 }
 
 /* How far joint j is off, once it has been closed where it had to be. Its island may be paying for that: velocities do
@@ -218,14 +230,85 @@ static __global__ void __launch_bounds__(ISLAND_THREADS)
     }
 }
 
+/* ---- many islands, of joints that are together ------------------------------------------------------------------ */
+
+/* Calls f(island) for those of the block's islands that have such bits; every thread of the block, a warp. */
+template <class Is, class F>
+static __device__ __forceinline__ void each_island_of_warp(const cuda_view &v, const Is &is, const F &f)
+{
+    const int32_t first = (int32_t)blockIdx.x * WARP, i = first + (int32_t)threadIdx.x;
+    const int32_t bits = i < v.model.bodies && v.graph.label[i] == i ? v.joints.touch[i] : 0;
+    for (unsigned left = __ballot_sync((unsigned)ALL_LANES, is(bits)); left != 0; left &= left - 1) {
+        const int lane = __ffs((int)left) - 1;
+        const int32_t label = first + lane;
+        f(joint_island{label, v.graph.island_bodies[label], v.graph.body_of + v.graph.slot_of[label], nullptr,
+                       __shfl_sync((unsigned)ALL_LANES, bits, lane, WARP)});
+    }
+}
+
+/* Blocks of bodies, args.most_bodies of them: what closing has cost, and what holds on to islands; then blocks of
+ * joints. */
+static __global__ void __launch_bounds__(WARP)
+    joint_momentum_pay_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    pdl_wait_if(all_pdl(v.model.bodies));
+    if (v.model.live->abort_code) return;
+    if ((int32_t)blockIdx.x >= args.most_bodies)
+        return find_drift(v, ((int32_t)blockIdx.x - args.most_bodies) * WARP + (int32_t)threadIdx.x);
+    each_island_of_warp(v, [](int32_t bits) { return (bits & ISLAND_CLOSED) != 0; },
+                        [&](const joint_island &island) { pay_island(v, island); });
+    const int32_t i = (int32_t)blockIdx.x * WARP + (int32_t)threadIdx.x;
+    if (i >= v.model.bodies) return;
+    int32_t *const bits = &v.joints.touch[v.graph.label[i]];
+    if (joint_island_is_floating(__ldcg(bits)) && anchors(v, i)) atomicOr(bits, ISLAND_ANCHORED);
+}
+
+static __global__ void __launch_bounds__(WARP, ISLAND_WARPS)
+    joint_momentum_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    pdl_wait_if(all_pdl(v.model.bodies));
+    const int32_t i = (int32_t)blockIdx.x * WARP + (int32_t)threadIdx.x;
+    if (i >= v.model.bodies || v.model.live->abort_code) return;
+    const int32_t label = v.graph.label[i], bits = v.joints.touch[label];
+    if (joint_island_is_floating(bits)) store_body(v, joint_island{label, 0, nullptr, nullptr, bits}, i);
+}
+
+static __global__ void __launch_bounds__(WARP, ISLAND_WARPS)
+    joint_momentum_islands_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    pdl_wait_if(all_pdl(v.model.bodies));
+    if (v.model.live->abort_code) return;
+    each_island_of_warp(v, [](int32_t bits) { return joint_island_is_floating(bits); },
+                        [&](const joint_island &island) { add_bodies(v, island); });
+    __syncthreads();
+    const int32_t i = (int32_t)blockIdx.x * WARP + (int32_t)threadIdx.x;
+    if (i >= v.model.bodies || v.graph.label[i] != i) return;
+    const int32_t bits = v.joints.touch[i];
+    if (joint_island_is_floating(bits)) find_restoring(v, i, bits);
+}
+
+/* ---- launches ---------------------------------------------------------------------------------------------------- */
+
+static sadmm_status launch_many(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    const int32_t joints = (c->view.joints.count + WARP - 1) / WARP;
+    args.most_bodies = (c->view.model.bodies + WARP - 1) / WARP;
+    TRY(CUDA(launch_of)(c, joint_momentum_pay_kernel, "what closing has cost", args.most_bodies + joints, WARP, &args,
+                        error));
+    TRY(CUDA(launch_of)(c, joint_momentum_bodies_kernel, "momentum of bodies", args.most_bodies, WARP, &args, error));
+    return CUDA(launch_of)(c, joint_momentum_islands_kernel, "momentum of joints", args.most_bodies, WARP, &args,
+                           error);
+}
+
 sadmm_status CUDA(launch_joint_momentum)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
     args.count = c->step->articulations;
+    if (args.count >= ISLANDS_FILL * c->multiprocessors && !c->view.joints.apart) return launch_many(c, error);
     const int64_t islands = c->view.joints.apart ? args.count : c->view.model.bodies;
-    const bool many = args.count >= ISLAND_BLOCKS;
-    const int threads = many ? MANY_THREADS : ISLAND_THREADS;
-    args.most_bodies = (int32_t)std::min<int64_t>(islands, many ? MANY_BLOCKS : ISLAND_BLOCKS);
+    args.most_bodies = (int32_t)std::min<int64_t>(islands, ISLAND_BLOCKS);
     return CUDA(launch_of)(c, joint_momentum_kernel, "momentum of joints",
-                           args.most_bodies + (c->view.joints.count + threads - 1) / threads, threads, &args, error);
+                           args.most_bodies + (c->view.joints.count + ISLAND_THREADS - 1) / ISLAND_THREADS,
+                           ISLAND_THREADS, &args, error);
 }
