@@ -58,8 +58,8 @@ static __device__ __noinline__ void list_cones(const ncp_island &s, ncp_interior
         c->hi = law.count == 1 ? law.hi / scale : INFINITY;
         for (int k = 0; k < 3; ++k) c->dual[k] = c->step[k] = c->second[k] = 0;
     });
-    __syncthreads();
-    if (threadIdx.x == 0) {
+    ncp_barrier();
+    if (ncp_thread() == 0) {
         int32_t count = 0, degree = 0;
         for (int32_t i = 0; i < s.laws; ++i) {
             ncp_cone *c = &p->cone[i];
@@ -70,7 +70,7 @@ static __device__ __noinline__ void list_cones(const ncp_island &s, ncp_interior
         shared->count = count;
         shared->pivot = degree;
     }
-    __syncthreads();
+    ncp_barrier();
     p->count = shared->count;
     p->degree = shared->pivot;
     each(s.laws, [&](int32_t i) {
@@ -83,7 +83,7 @@ static __device__ __noinline__ void list_cones(const ncp_island &s, ncp_interior
             p->scale[c->at + k] = c->count == 3 && k == 0 ? scale / law.friction : scale;
         }
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 static __device__ __noinline__ void find_velocities(const ncp_island &s, const ncp_interior &p)
@@ -93,7 +93,7 @@ static __device__ __noinline__ void find_velocities(const ncp_island &s, const n
         for (int32_t c = 0; c < s.numbers; ++c) sum += s.G[r * s.stride + c] * s.lambda[c];
         s.u[r] = sum;
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* Well inside, by `size`. */
@@ -112,17 +112,17 @@ static __device__ void begin_inside(const ncp_island &s, const ncp_interior &p, 
         x[0] = low && high ? c->lo + (c->hi - c->lo) / 2 : low ? c->lo + size : high ? c->hi - size : 0;
         c->dual[1] = high ? size : 0;
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* y, what it is off by from the duals, and the complementarity. */
 static __device__ __noinline__ void measure_interior(const ncp_island &s, ncp_interior *p, ncp_shared *shared)
 {
     each(p->count, [&](int32_t i) { s.lambda[p->number[i]] = p->scale[i] * p->x[i]; });
-    __syncthreads();
+    ncp_barrier();
     find_velocities(s, *p);
     each(p->count, [&](int32_t i) { p->y[i] = p->off[i] = p->scale[i] * s.u[p->number[i]]; });
-    __syncthreads();
+    ncp_barrier();
     each(s.laws, [&](int32_t i) {
         ncp_cone *c = &p->cone[i];
         const double *x = p->x + c->at;
@@ -138,7 +138,7 @@ static __device__ __noinline__ void measure_interior(const ncp_island &s, ncp_in
             if (c->hi < INFINITY) c->product += (c->hi - x[0]) * c->dual[1];
         }
     });
-    __syncthreads();
+    ncp_barrier();
     double sum = 0;
     for (int32_t i = 0; i < s.laws; ++i) sum += p->cone[i].product; /* by every thread alike */
     p->complementarity = sum / (p->degree > 0 ? p->degree : 1);
@@ -150,26 +150,26 @@ static __device__ __noinline__ bool invert_matrix(const ncp_island &s, const ncp
 {
     const int32_t n = p.count, stride = stride_of(n);
     each(n, [&](int32_t i) { s.pivot[i] = -1; });
-    __syncthreads();
+    ncp_barrier();
 #pragma unroll 1
     for (int32_t k = 0; k < n; ++k) {
         choose_pivot(s, n, stride, k, shared);
-        __syncthreads();
+        ncp_barrier();
         const int32_t row = shared->pivot;
         if (row < 0) return false;
         const double inverse = 1 / s.M[row * stride + k];
-        if (threadIdx.x == 0) p.row[k] = row;
+        if (ncp_thread() == 0) p.row[k] = row;
         each_entry(n, n, [&](int32_t i, int32_t c) {
             if (i != row && c != k)
                 s.M[i * stride + c] -= s.M[i * stride + k] * inverse * s.M[row * stride + c];
         });
-        __syncthreads();
+        ncp_barrier();
         each(n, [&](int32_t i) {
             if (i != row) s.M[i * stride + k] *= -inverse;
             if (i != k) s.M[row * stride + i] *= inverse;
         });
-        if (threadIdx.x == 0) s.M[row * stride + k] = inverse;
-        __syncthreads();
+        if (ncp_thread() == 0) s.M[row * stride + k] = inverse;
+        ncp_barrier();
     }
     return true;
 }
@@ -194,7 +194,7 @@ static __device__ __noinline__ bool make_inverse(const ncp_island &s, const ncp_
         const double *y = p.y + c->at, speed = hypot(y[1], y[2]);
         if (speed > 0) M[0] += (y[1] * M[stride] + y[2] * M[2 * stride]) / speed;
     });
-    __syncthreads();
+    ncp_barrier();
     each(s.laws, [&](int32_t i) {
         const ncp_cone *c = &p.cone[i];
         double *M = s.M + c->at * stride + c->at;
@@ -210,7 +210,7 @@ static __device__ __noinline__ bool make_inverse(const ncp_island &s, const ncp_
                     (2 * sign * c->by.middle[r] * c->by.middle[k] - J) / (c->by.size * c->by.size);
             }
     });
-    __syncthreads();
+    ncp_barrier();
     return invert_matrix(s, p, shared);
 }
 
@@ -234,7 +234,7 @@ static __device__ __noinline__ double find_step(const ncp_island &s, const ncp_i
             if (c->hi < INFINITY) right[0] -= bound_step(aim, second ? c->second[1] : 0, c->hi - x, c->dual[1], 0);
         }
     });
-    __syncthreads();
+    ncp_barrier();
     bool finite = true;
     each(n, [&](int32_t k) {
         double sum = 0;
@@ -282,7 +282,7 @@ static __device__ __noinline__ void find_second_order(const ncp_island &s, const
         cone_scale(&c->by, false, c->step, b);
         cone_multiply(a, b, c->second);
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* Returns the share of the step that was gone; 0: there is none. */
@@ -299,14 +299,14 @@ static __device__ __noinline__ double step_inside(const ncp_island &s, const ncp
     each(s.laws, [&](int32_t i) {
         for (int k = 0; k < 3; ++k) p.cone[i].dual[k] += way * p.cone[i].step[k];
     });
-    __syncthreads();
+    ncp_barrier();
     return way;
 }
 
 /* From u alone. lambda and u are those that it ends with; returns their natural map. */
-static __device__ __noinline__ double go_inside(ncp_island *island, ncp_memory memory, ncp_shared *shared)
+static __device__ __noinline__ double go_inside(const ncp_island &s, ncp_memory memory, double *budget,
+                                                ncp_shared *shared)
 {
-    const ncp_island &s = *island;
     ncp_interior p;
     if (!take_interior(s, &memory, &p)) return INFINITY;
     each(s.numbers, [&](int32_t r) {
@@ -314,7 +314,7 @@ static __device__ __noinline__ double go_inside(ncp_island *island, ncp_memory m
         for (int32_t c = 0; c < s.numbers; ++c) sum -= s.G[r * s.stride + c] * s.lambda[c];
         p.free[r] = sum;
     });
-    __syncthreads();
+    ncp_barrier();
     list_cones(s, &p, shared);
     find_velocities(s, p);
     double own = 0;
@@ -328,7 +328,7 @@ static __device__ __noinline__ double go_inside(ncp_island *island, ncp_memory m
         if (!(map > NCP_AIM && map < INFINITY) || step == NCP_MOST_STEPS ||
             brief == NCP_MOST_SHORT || p.complementarity < NCP_LEAST_PRODUCT * size * size)
             return map;
-        if (!affords(island, 2 * elimination_of(p.count))) return map;
+        if (!affords(budget, 2 * elimination_of(p.count))) return map;
         const double way = step_inside(s, p, shared);
         if (way == 0) return map;
         brief = way < NCP_SHORT / 10 ? brief + 1 : 0;

@@ -6,21 +6,40 @@
  *     (ncp_response.h), and laws of theirs; semismooth Newton steps find them (ncp_newton.h)
  *
  * Rows with bounds have numbers once their law is not met without. Every sum is made by one thread, in one order:
- * results do not depend on how many threads a block has. Few islands get large blocks; where there are thousands, a
- * warp each does, and many of them run side by side. */
+ * results do not depend on how many threads an island has. Few islands have a block each (ncp_block.cu); where there
+ * are thousands, a warp each does (ncp_warp.cu). */
 #ifndef SADMM_CUDA_STEP_NCP_ISLAND_H
 #define SADMM_CUDA_STEP_NCP_ISLAND_H
 
 #include "backend_cuda/device/double.h"
 #include "core/math/contact.h"
 #include "core/math/ldl6.h"
+#include "ncp_bodies.h"
+#include "world.h"
 
-enum {
-    NCP_BODIES = 128,   /* of an island, at most; */
-    NCP_PARTS = 32,     /* articulations; */
-    NCP_CONTACTS = 128, /* points; */
-    NCP_NUMBERS = 256   /* numbers of the dense problem */
-};
+/* Islands of a block at a time, and threads of each. Is what a few steps do not solve left to a block of its own?
+ * Thousands of islands would wait for it. */
+#ifdef NCP_BY_WARP
+enum { NCP_ISLANDS = NCP_WARPS, NCP_THREADS = 32, NCP_LEAVES_HARD = true };
+#else
+enum { NCP_ISLANDS = 1, NCP_THREADS = NCP_LARGE_BLOCK, NCP_LEAVES_HARD = false };
+#endif
+static __device__ __forceinline__ int32_t ncp_thread(void) { return (int32_t)threadIdx.x % (int32_t)NCP_THREADS; }
+static __device__ __forceinline__ int32_t ncp_threads(void) { return NCP_THREADS; }
+
+/* A barrier of an island's threads; */
+static __device__ __forceinline__ void ncp_barrier(void)
+{
+    if ((int)NCP_THREADS > (int)WARP) __syncthreads();
+    else __syncwarp((unsigned)ALL_LANES);
+}
+
+/* of all threads of the block. Its warps begin each phase together: what thousands of warps run, each somewhere else,
+ * does not fit the caches for instructions. */
+static __device__ __forceinline__ void ncp_together(void)
+{
+    if ((int)NCP_ISLANDS > 1) __syncthreads();
+}
 
 /* A node while velocities are found: loads on the way to the root, what is handed on, and in between. */
 struct ncp_passing {
@@ -80,7 +99,7 @@ struct ncp_law {
     double gain, compliance; /* of its numbers in G: 1, 0 of contacts */
 };
 
-/* Memory of a block: its own first, then what is far. */
+/* Memory: the island's share of the block's first, then what is far. */
 struct ncp_memory {
     char *at, *end, *far_at, *far_end;
     bool full;
@@ -102,7 +121,7 @@ template <class T> static __device__ __forceinline__ T *take(ncp_memory *memory,
     return (T *)out;
 }
 
-/* What is large and used little: a block's own memory is for the rest, if that would take most of it. */
+/* What is large and used little: the nearer memory is for the rest, if that would take most of it. */
 template <class T> static __device__ __forceinline__ T *take_large(ncp_memory *memory, size_t count)
 {
     ncp_memory far = *memory;
@@ -114,6 +133,24 @@ template <class T> static __device__ __forceinline__ T *take_large(ncp_memory *m
     return out;
 }
 
+/* A node that a load has passed (ncp_response.h): where z and H z are, one behind the other. */
+struct ncp_passed {
+    int32_t node, at;
+};
+
+/* Of a number: nodes of `passed` from first on, ascending, and numbers of `shares` from `at` on. */
+struct ncp_way {
+    int32_t first, count, at, numbers;
+};
+
+struct ncp_ways {
+    ncp_way *way;
+    ncp_passed *passed;
+    double *shares;
+    double (*p)[6]; /* by eight lanes: a load where it is on its way */
+};
+
+/* Once for all its threads: each reads what the first one writes (put). */
 struct ncp_island {
     int32_t label, first_slot, bodies, contacts, rows, first_gear, levels; /* rows of gears come last */
     ncp_node *node;
@@ -125,38 +162,45 @@ struct ncp_island {
     double *pool;
     /* of contacts x 3: impulses along their frames */
     double *impulse, *kept; /* kept: with multipliers of rows, a solution that is held against another one */
-    double budget; /* multiplications of a thread that are left */
-    bool missed;   /* its contacts give, by more than the tolerance */
+    bool missed; /* its contacts give, by more than the tolerance */
     /* the dense problem */
     int32_t laws, numbers, stride; /* stride: of G's rows; odd, as M's: columns are read without conflicts */
     ncp_law *law;
     double *lambda, *u, *step, *moved, *best_lambda, *best_u, *D;
     int32_t *list, *pivot;
     double *G, *M;
+    ncp_ways ways;
 };
 
-/* What the block's threads share. */
+/* What its threads share. */
 struct ncp_shared {
     unsigned long long most;
     int32_t flag, count, pivot;
     int32_t parts, part[NCP_PARTS];         /* of the island */
+    ncp_island island;
 };
+
+/* What every thread has found alike. The others read it after a barrier, and have read what was there before one. */
+template <class T> static __device__ __forceinline__ void put(T &to, const T &value)
+{
+    if (ncp_thread() == 0) to = value;
+}
 
 /* Calls f(k) for k < count, by a thread each. */
 template <class F> static __device__ __forceinline__ void each(int32_t count, const F &f)
 {
 #pragma unroll 1
-    for (int32_t k = (int32_t)threadIdx.x; k < count; k += (int32_t)blockDim.x) f(k);
+    for (int32_t k = ncp_thread(); k < count; k += ncp_threads()) f(k);
 }
 
 /* Eight lanes for each of `count`: f(k, lane), k = -1 for those beyond. Every lane of a warp comes there. */
 template <class F> static __device__ __forceinline__ void each_eight(int32_t count, const F &f)
 {
 #pragma unroll 1
-    for (int32_t first = (int32_t)threadIdx.x / WARP * (WARP / LANES); first < count;
-         first += (int32_t)blockDim.x / LANES) {
-        const int32_t k = first + (int32_t)threadIdx.x % WARP / LANES;
-        f(k < count ? k : -1, (int)threadIdx.x % LANES);
+    for (int32_t first = ncp_thread() / WARP * (WARP / LANES); first < count;
+         first += ncp_threads() / LANES) {
+        const int32_t k = first + ncp_thread() % WARP / LANES;
+        f(k < count ? k : -1, ncp_thread() % LANES);
     }
 }
 
@@ -167,43 +211,43 @@ template <class F> static __device__ __forceinline__ void each_node(const ncp_is
     each_eight(s.level_first[level + 1] - first, [&](int32_t k, int lane) {
         f(&s.node[k < 0 ? 0 : s.order[first + k]], lane, k >= 0 && lane < 6);
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* f(i, k) for i < rows and k < columns, by a thread each: columns side by side. */
 template <class F> static __device__ __forceinline__ void each_entry(int32_t rows, int32_t columns, const F &f)
 {
     int32_t width = 1, bits = 0;
-    while (width < columns && width < (int32_t)blockDim.x) width *= 2, ++bits;
-    const int32_t t = (int32_t)threadIdx.x;
+    while (width < columns && width < ncp_threads()) width *= 2, ++bits;
+    const int32_t t = ncp_thread();
 #pragma unroll 1
     for (int32_t k = t & (width - 1); k < columns; k += width)
 #pragma unroll 1
-        for (int32_t i = t >> bits; i < rows; i += (int32_t)blockDim.x >> bits) f(i, k);
+        for (int32_t i = t >> bits; i < rows; i += ncp_threads() >> bits) f(i, k);
 }
 
 /* *at = of[0] + ... before each of `count`; returns the sum. */
 static __device__ __noinline__ int32_t add_up(int32_t count, const int32_t *of, int32_t *at, int32_t *sum)
 {
-    __syncthreads();
-    if (threadIdx.x < WARP) {
+    ncp_barrier();
+    if (ncp_thread() < WARP) {
         int32_t total = 0;
         for (int32_t first = 0; first < count; first += WARP) {
-            const int32_t k = first + (int32_t)threadIdx.x, own = k < count ? of[k] : 0;
+            const int32_t k = first + ncp_thread(), own = k < count ? of[k] : 0;
             int32_t up = own;
 #pragma unroll
             for (int32_t o = 1; o < WARP; o *= 2) {
                 const int32_t before = __shfl_up_sync((unsigned)ALL_LANES, up, (unsigned)o);
-                if ((int32_t)threadIdx.x >= o) up += before;
+                if (ncp_thread() >= o) up += before;
             }
             if (k < count) at[k] = total + up - own;
             total += __shfl_sync((unsigned)ALL_LANES, up, WARP - 1, WARP);
         }
-        if (threadIdx.x == 0) *sum = total;
+        if (ncp_thread() == 0) *sum = total;
     }
-    __syncthreads();
+    ncp_barrier();
     const int32_t out = *sum;
-    __syncthreads();
+    ncp_barrier();
     return out;
 }
 
@@ -211,20 +255,20 @@ static __device__ __noinline__ int32_t add_up(int32_t count, const int32_t *of, 
 template <class F>
 static __device__ __forceinline__ int32_t make_list(int32_t count, int32_t *list, int32_t *sum, const F &f)
 {
-    if (threadIdx.x < WARP) {
+    if (ncp_thread() < WARP) {
         int32_t total = 0;
         for (int32_t first = 0; first < count; first += WARP) {
-            const int32_t k = first + (int32_t)threadIdx.x;
+            const int32_t k = first + ncp_thread();
             const bool is = k < count && f(k);
             const unsigned lanes = __ballot_sync((unsigned)ALL_LANES, is);
-            if (is) list[total + __popc(lanes & ((1u << threadIdx.x) - 1))] = k;
+            if (is) list[total + __popc(lanes & ((1u << ncp_thread()) - 1))] = k;
             total += __popc(lanes);
         }
-        if (threadIdx.x == 0) *sum = total;
+        if (ncp_thread() == 0) *sum = total;
     }
-    __syncthreads();
+    ncp_barrier();
     const int32_t out = *sum;
-    __syncthreads();
+    ncp_barrier();
     return out;
 }
 
@@ -233,30 +277,30 @@ static __device__ __forceinline__ int32_t make_list(int32_t count, int32_t *list
 static __device__ __noinline__ double most_of(double own, ncp_shared *shared)
 {
     unsigned long long bits = own <= 0 ? 0 : (unsigned long long)__double_as_longlong(fabs(own));
-    __syncthreads();
+    ncp_barrier();
 #pragma unroll
     for (int o = WARP / 2; o > 0; o /= 2) {
         const unsigned long long other = __shfl_xor_sync((unsigned)ALL_LANES, bits, o);
         bits = other > bits ? other : bits;
     }
-    if (blockDim.x > WARP) {
-        if (threadIdx.x == 0) shared->most = 0;
-        __syncthreads();
-        if (threadIdx.x % WARP == 0) atomicMax(&shared->most, bits);
-        __syncthreads();
+    if (ncp_threads() > WARP) {
+        if (ncp_thread() == 0) shared->most = 0;
+        ncp_barrier();
+        if (ncp_thread() % WARP == 0) atomicMax(&shared->most, bits);
+        ncp_barrier();
         bits = shared->most;
     }
     return __longlong_as_double((long long)bits);
 }
 static __device__ __noinline__ bool any_of(bool own, ncp_shared *shared)
 {
-    __syncthreads();
+    ncp_barrier();
     const bool any = __ballot_sync((unsigned)ALL_LANES, own) != 0;
-    if (blockDim.x <= WARP) return any;
-    if (threadIdx.x == 0) shared->flag = 0;
-    __syncthreads();
-    if (any && threadIdx.x % WARP == 0) shared->flag = 1;
-    __syncthreads();
+    if (ncp_threads() <= WARP) return any;
+    if (ncp_thread() == 0) shared->flag = 0;
+    ncp_barrier();
+    if (any && ncp_thread() % WARP == 0) shared->flag = 1;
+    ncp_barrier();
     return shared->flag != 0;
 }
 
@@ -314,15 +358,6 @@ static __device__ __forceinline__ int32_t side_of_gear(const cuda_view &v, int32
 }
 
 /* ---- bodies and rows --------------------------------------------------------------------------------------------- */
-
-static __device__ __forceinline__ mat3 inertia_of(const struct cuda_articulation_body &body)
-{
-    mat3 inertia;
-    inertia.r[0] = v3(body.inertia[0], body.inertia[3], body.inertia[4]);
-    inertia.r[1] = v3(body.inertia[3], body.inertia[1], body.inertia[5]);
-    inertia.r[2] = v3(body.inertia[4], body.inertia[5], body.inertia[2]);
-    return inertia;
-}
 
 /* Of a row: J A^-1 J^T. */
 static __device__ __forceinline__ double own_response(const struct cuda_articulation_body &body, const double row[6])

@@ -24,11 +24,14 @@ static __device__ __noinline__ void make_tree(const cuda_view &v, const ncp_isla
 }
 
 /* Nodes by level. False: there is no room. */
-static __device__ __noinline__ bool order_nodes(ncp_island *s, ncp_memory *memory)
+static __device__ __noinline__ bool order_nodes(ncp_island *s, int32_t levels, ncp_memory *memory)
 {
-    s->order = take<int32_t>(memory, (size_t)s->bodies);
-    s->level_first = take<int32_t>(memory, (size_t)s->levels + 1);
+    int32_t *const order = take<int32_t>(memory, (size_t)s->bodies),
+                   *const level_first = take<int32_t>(memory, (size_t)levels + 1);
     if (memory->full) return false;
+    put(s->order, order);
+    put(s->level_first, level_first);
+    put(s->levels, levels);
     each(s->bodies, [&](int32_t n) {
         const int32_t level = s->node[n].level;
         int32_t before = 0;
@@ -36,14 +39,14 @@ static __device__ __noinline__ bool order_nodes(ncp_island *s, ncp_memory *memor
             const int32_t other = s->node[k].level;
             before += other < level || (other == level && k < n);
         }
-        s->order[before] = n;
+        order[before] = n;
     });
-    each(s->levels + 1, [&](int32_t level) {
+    each(levels + 1, [&](int32_t level) {
         int32_t before = 0;
         for (int32_t k = 0; k < s->bodies; ++k) before += s->node[k].level < level;
-        s->level_first[level] = before;
+        level_first[level] = before;
     });
-    __syncthreads();
+    ncp_barrier();
     return true;
 }
 
@@ -52,42 +55,42 @@ static __device__ __noinline__ bool make_nodes(const cuda_view &v, ncp_island *s
                                                ncp_shared *shared)
 {
     bool right = true;
-    s->of = take<int32_t>(memory, (size_t)s->bodies);
-    s->at = take<int32_t>(memory, (size_t)s->bodies);
+    int32_t *const of = take<int32_t>(memory, (size_t)s->bodies), *const at = take<int32_t>(memory, (size_t)s->bodies);
+    ncp_node *const node = take<ncp_node>(memory, (size_t)s->bodies);
     if (memory->full) return false;
-    if (threadIdx.x == 0) shared->parts = 0;
-    __syncthreads();
+    put(s->of, of);
+    put(s->at, at);
+    put(s->node, node);
+    put(shared->parts, 0);
+    ncp_barrier();
     each(s->bodies, [&](int32_t t) {
         const int32_t body = v.graph.body_of[s->first_slot + t], part = v.ncp.part_of[body];
         const bool is_first = part < 0 || v.joints.parts[part].label - 1 == body;
-        s->of[t] = !is_first ? 0 : part < 0 ? 1 : v.ncp.parts[part].nodes;
+        of[t] = !is_first ? 0 : part < 0 ? 1 : v.ncp.parts[part].nodes;
         if (part >= 0 && v.ncp.parts[part].nodes == 0) right = false;
         if (part >= 0 && is_first) atomicAdd(&shared->parts, 1);
     });
     if (any_of(!right, shared) || shared->parts > NCP_PARTS) return false;
-    if (add_up(s->bodies, s->of, s->at, &shared->count) != s->bodies) return false;
-    s->node = take<ncp_node>(memory, (size_t)s->bodies);
-    if (memory->full) return false;
-    s->levels = 1;
-    int32_t parts = 0;
+    if (add_up(s->bodies, of, at, &shared->count) != s->bodies) return false;
+    int32_t parts = 0, levels = 1;
 #pragma unroll 1
     for (int32_t t = 0; t < s->bodies; ++t) {
-        if (s->of[t] == 0) continue;
-        const int32_t body = v.graph.body_of[s->first_slot + t], part = v.ncp.part_of[body], base = s->at[t];
+        if (of[t] == 0) continue;
+        const int32_t body = v.graph.body_of[s->first_slot + t], part = v.ncp.part_of[body], base = at[t];
         if (part >= 0) {
-            const int32_t levels = v.ncp.parts[part].levels;
-            s->levels = levels > s->levels ? levels : s->levels;
-            if (threadIdx.x == 0) shared->part[parts] = part;
+            const int32_t own = v.ncp.parts[part].levels;
+            levels = own > levels ? own : levels;
+            if (ncp_thread() == 0) shared->part[parts] = part;
             ++parts;
             make_tree(v, *s, part, base, &right);
-        } else if (threadIdx.x == 0) {
+        } else if (ncp_thread() == 0) {
             ncp_node *node = &s->node[base];
             node->body = body;
             node->parent = node->child = node->sibling = -1;
             node->first_joint = node->joints = node->level = 0;
         }
     }
-    __syncthreads();
+    ncp_barrier();
     each(s->bodies, [&](int32_t n) {
         ncp_node *node = &s->node[n];
         v.ncp.number[node->body] = n;
@@ -103,7 +106,7 @@ static __device__ __noinline__ bool make_nodes(const cuda_view &v, ncp_island *s
         }
     });
     if (any_of(!right, shared)) return false;
-    return order_nodes(s, memory);
+    return order_nodes(s, levels, memory);
 }
 
 static __device__ __forceinline__ int32_t role_of(const struct raw_row &law, bool of_joint)
@@ -144,7 +147,7 @@ template <class F>
 static __device__ __forceinline__ void each_joint_row(const cuda_view &v, const ncp_node &node, int lane, bool live,
                                                       int32_t *locks, int32_t *others, const F &f)
 {
-    const int shift = (int)threadIdx.x % WARP / LANES * LANES;
+    const int shift = ncp_thread() % WARP / LANES * LANES;
     const unsigned lanes = (1u << LANES) - 1, before = (1u << lane) - 1;
     int32_t j = node.first_joint;
     *locks = *others = 0;
@@ -201,7 +204,7 @@ static __device__ __noinline__ int32_t list_gears(const cuda_view &v, const ncp_
         for (int32_t g = plan.first_gear; g < plan.first_gear + plan.gears; ++g) {
             const int32_t constraint = v.ncp.joints[g];
             for (int32_t r = 0; r < v.raw.constraints[constraint].count; ++r, ++count) {
-                if (!rows || threadIdx.x > 0) continue;
+                if (!rows || ncp_thread() > 0) continue;
                 rows[count].slot = constraint * SADMM_MAX_ROWS + r;
                 rows[count].node = -1;
                 rows[count].side = rows[count].along = 0;
@@ -226,22 +229,28 @@ static __device__ __noinline__ bool make_rows(const cuda_view &v, ncp_island *s,
         s->of[n] = node->rows;
     });
     if (any_of(!right, shared)) return false;
-    s->first_gear = add_up(s->bodies, s->of, s->at, &shared->count);
+    const int32_t first_gear = add_up(s->bodies, s->of, s->at, &shared->count);
     each(s->bodies, [&](int32_t n) {
         ncp_node *node = &s->node[n];
         node->first_row = s->at[n];
         s->of[n] = node->free * (13 + 2 * node->free + node->rows);
     });
     const int32_t pool = add_up(s->bodies, s->of, s->at, &shared->count);
-    s->rows = s->first_gear + list_gears(v, shared, nullptr);
-    s->row = take_large<ncp_row>(memory, (size_t)s->rows);
-    s->bounded_row = take_large<int32_t>(memory, (size_t)s->rows);
-    s->pool = take<double>(memory, (size_t)pool);
+    const int32_t rows = first_gear + list_gears(v, shared, nullptr);
+    ncp_row *const row = take_large<ncp_row>(memory, (size_t)rows);
+    int32_t *const bounded_row = take_large<int32_t>(memory, (size_t)rows);
+    double *const numbers = take<double>(memory, (size_t)pool);
     if (memory->full) return false;
-    (void)list_gears(v, shared, s->row + s->first_gear);
+    put(s->first_gear, first_gear);
+    put(s->rows, rows);
+    put(s->row, row);
+    put(s->bounded_row, bounded_row);
+    put(s->pool, numbers);
+    (void)list_gears(v, shared, row + first_gear);
+    ncp_barrier();
     each_eight(s->bodies, [&](int32_t n, int lane) { load_rows(v, *s, n < 0 ? 0 : n, lane, n >= 0, after); });
-    __syncthreads();
-    each(s->rows - s->first_gear, [&](int32_t r) { load_row(v, *s, &s->row[s->first_gear + r], after); });
+    ncp_barrier();
+    each(rows - first_gear, [&](int32_t r) { load_row(v, *s, &row[first_gear + r], after); });
     each(s->bodies, [&](int32_t n) {
         ncp_node *node = &s->node[n];
         int32_t at = s->at[n];
@@ -251,20 +260,19 @@ static __device__ __noinline__ bool make_rows(const cuda_view &v, ncp_island *s,
         meet_locks(node);
         at += node->free * (13 + 2 * node->free);
         for (int32_t r = node->first_row; r < node->first_row + node->rows; ++r, at += node->free) {
-            s->row[r].along = at;
-            node->loads += s->row[r].role != NCP_SOFT;
+            row[r].along = at;
+            node->loads += row[r].role != NCP_SOFT;
         }
     });
-    __syncthreads();
-    each(s->first_gear, [&](int32_t r) {
-        const ncp_row *row = &s->row[r];
-        const ncp_node &node = s->node[row->node];
+    ncp_barrier();
+    each(first_gear, [&](int32_t r) {
+        const ncp_node &node = s->node[row[r].node];
         for (int i = 0; i < node.free; ++i)
-            s->pool[row->along + i] = six_product(row->jacobian, directions_of(*s, node) + 6 * i);
+            numbers[row[r].along + i] = six_product(row[r].jacobian, directions_of(*s, node) + 6 * i);
     });
-    __syncthreads();
-    s->bounded = make_list(s->rows, s->bounded_row, &shared->count,
-                           [&](int32_t r) { return s->row[r].role == NCP_BOUNDED; });
+    ncp_barrier();
+    put(s->bounded,
+        make_list(rows, bounded_row, &shared->count, [&](int32_t r) { return row[r].role == NCP_BOUNDED; }));
     return true;
 }
 
@@ -316,14 +324,18 @@ static __device__ __noinline__ bool make_contacts(const cuda_view &v, ncp_island
             if (speaks(v, v.graph.incident[at])) points += v.raw.pairs[v.graph.incident[at] / 2].count;
         s->of[t] = points;
     });
-    s->contacts = add_up(s->bodies, s->of, s->at, &shared->count);
-    if (s->contacts > NCP_CONTACTS || s->contacts > v.ncp.points) return false;
-    const size_t laws = (size_t)(s->contacts + s->bounded);
-    s->contact = take<ncp_contact>(memory, (size_t)s->contacts);
-    s->impulse = take<double>(memory, 3 * (size_t)s->contacts);
-    s->kept = take<double>(memory, 3 * (size_t)s->contacts + (size_t)s->rows);
-    s->law = take<ncp_law>(memory, laws);
+    const int32_t contacts = add_up(s->bodies, s->of, s->at, &shared->count);
+    if (contacts > NCP_CONTACTS || contacts > v.ncp.points) return false;
+    ncp_contact *const contact = take<ncp_contact>(memory, (size_t)contacts);
+    double *const impulse = take<double>(memory, 3 * (size_t)contacts),
+                  *const kept = take<double>(memory, 3 * (size_t)contacts + (size_t)s->rows);
+    ncp_law *const laws = take<ncp_law>(memory, (size_t)(contacts + s->bounded));
     if (memory->full) return false;
+    put(s->contacts, contacts);
+    put(s->contact, contact);
+    put(s->impulse, impulse);
+    put(s->kept, kept);
+    put(s->law, laws);
     each(s->bodies, [&](int32_t t) {
         const int32_t slot = s->first_slot + t;
         int32_t k = s->at[t];
@@ -331,16 +343,16 @@ static __device__ __noinline__ bool make_contacts(const cuda_view &v, ncp_island
             const int32_t code = v.graph.incident[at];
             if (!speaks(v, code)) continue;
             for (int32_t point = 0; point < v.raw.pairs[code / 2].count; ++point, ++k)
-                s->contact[k].pair = code / 2, s->contact[k].point = point; /* of the pair, for now */
+                contact[k].pair = code / 2, contact[k].point = point; /* of the pair, for now */
         }
     });
-    __syncthreads();
-    each(s->contacts, [&](int32_t k) {
-        ncp_law *law = &s->law[k];
-        make_contact(v, *s, s->contact[k].pair, s->contact[k].point, &s->contact[k], law, s->impulse + 3 * k, after);
+    ncp_barrier();
+    each(contacts, [&](int32_t k) {
+        ncp_law *law = &laws[k];
+        make_contact(v, *s, contact[k].pair, contact[k].point, &contact[k], law, impulse + 3 * k, after);
         law->first = 3 * k, law->count = 3, law->of = k;
     });
-    __syncthreads();
+    ncp_barrier();
     return true;
 }
 

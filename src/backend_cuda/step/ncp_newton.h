@@ -10,7 +10,7 @@
 
 /* What is added to the diagonal of a step's matrix, whose entries are shares of a law's own response: `share` of the
  * natural map, by the size of velocities, within bounds (core/solve/ncp_newton.c). */
-enum { NCP_FROM_START = 20, NCP_FROM_INSIDE = 100, NCP_IN_TURN = 50 };
+enum { NCP_FROM_START = 20, NCP_FROM_INSIDE = 100, NCP_IN_TURN = 50, NCP_OF_WARP = 8 /* the first of these */ };
 struct ncp_damping {
     double share, least, most;
 };
@@ -21,12 +21,12 @@ struct ncp_damping {
 enum { NCP_LEAST_STEPS = 8 };
 static __device__ __forceinline__ double elimination_of(int32_t numbers)
 {
-    return (double)numbers * numbers * numbers / 2 / blockDim.x;
+    return (double)numbers * numbers * numbers / 2 / ncp_threads();
 }
-static __device__ __forceinline__ bool affords(ncp_island *s, double multiplications)
+static __device__ __forceinline__ bool affords(double *budget, double multiplications)
 {
-    s->budget -= multiplications;
-    return s->budget >= 0;
+    *budget -= multiplications;
+    return *budget >= 0;
 }
 
 /* Pi(y) of a law, and its derivative (core/solve/ncp_dense.c). */
@@ -114,7 +114,7 @@ static __device__ __noinline__ int32_t sort_numbers(const ncp_island &s, ncp_sha
             if (!s.pivot[n]) sum += s.G[r * s.stride + n] * s.step[n];
         s.moved[r] = sum;
     });
-    __syncthreads();
+    ncp_barrier();
     return count;
 }
 
@@ -146,9 +146,9 @@ static __device__ __forceinline__ void choose_pivot(const ncp_island &s, int32_t
                                                     ncp_shared *shared)
 {
     const unsigned rows = (1u << NCP_ROW_BITS) - 1;
-    if (threadIdx.x >= WARP) return;
+    if (ncp_thread() >= WARP) return;
     unsigned key = 0;
-    for (int32_t i = (int32_t)threadIdx.x; i < count; i += WARP) {
+    for (int32_t i = ncp_thread(); i < count; i += WARP) {
         const double entry = fabs(s.M[i * stride + k]);
         const unsigned size = (unsigned)((unsigned long long)__double_as_longlong(entry) >> 32) & ~rows,
                        own = size | (rows - (unsigned)i);
@@ -159,7 +159,7 @@ static __device__ __forceinline__ void choose_pivot(const ncp_island &s, int32_t
         const unsigned other = __shfl_xor_sync((unsigned)ALL_LANES, key, o);
         key = other > key ? other : key;
     }
-    if (threadIdx.x == 0) {
+    if (ncp_thread() == 0) {
         const int32_t row = key == 0 ? -1 : (int32_t)(rows - (key & rows));
         shared->pivot = row;
         if (row >= 0) s.pivot[row] = k;
@@ -174,35 +174,35 @@ static __device__ __noinline__ bool solve_step(const ncp_island &s, int32_t coun
 {
     const int32_t stride = stride_of(count);
     each(count, [&](int32_t i) { s.pivot[i] = -1; });
-    __syncthreads();
+    ncp_barrier();
 #pragma unroll 1
     for (int32_t k = 0; k < count; ++k) {
         choose_pivot(s, count, stride, k, shared);
-        __syncthreads();
+        ncp_barrier();
         const int32_t p = shared->pivot;
         if (p < 0) return false;
         const double inverse = 1 / s.M[p * stride + k];
         each_entry(count, count - k, [&](int32_t i, int32_t c) {
             if (i != p) s.M[i * stride + k + 1 + c] -= s.M[i * stride + k] * inverse * s.M[p * stride + k + 1 + c];
         });
-        __syncthreads();
+        ncp_barrier();
     }
     each(count, [&](int32_t i) {
         const int32_t k = s.pivot[i];
         s.step[s.list[k]] = s.M[i * stride + count] / s.M[i * stride + k];
     });
-    __syncthreads();
+    ncp_barrier();
     return true;
 }
 
-static __device__ __noinline__ bool take_step(ncp_island *island, double proximal, ncp_shared *shared)
+/* budget: multiplications of a thread that are left. */
+static __device__ __noinline__ bool take_step(const ncp_island &s, double proximal, double *budget, ncp_shared *shared)
 {
-    const ncp_island &s = *island;
     const int32_t count = sort_numbers(s, shared), stride = stride_of(count);
-    if (!affords(island, elimination_of(count))) return false;
+    if (!affords(budget, elimination_of(count))) return false;
     each_entry(count, count + 1,
                [&](int32_t i, int32_t c) { s.M[i * stride + c] = step_entry(s, count, i, c, proximal); });
-    __syncthreads();
+    ncp_barrier();
     if (!solve_step(s, count, shared)) return false;
     each(s.numbers, [&](int32_t r) {
         double sum = 0;
@@ -210,7 +210,7 @@ static __device__ __noinline__ bool take_step(ncp_island *island, double proxima
         s.u[r] += sum;
         s.lambda[r] += s.step[r];
     });
-    __syncthreads();
+    ncp_barrier();
     return true;
 }
 
@@ -220,23 +220,27 @@ static __device__ __forceinline__ void keep_best(const ncp_island &s)
         s.best_lambda[n] = s.lambda[n];
         s.best_u[n] = s.u[n];
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* Full steps: on the way to the right pieces of laws the map may grow. lambda, u: the best there was; returns its
- * map. */
-static __device__ __noinline__ double take_steps(ncp_island *island, int steps, ncp_shared *shared)
+ * map. *ended: no more steps would be made, if there were some left. */
+static __device__ __noinline__ double take_steps(const ncp_island &s, int steps, double *budget, ncp_shared *shared,
+                                                 bool *ended)
 {
-    const ncp_island &s = *island;
     const ncp_damping damping[2] = {{100, 1e-8, 1e-5}, {1, 1e-10, 1e-3}};
     const double size = size_of(s, shared);
     double map = look_at_laws(s, shared), best = map;
     keep_best(s);
+    int step = 0;
 #pragma unroll 1
-    for (int step = 0; step < steps && best > NCP_AIM && map < INFINITY; ++step) {
+    for (; step < steps && best > NCP_AIM && map < INFINITY; ++step) {
         const double last = best;
         const ncp_damping &by = damping[step / NCP_IN_TURN % 2];
-        if (!take_step(island, fmin(by.most, fmax(by.least, by.share * map / size)), shared)) break;
+        if (!take_step(s, fmin(by.most, fmax(by.least, by.share * map / size)), budget, shared)) {
+            if (*budget < 0) step = steps;
+            break;
+        }
         map = look_at_laws(s, shared);
         if (map < best) keep_best(s);
         best = fmin(best, map);
@@ -246,7 +250,8 @@ static __device__ __noinline__ double take_steps(ncp_island *island, int steps, 
         s.lambda[n] = s.best_lambda[n];
         s.u[n] = s.best_u[n];
     });
-    __syncthreads();
+    ncp_barrier();
+    *ended = step < steps;
     return best;
 }
 

@@ -8,9 +8,9 @@
 #include "core/base/memory.h"
 #include "core/solve/articulation_order.h"
 
-/* Memory of all blocks at most, and of one: large ones have as much however many there are. */
+/* Memory of all islands at a time at most, and of one: by blocks these have as much however many there are. */
 #define NCP_MEMORY ((size_t)512 << 20)
-#define NCP_BLOCK_MEMORY ((size_t)1900 << 10)
+#define NCP_ISLAND_MEMORY ((size_t)1900 << 10)
 
 /* In BUFFER_NCP, in this order: what the host gives; then what is the device's own. */
 struct ncp_arrays {
@@ -185,9 +185,10 @@ sadmm_status CUDA(reserve_ncp)(struct sadmm_context *c, struct sadmm_error *erro
     size_t most = 0;
     for (int large = 0; large < 2; ++large) {
         struct ncp_block_memory *blocks = &s->ncp_blocks[large];
-        blocks->count = std::min(s->bodies, (large ? (int)NCP_LARGE_EACH : (int)NCP_SMALL_EACH) * c->multiprocessors);
-        blocks->bytes = std::min(NCP_BLOCK_MEMORY, NCP_MEMORY / (size_t)blocks->count / 16 * 16);
-        if (large || !has_large_ncp_blocks(c)) most = std::max(most, (size_t)blocks->count * blocks->bytes);
+        blocks->count = large ? std::min(s->bodies, (int)NCP_LARGE_EACH * c->multiprocessors) : c->multiprocessors;
+        const size_t islands = (size_t)blocks->count * (large ? 1 : (size_t)NCP_WARPS); /* at a time */
+        blocks->bytes = std::min(NCP_ISLAND_MEMORY, NCP_MEMORY / islands / 16 * 16);
+        if (large || !has_large_ncp_blocks(c)) most = std::max(most, islands * blocks->bytes);
     }
     TRY(CUDA(reserve)(c, BUFFER_NCP_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
     return CUDA(reserve)(c, BUFFER_NCP_MEMORY, most, error);

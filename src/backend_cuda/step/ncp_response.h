@@ -9,23 +9,6 @@
 
 #include "ncp_tree.h"
 
-/* A node that a load has passed: where z and H z are, one behind the other. */
-struct ncp_passed {
-    int32_t node, at;
-};
-
-/* Of a number: nodes of `passed` from first on, ascending, and numbers of `shares` from `at` on. */
-struct ncp_way {
-    int32_t first, count, at, numbers;
-};
-
-struct ncp_ways {
-    ncp_way *way;
-    ncp_passed *passed;
-    double *shares;
-    double (*p)[6]; /* by eight lanes: a load where it is on its way */
-};
-
 static __device__ __forceinline__ int32_t next_node(const ncp_node &node)
 {
     return is_carried(node) ? node.parent : -1;
@@ -74,7 +57,7 @@ static __device__ __forceinline__ void pass_number(const cuda_view &v, const ncp
 {
     int32_t node[2] = {-1, -1}, at = way.first, share = way.at;
     const double *extra = nullptr; /* along the first joint */
-    double load[2] = {0, 0}, *exchange = ways.p[threadIdx.x / LANES];
+    double load[2] = {0, 0}, *exchange = ways.p[ncp_thread() / LANES];
     if (live) {
         begin_nodes(v, s, law, node);
         if (law.count < 3 && s.row[law.of].node >= 0) extra = s.pool + s.row[law.of].along;
@@ -133,11 +116,12 @@ static __device__ __forceinline__ double respond(const ncp_island &s, const ncp_
 }
 
 /* Where the ways of all numbers are. False: there is no room. */
-static __device__ __noinline__ bool lay_ways(const cuda_view &v, const ncp_island &s, ncp_memory *memory,
-                                             ncp_ways *ways, ncp_shared *shared)
+static __device__ __noinline__ bool lay_ways(const cuda_view &v, ncp_island *island, ncp_memory *memory,
+                                             ncp_shared *shared)
 {
+    const ncp_island &s = *island;
     int32_t *count = (int32_t *)s.list, *first = s.pivot; /* as many as numbers; not in use yet */
-    ways->way = take<ncp_way>(memory, (size_t)s.numbers);
+    ncp_way *const way = take<ncp_way>(memory, (size_t)s.numbers);
     if (memory->full) return false;
     each(s.numbers, [&](int32_t n) {
         int32_t node[2], nodes = 0, numbers = 0;
@@ -147,33 +131,35 @@ static __device__ __noinline__ bool lay_ways(const cuda_view &v, const ncp_islan
             ++nodes;
             numbers += 2 * s.node[at].free;
         });
-        ways->way[n].count = nodes;
-        ways->way[n].numbers = numbers;
+        way[n].count = nodes;
+        way[n].numbers = numbers;
         count[n] = nodes;
     });
     const int32_t nodes = add_up(s.numbers, count, first, &shared->count);
     each(s.numbers, [&](int32_t n) {
-        ways->way[n].first = first[n];
-        count[n] = ways->way[n].numbers;
+        way[n].first = first[n];
+        count[n] = way[n].numbers;
     });
     const int32_t numbers = add_up(s.numbers, count, first, &shared->count);
-    each(s.numbers, [&](int32_t n) { ways->way[n].at = first[n]; });
-    ways->passed = take<ncp_passed>(memory, (size_t)nodes);
-    ways->shares = take<double>(memory, (size_t)numbers);
-    ways->p = (double(*)[6])take<double>(memory, 6 * (size_t)blockDim.x / LANES);
-    __syncthreads();
+    each(s.numbers, [&](int32_t n) { way[n].at = first[n]; });
+    ncp_passed *const passed = take<ncp_passed>(memory, (size_t)nodes);
+    double *const shares = take<double>(memory, (size_t)numbers);
+    put(island->ways,
+        ncp_ways{way, passed, shares, (double(*)[6])take<double>(memory, 6 * (size_t)ncp_threads() / LANES)});
+    ncp_barrier();
     return !memory->full;
 }
 
 /* G. regularisation: of contacts, a share of their response. */
-static __device__ __noinline__ void find_responses(const cuda_view &v, const ncp_island &s, const ncp_ways &ways)
+static __device__ __noinline__ void find_responses(const cuda_view &v, const ncp_island &s)
 {
+    const ncp_ways &ways = s.ways;
     each_eight(s.numbers, [&](int32_t n, int c) {
         int k;
         const int32_t number = n < 0 ? 0 : n, law = law_of(s, number, &k);
         pass_number(v, s, s.law[law], k, ways, ways.way[number], c < 6 ? c : 0, n >= 0 && c < 6);
     });
-    __syncthreads();
+    ncp_barrier();
     each_entry(s.numbers, s.numbers, [&](int32_t r, int32_t c) {
         if (r > c) return;
         const double G = respond(s, ways, r, c);
@@ -182,7 +168,7 @@ static __device__ __noinline__ void find_responses(const cuda_view &v, const ncp
         s.G[r * s.stride + c] = row.gain * G + (r == c ? row.compliance : 0);
         if (r != c) s.G[c * s.stride + r] = column.gain * G;
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 #endif

@@ -46,44 +46,47 @@ static __device__ __noinline__ bool number_rows(ncp_island *s, ncp_shared *share
 {
     const int32_t before = s->laws;
     if (s->bounded == 0) return false;
-    if (threadIdx.x < WARP) {
+    if (ncp_thread() < WARP) {
         int32_t laws = before;
         for (int32_t first = 0; first < s->bounded; first += WARP) {
-            const int32_t i = first + (int32_t)threadIdx.x, r = i < s->bounded ? s->bounded_row[i] : -1;
+            const int32_t i = first + ncp_thread(), r = i < s->bounded ? s->bounded_row[i] : -1;
             const bool asks = r >= 0 && asks_for_number(s->row[r]);
             const unsigned lanes = __ballot_sync((unsigned)ALL_LANES, asks);
             if (asks) {
                 ncp_row *row = &s->row[r];
-                const int32_t law = laws + __popc(lanes & ((1u << threadIdx.x) - 1));
+                const int32_t law = laws + __popc(lanes & ((1u << ncp_thread()) - 1));
                 row->number = law + 2 * s->contacts;
                 s->law[law] = {row->number, 1, r, row->response, 0, row->lo, row->hi, row->gain, row->compliance};
             }
             laws += __popc(lanes);
         }
-        if (threadIdx.x == 0) shared->count = laws;
+        if (ncp_thread() == 0) shared->count = laws;
     }
-    __syncthreads();
-    s->laws = shared->count;
-    s->numbers = 2 * s->contacts + s->laws;
-    __syncthreads();
-    return s->laws > before;
+    ncp_barrier();
+    const int32_t laws = shared->count;
+    put(s->laws, laws);
+    put(s->numbers, 2 * s->contacts + laws);
+    ncp_barrier();
+    return laws > before;
 }
 
-/* Memory of the dense problem. */
+/* Memory of the dense problem. Every thread has read what it had before. */
 static __device__ bool take_numbers(ncp_island *s, ncp_memory *memory)
 {
     const size_t n = (size_t)s->numbers;
-    s->lambda = take<double>(memory, n);
-    s->u = take<double>(memory, n);
-    s->step = take<double>(memory, n);
-    s->moved = take<double>(memory, n);
-    s->best_lambda = take<double>(memory, n);
-    s->best_u = take<double>(memory, n);
-    s->D = take<double>(memory, 9 * (size_t)s->laws);
-    s->list = take<int32_t>(memory, n);
-    s->pivot = take<int32_t>(memory, n);
-    s->stride = s->numbers | 1;
-    s->G = take<double>(memory, n * (size_t)s->stride);
+    const int32_t stride = s->numbers | 1;
+    put(s->lambda, take<double>(memory, n));
+    put(s->u, take<double>(memory, n));
+    put(s->step, take<double>(memory, n));
+    put(s->moved, take<double>(memory, n));
+    put(s->best_lambda, take<double>(memory, n));
+    put(s->best_u, take<double>(memory, n));
+    put(s->D, take<double>(memory, 9 * (size_t)s->laws));
+    put(s->list, take<int32_t>(memory, n));
+    put(s->pivot, take<int32_t>(memory, n));
+    put(s->stride, stride);
+    put(s->G, take<double>(memory, n * (size_t)stride));
+    ncp_barrier();
     return !memory->full;
 }
 
@@ -99,7 +102,7 @@ static __device__ __noinline__ void load_numbers(const ncp_island &s)
         s.lambda[row->number] = row->lambda;
         s.u[row->number] = row->u;
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* Impulses and multipliers are what has been found. */
@@ -109,7 +112,7 @@ static __device__ void store_numbers(const ncp_island &s)
         if (n < 3 * s.contacts) s.impulse[n] = s.lambda[n];
         else s.row[s.law[n - 2 * s.contacts].of].lambda = s.lambda[n];
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* Contacts give by a share of their response. */
@@ -120,7 +123,7 @@ static __device__ void regularise(const ncp_island &s, double share)
         s.G[n * s.stride + n] += more;
         s.u[n] += more * s.lambda[n];
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* That of the contact with the largest load is NCP_REGULARISATION, m/s, by any of them. */
@@ -157,7 +160,7 @@ static __device__ __noinline__ double map_of_all(const ncp_island &s, double sha
 
 /* From where impulses and multipliers are. gives: contacts do. Returns the natural map of what is found. */
 static __device__ __noinline__ double search(const cuda_view &v, ncp_island *s, const ncp_memory &memory, bool gives,
-                                             ncp_shared *shared)
+                                             double *budget, ncp_shared *shared)
 {
     double map = INFINITY, share = NCP_GIVES;
     solve_trees(v, *s);
@@ -168,22 +171,24 @@ static __device__ __noinline__ double search(const cuda_view &v, ncp_island *s, 
         map = map_of_all(*s, gives ? share : 0, shared);
         if (!(map > NCP_ENOUGH / 10) || s->numbers > NCP_NUMBERS || (round > 0 && !more && !(map > NCP_ENOUGH)))
             return map;
-        if (NCP_LEAST_STEPS * elimination_of(s->numbers) > s->budget) return INFINITY;
+        if (NCP_LEAST_STEPS * elimination_of(s->numbers) > *budget) return INFINITY;
         ncp_memory left = memory;
-        ncp_ways ways;
         if (!take_numbers(s, &left)) return INFINITY;
         const ncp_memory before = left;
-        if (!lay_ways(v, *s, &left, &ways, shared)) return INFINITY;
-        find_responses(v, *s, ways);
+        if (!lay_ways(v, s, &left, shared)) return INFINITY;
+        find_responses(v, *s);
         left = before; /* ways are not needed any more */
-        s->M = take<double>(&left, (size_t)s->numbers * (size_t)stride_of(s->numbers));
+        put(s->M, take<double>(&left, (size_t)s->numbers * (size_t)stride_of(s->numbers)));
         if (left.full) return INFINITY;
         load_numbers(*s);
         regularise(*s, share);
-        const double found = take_steps(s, NCP_FROM_START, shared);
+        const int steps = NCP_LEAVES_HARD ? (int)NCP_OF_WARP : (int)NCP_FROM_START;
+        bool ended;
+        const double found = take_steps(*s, steps, budget, shared, &ended);
+        if (NCP_LEAVES_HARD && !(ended && found <= NCP_ENOUGH)) return INFINITY; /* others would go on */
         if (!(found <= NCP_ENOUGH)) {
-            (void)go_inside(s, left, shared);
-            (void)take_steps(s, NCP_FROM_INSIDE, shared);
+            (void)go_inside(*s, left, budget, shared);
+            (void)take_steps(*s, NCP_FROM_INSIDE, budget, shared, &ended);
         }
         store_numbers(*s);
         solve_trees(v, *s);
@@ -199,7 +204,7 @@ static __device__ __noinline__ void forget(ncp_island *s)
         ncp_row *row = &s->row[s->bounded_row[i]];
         row->lambda = articulation_clamp(0, row->lo, row->hi);
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* Twice the energy of the island's motion; what forces alone, and all at the speed of corrections, would give it. */
@@ -218,10 +223,10 @@ static __device__ __noinline__ void find_energies(const cuda_view &v, const ncp_
         node->now.p[1] = node->own.mass * (v3_norm2(moved) + speed * speed) +
                       v3_dot(turn, m3_solve(inertia_of(node->own), turn));
     });
-    __syncthreads();
+    ncp_barrier();
     *now = *expected = 0;
     for (int32_t n = 0; n < s.bodies; ++n) *now += s.node[n].now.p[0], *expected += s.node[n].now.p[1];
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* A solution is kept, or is that again. */
@@ -229,13 +234,13 @@ static __device__ __noinline__ void keep_solution(const ncp_island &s)
 {
     each(3 * s.contacts, [&](int32_t n) { s.kept[n] = s.impulse[n]; });
     each(s.rows, [&](int32_t r) { s.kept[3 * s.contacts + r] = s.row[r].lambda; });
-    __syncthreads();
+    ncp_barrier();
 }
 static __device__ __noinline__ void take_kept(const cuda_view &v, const ncp_island &s)
 {
     each(3 * s.contacts, [&](int32_t n) { s.impulse[n] = s.kept[n]; });
     each(s.rows, [&](int32_t r) { s.row[r].lambda = s.kept[3 * s.contacts + r]; });
-    __syncthreads();
+    ncp_barrier();
     solve_trees(v, s);
 }
 
@@ -256,19 +261,23 @@ static __device__ __noinline__ bool is_enough(const cuda_view &v, const ncp_isla
 /* Is it solved? By impulses, multipliers and velocities as they are then. A solution of much energy, as drives may ask
  * for, stays where contacts that give do not have less than half of it. */
 static __device__ __noinline__ bool search_all(const cuda_view &v, ncp_island *s, const ncp_memory &memory,
-                                               ncp_shared *shared)
+                                               double *budget, ncp_shared *shared)
 {
     double energy, expected, given;
-    const bool solved = is_enough(v, *s, search(v, s, memory, false, shared));
-    s->missed = false;
+    const double map = search(v, s, memory, false, budget, shared);
+    if (NCP_LEAVES_HARD && !(map < INFINITY)) return false;
+    const bool solved = is_enough(v, *s, map);
+    put(s->missed, false);
     find_energies(v, *s, &energy, &expected);
     if (solved && energy <= NCP_MOST_ENERGY * expected) return true;
     keep_solution(*s);
     forget(s);
-    const bool gives = is_enough(v, *s, search(v, s, memory, true, shared));
+    const double map_of_given = search(v, s, memory, true, budget, shared);
+    if (NCP_LEAVES_HARD && !(map_of_given < INFINITY)) return false;
+    const bool gives = is_enough(v, *s, map_of_given);
     find_energies(v, *s, &given, &expected);
     if (gives && !(solved && given > energy / 2)) {
-        s->missed = !(map_of_all(*s, 0, shared) <= v.model.settings->tolerance);
+        put(s->missed, !(map_of_all(*s, 0, shared) <= v.model.settings->tolerance));
         return true;
     }
     if (solved) take_kept(v, *s);

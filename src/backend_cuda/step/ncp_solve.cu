@@ -5,113 +5,9 @@
 #include "backend_cuda/device/double.h"
 
 #include "backend_cuda/device/plan_check.h"
-#include "core/model/push_law.h"
 #include "anchors.h"
-#include "assemble_again.h"
-#include "ncp_search.h"
+#include "ncp_bodies.h"
 #include "world.h"
-
-/* Are all islands left to the iterations? Where some are seen from their supports, or are pushed apart. */
-static __device__ __forceinline__ bool is_left(const cuda_view &v)
-{
-    return v.model.live->abort_code || is_supported(v) || (v.push.planned && v.push.due[PUSH_DUE]);
-}
-
-/* ---- islands ----------------------------------------------------------------------------------------------------- */
-
-static __device__ __noinline__ void store_island(const cuda_view &v, const ncp_island &s)
-{
-    each(s.bodies * LANES, [&](int32_t t) {
-        if (t % LANES < 6)
-            v.joints.velocity[6 * (size_t)s.node[t / LANES].body + (size_t)(t % LANES)] =
-                s.node[t / LANES].velocity[t % LANES];
-    });
-    each(s.contacts, [&](int32_t i) {
-        const ncp_contact *c = &s.contact[i];
-        for (int k = 0; k < 3; ++k)
-            v.ncp.impulse[3 * (size_t)c->point + (size_t)k] = c->frame[k] * s.impulse[3 * i] +
-                                                              c->frame[3 + k] * s.impulse[3 * i + 1] +
-                                                              c->frame[6 + k] * s.impulse[3 * i + 2];
-    });
-    store_rows(v, s);
-    __syncthreads();
-}
-
-/* Does any body have another inertia by the forces that have been found? */
-static __device__ __noinline__ bool stiffen_island(const cuda_view &v, const ncp_island &s, ncp_shared *shared)
-{
-    bool any = false;
-    each(s.bodies, [&](int32_t n) {
-        const int32_t body = s.node[n].body;
-        if (v.ncp.part_of[body] < 0 || !stiffen_body(v, body, true)) return;
-        assemble_again(v, body);
-        s.node[n].own = v.joints.bodies[body];
-        any = true;
-    });
-    return any_of(any, shared);
-}
-
-static __device__ bool solve_island(const cuda_view &v, ncp_island *s, ncp_memory memory, bool after,
-                                    ncp_shared *shared)
-{
-    if (!make_nodes(v, s, &memory, shared)) return false;
-    if (!make_rows(v, s, &memory, after, shared)) return false;
-    if (!make_contacts(v, s, &memory, after, shared)) return false;
-#pragma unroll 1
-    for (int turn = 0; turn < 2; ++turn) {
-        s->laws = s->contacts;
-        s->numbers = 3 * s->contacts;
-        each(s->rows, [&](int32_t r) { s->row[r].number = -1; });
-        factor_trees(*s);
-        if (!search_all(v, s, memory, shared)) return false;
-        store_island(v, *s);
-        if (after || turn > 0 || !stiffen_island(v, *s, shared)) break;
-    }
-    return true;
-}
-
-/* Blocks take islands in turn. args.count: after the iterations; args.left: enum cuda_ncp_pass. What an island takes at
- * most is by its threads: with large blocks it is solved, or not, whether a small one has tried or not. */
-template <int BLOCK, int EACH>
-static __global__ void __launch_bounds__(BLOCK, EACH)
-    ncp_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
-{
-    CUDA_DYNAMIC_SHARED(dynamic);
-    ncp_shared *shared = (ncp_shared *)dynamic;
-    pdl_wait();
-    if (is_left(v)) {
-        if (blockIdx.x == 0 && threadIdx.x == 0) *v.ncp.unsolved = 1;
-        return;
-    }
-    const bool of_left = args.left == NCP_LEFT;
-    const int32_t islands = of_left ? *v.ncp.left_count : *v.ncp.count,
-                  *const list = of_left ? v.ncp.left : v.ncp.islands;
-#pragma unroll 1
-    for (int32_t k = (int32_t)blockIdx.x; k < islands; k += (int32_t)gridDim.x) {
-        ncp_island s;
-        ncp_memory memory;
-        char *far = v.ncp.memory + (size_t)blockIdx.x * args.memory;
-        s.label = list[k];
-        s.budget = NCP_BUDGET;
-        if (args.count && v.ncp.solved[s.label]) continue;
-        s.first_slot = v.graph.slot_of[s.label];
-        s.bodies = v.graph.island_bodies[s.label];
-        memory.at = (char *)(shared + 1);
-        memory.end = (char *)dynamic + args.cluster;
-        memory.far_at = far;
-        memory.far_end = far + args.memory;
-        memory.full = false;
-        const bool solved = solve_island(v, &s, memory, args.count != 0, shared);
-        __syncthreads();
-        if (threadIdx.x > 0) continue;
-        v.ncp.solved[s.label] = solved;
-        if (!solved && args.left == NCP_LEAVES) v.ncp.left[atomicAdd(v.ncp.left_count, 1)] = s.label;
-        else if (!solved) *v.ncp.unsolved = 1;
-        if (solved && s.missed) atomicAdd(v.ncp.missed, 1);
-        if (solved && !s.missed && args.checks > 0 && v.islands.info[s.label].stopped == 0) /* a check has counted it */
-            atomicAdd(&v.islands.stop->unmet[args.checks % CHECKS_KEPT], -1);
-    }
-}
 
 /* Islands that there are, in no order. Bodies that nothing touches are by themselves. */
 static __global__ void begin_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -121,7 +17,7 @@ static __global__ void begin_kernel(const __grid_constant__ cuda_view v, const _
     if (i >= v.model.bodies || v.model.live->abort_code) return;
     const int32_t slot = v.graph.slot_of[i];
     const bool touched = v.graph.offsets[slot] < v.graph.offsets[slot + 1];
-    v.ncp.solved[i] = !touched && !is_left(v);
+    v.ncp.solved[i] = !touched && !ncp_is_left(v);
     if (!touched) {
         const struct cuda_articulation_body body = v.joints.bodies[i];
         const vec3 turn = m3_solve(inertia_of(body), v3_load(body.b + 3));
@@ -213,13 +109,10 @@ static __global__ void check_kernel(const __grid_constant__ cuda_view v, const _
 
 /* ---- launches ---------------------------------------------------------------------------------------------------- */
 
-static cuda_kernel ncp_kernel_of(bool large)
-{
-    return large ? ncp_kernel<NCP_LARGE_BLOCK, 1> : ncp_kernel<NCP_SMALL_BLOCK, NCP_SMALL_EACH>;
-}
+static cuda_kernel ncp_kernel_of(bool large) { return large ? CUDA(ncp_block_kernel)() : CUDA(ncp_warp_kernel)(); }
 static int ncp_shared_of(bool large, int shared_limit)
 {
-    return std::min(large ? (int)NCP_LARGE_SHARED : (int)NCP_SMALL_SHARED, shared_limit);
+    return std::min(large ? (int)NCP_LARGE_SHARED : (int)NCP_WARPS_SHARED, shared_limit);
 }
 
 static sadmm_status launch_pass(struct sadmm_context *c, bool large, enum cuda_ncp_pass pass, bool after,
@@ -234,7 +127,7 @@ static sadmm_status launch_pass(struct sadmm_context *c, bool large, enum cuda_n
     args.memory = c->step->ncp_blocks[large].bytes;
     blocks.parts = c->step->ncp_blocks[large].count;
     blocks.cluster = 1;
-    blocks.threads = large ? (int)NCP_LARGE_BLOCK : (int)NCP_SMALL_BLOCK;
+    blocks.threads = large ? (int)NCP_LARGE_BLOCK : (int)NCP_WARPS * (int)WARP;
     blocks.shared = (size_t)args.cluster;
     return CUDA(launch_partition)(c, ncp_kernel_of(large), "dense contact solve", &blocks, &args, error);
 }

@@ -333,7 +333,7 @@ static __device__ __noinline__ void solve_trees(const cuda_view &v, const ncp_is
     each_eight(s.bodies, [&](int32_t n, int k) {
         if (n >= 0 && k < 6) s.node[n].now.load[k] = outer_load(v, s, n, k);
     });
-    __syncthreads();
+    ncp_barrier();
 #pragma unroll 1
     for (int32_t level = s.levels - 1; level >= 0; --level)
         each_node(s, level, [&](ncp_node *node, int k, bool live) { pass_down(s, node, k, live); });
@@ -344,7 +344,7 @@ static __device__ __noinline__ void solve_trees(const cuda_view &v, const ncp_is
         ncp_row *row = &s.row[s.bounded_row[i]];
         row->u = law_rate(v, s, *row) + row->compliance * row->lambda;
     });
-    __syncthreads();
+    ncp_barrier();
 }
 
 /* What a joint does to its body is what its motion and loads say; less what its other rows do, that is its locks'. */
@@ -396,7 +396,7 @@ static __device__ __noinline__ void store_rows(const cuda_view &v, const ncp_isl
         ncp_row *row = &s.row[r];
         if (row->role == NCP_SOFT) row->lambda = -law_rate(v, s, *row) / row->compliance;
     });
-    __syncthreads();
+    ncp_barrier();
 #pragma unroll 1
     for (int32_t level = s.levels - 1; level >= 0; --level)
         each_node(s, level, [&](ncp_node *node, int k, bool live) { store_locks(v, s, node, k, live); });

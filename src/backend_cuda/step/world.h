@@ -79,7 +79,7 @@ struct cuda_step {
         backoff; /* steps that could have been so since one could not; that it takes for it to be tried */
 
     bool ncp_trees;             /* some of them are trees (ncp_plan.cu); */
-    struct ncp_block_memory ncp_blocks[2]; /* that solve islands: small ones, large ones */
+    struct ncp_block_memory ncp_blocks[2]; /* that solve islands: by their warps, by themselves */
     bool unsolved;              /* planned: some islands are not solved before the iterations, which are made; */
     int32_t solved, solved_backoff; /* steps since one was; that it takes until it is planned that all are */
 
@@ -145,11 +145,13 @@ static inline bool takes_hits(const struct sadmm_context *c) { return c->step->h
 /* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
 static inline bool stop_rule_checked(const struct sadmm_context *c) { return c->fast && c->settings.tolerance > 0; }
 
-/* Blocks of the dense contact solve: large ones of few islands; where there are more mechanisms than such blocks, a
- * warp each, many side by side. Threads; blocks on a multiprocessor; bytes of their own memory: so many fit there.
- * Islands without joints are small work: of so many bodies a mechanism large blocks are still as fast. */
+/* The dense contact solve: an island by each block, where there are few; where there are more mechanisms than such
+ * blocks, by each warp of a block, one a multiprocessor. Threads, or warps; blocks on a multiprocessor; bytes of their
+ * memory there. Islands without joints are small work: of so many bodies a mechanism such blocks are still as fast. */
 enum { NCP_LARGE_BLOCK = 256, NCP_LARGE_EACH = 2, NCP_LARGE_SHARED = 104 * 1024, NCP_LARGE_BODIES = 16 };
-enum { NCP_SMALL_BLOCK = 32, NCP_SMALL_EACH = 16, NCP_SMALL_SHARED = 13 * 1024 };
+enum { NCP_WARPS = 16, NCP_WARPS_SHARED = 216 * 1024 };
+cuda_kernel CUDA(ncp_block_kernel)(void); /* ncp_block.cu */
+cuda_kernel CUDA(ncp_warp_kernel)(void);  /* ncp_warp.cu */
 static inline bool has_large_ncp_blocks(const struct sadmm_context *c)
 {
     const int32_t blocks = NCP_LARGE_EACH * c->multiprocessors;
