@@ -195,10 +195,11 @@ START_TEST(thousands_are_as_one)
     use_device(origin, _i, 0);
     sadmm_environments *all = replicate(origin, MANY), *one = replicate(origin, 1);
     const struct view states = view_of(all, SADMM_ARRAY_BODY_STATE), state = view_of(one, SADMM_ARRAY_BODY_STATE);
-    const size_t n = numbers_of(all, SADMM_ARRAY_BODY_STATE);
+    const size_t n = numbers_of(all, SADMM_ARRAY_BODY_STATE), without = sadmm_environments_memory(all);
     for (int step = 0; step < STEPS; ++step) {
         MUST_ALL(all, sadmm_environments_step(all, 1));
         MUST_ALL(one, sadmm_environments_step(one, 1));
+        ck_assert_uint_gt(sadmm_environments_memory(all), without + 2 * n * sizeof(double)); /* both states, at least */
         const double *of_all = look(all, &states), *of_one = look(one, &state);
         for (int32_t e = 0; e < MANY; ++e) expect_same(of_all + n * (size_t)e, of_one, n, "step", e, step);
     }

@@ -46,7 +46,7 @@ SADMM_API void sadmm_environments_destroy(sadmm_environments *environments); /* 
 SADMM_API const char *sadmm_environments_message(const sadmm_environments *environments);
 SADMM_API int32_t sadmm_environments_count(const sadmm_environments *environments); /* of NULL: 0 */
 /* Bytes of all that is stored, over the number of environments: states, those that are kept, arrays, contacts that are
- * recorded; without the world that they are in on CUDA. Of NULL: 0. */
+ * recorded; on CUDA also the device's memory of the world that they are in, once it has made a step. Of NULL: 0. */
 SADMM_API size_t sadmm_environments_memory(const sadmm_environments *environments);
 
 /* `steps` time steps, >= 1, of settings.dt each, in every environment that is not marked. Input arrays are read once,

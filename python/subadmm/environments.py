@@ -71,7 +71,7 @@ class Environments:
 
     @property
     def memory(self) -> int:
-        """Bytes an environment, states and arrays."""
+        """Bytes an environment: states and arrays; on CUDA with the world that they are in, once it has made a step."""
         return self._core.memory
 
     @property

@@ -90,6 +90,7 @@ sadmm_status COLLISION(put_contacts)(struct sadmm_cuda_collision *collision, voi
                                      const struct cuda_kept_state *const *states,
                                      struct sadmm_cuda_contact_counts *counts, bool *fits, struct sadmm_error *error);
 
+size_t COLLISION(memory)(const struct sadmm_cuda_collision *collision); /* bytes of the device */
 struct sadmm_cuda_collision_stats COLLISION(stats)(const struct sadmm_cuda_collision *collision);
 /* From the next find on. */
 void COLLISION(tune)(struct sadmm_cuda_collision *collision, const struct sadmm_cuda_collision_tuning *tuning);

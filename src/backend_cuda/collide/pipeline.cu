@@ -232,6 +232,13 @@ extern "C" void COLLISION(undo)(struct sadmm_cuda_collision *c)
     c->current = 1 - c->current;
 }
 
+extern "C" size_t COLLISION(memory)(const struct sadmm_cuda_collision *c)
+{
+    size_t bytes = 0;
+    for (int name = 0; name < PINNED_SHAPES; ++name) bytes += c->buffers[name].capacity;
+    return bytes;
+}
+
 extern "C" struct sadmm_cuda_collision_stats COLLISION(stats)(const struct sadmm_cuda_collision *c)
 {
     struct sadmm_cuda_collision_stats stats = c->stats;

@@ -67,6 +67,7 @@ sadmm_status CUDA(read_rows)(struct sadmm_context *, struct sadmm_rows *, double
                              struct sadmm_error *);
 sadmm_status CUDA(allocate)(struct sadmm_context *, size_t bytes, void **out, struct sadmm_error *);
 void CUDA(release)(struct sadmm_context *, void *memory);
+size_t CUDA(memory)(const struct sadmm_context *);
 sadmm_status CUDA(to_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *);
 sadmm_status CUDA(from_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes,
                                 struct sadmm_error *);

@@ -37,6 +37,16 @@ extern "C" void CUDA(release)(struct sadmm_context *c, void *memory)
     (void)cudaGetLastError();
 }
 
+extern "C" size_t CUDA(memory)(const struct sadmm_context *c)
+{
+    size_t bytes = 0;
+    for (const cuda_buffer &buffer : c->buffers) bytes += buffer.pinned ? 0 : buffer.capacity;
+    if (!c->step) return bytes;
+    if (c->step->collision) bytes += COLLISION(memory)(c->step->collision);
+    if (c->step->push) bytes += CUDA(memory)(c->step->push);
+    return bytes;
+}
+
 /* Whatever may be at work on what the host reads or writes has ended. */
 static cudaError_t wait_for_all(void)
 {

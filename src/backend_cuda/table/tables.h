@@ -41,6 +41,7 @@
             .read_rows = sadmm_cuda_read_rows##suffix,         \
             .allocate = sadmm_cuda_allocate##suffix,           \
             .release = sadmm_cuda_release##suffix,             \
+            .memory = sadmm_cuda_memory##suffix,               \
             .to_backend = sadmm_cuda_to_backend##suffix,       \
             .from_backend = sadmm_cuda_from_backend##suffix,   \
             .has_array = sadmm_cuda_has_array##suffix,         \

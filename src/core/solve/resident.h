@@ -198,6 +198,7 @@ struct sadmm_resident_kernels {
      * at work there any more. */
     sadmm_status (*allocate)(struct sadmm_context *, size_t bytes, void **out, struct sadmm_error *);
     void (*release)(struct sadmm_context *, void *memory);
+    size_t (*memory)(const struct sadmm_context *); /* bytes of its device for the world, without what is allocated */
     sadmm_status (*to_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *);
     sadmm_status (*from_backend)(struct sadmm_context *, void *to, const void *from, size_t bytes,
                                  struct sadmm_error *);

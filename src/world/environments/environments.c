@@ -203,6 +203,9 @@ size_t sadmm_environments_memory(const sadmm_environments *environments)
         if (bound->given) bytes += count * bound->numbers * sizeof *bound->given;
     }
     if (environments->merged.gravities) bytes += 3 * count * sizeof *environments->merged.gravities;
+    const sadmm_world *merged = environments->merged.world;
+    if (merged && merged->context && merged->kernels->resident)
+        bytes += merged->kernels->resident->memory(merged->context);
     return (bytes + count - 1) / count;
 }
 
