@@ -54,6 +54,16 @@ static const double *look(sadmm_environments *environments, const struct view *v
     return view->host;
 }
 
+static void destroy_both(const struct view *states, const struct view *state, sadmm_environments *all,
+                         sadmm_environments *one, sadmm_world *origin)
+{
+    free(states->host);
+    free(state->host);
+    sadmm_environments_destroy(all);
+    sadmm_environments_destroy(one);
+    sadmm_world_destroy(origin);
+}
+
 static void give(sadmm_environments *environments, const struct view *view)
 {
     sadmm_world *world = environments->merged.world;
@@ -204,11 +214,7 @@ START_TEST(thousands_are_as_one)
         for (int32_t e = 0; e < MANY; ++e) expect_same(of_all + n * (size_t)e, of_one, n, "step", e, step);
     }
     ck_assert(all->merged.world->resident.loaded); /* nothing has gone by way of the host */
-    free(states.host);
-    free(state.host);
-    sadmm_environments_destroy(all);
-    sadmm_environments_destroy(one);
-    sadmm_world_destroy(origin);
+    destroy_both(&states, &state, all, one, origin);
 }
 END_TEST
 
@@ -248,11 +254,7 @@ START_TEST(resets_begin_again)
             expect_same(look(all, &states) + n * (size_t)e, after + n * (size_t)++made[e], n, "step", e, step);
         ck_assert(all->merged.world->resident.loaded); /* nothing has gone by way of the host */
     }
-    free(states.host);
-    free(state.host);
-    sadmm_environments_destroy(all);
-    sadmm_environments_destroy(one);
-    sadmm_world_destroy(origin);
+    destroy_both(&states, &state, all, one, origin);
     free(after);
 }
 END_TEST
@@ -756,11 +758,7 @@ START_TEST(gravity_is_checked)
     sadmm_environments_array none;
     ck_assert_int_eq(sadmm_environments_bind(one, SADMM_ARRAY_GRAVITY, SADMM_F64, &none), SADMM_ERROR_UNAVAILABLE);
     free(start);
-    free(states.host);
-    free(state.host);
-    sadmm_environments_destroy(all);
-    sadmm_environments_destroy(one);
-    sadmm_world_destroy(origin);
+    destroy_both(&states, &state, all, one, origin);
 }
 END_TEST
 

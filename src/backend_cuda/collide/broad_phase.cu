@@ -426,6 +426,13 @@ struct walk_leaves {
     int32_t numbers[WALK_LEAVES][TREE_THREADS];
 };
 
+static __device__ __forceinline__ void test_pair(const collision_view &v, const struct collision_leaf &leaf,
+                                                 const struct collision_leaf &other, double dt, struct batch *out)
+{
+    if (leaves_overlap(leaf, other) & leaves_meet(v, leaf, other, dt))
+        add_pair(v, out, candidate_key(v, leaf, other), candidates_of(v, leaf.subshapes, other.subshapes));
+}
+
 /* The first `count` leaves of this thread's list; the next one is fetched while one is tested. */
 static __device__ void test_leaves(const collision_view &v, const struct collision_leaf &leaf, double dt,
                                    const struct walk_leaves &list, int count, struct batch *out)
@@ -434,8 +441,7 @@ static __device__ void test_leaves(const collision_view &v, const struct collisi
     for (int k = 0; k < count; ++k) {
         const struct collision_leaf other = next;
         if (k + 1 < count) next = v.placed[list.numbers[k + 1][threadIdx.x]];
-        if (leaves_overlap(leaf, other) & leaves_meet(v, leaf, other, dt))
-            add_pair(v, out, candidate_key(v, leaf, other), candidates_of(v, leaf.subshapes, other.subshapes));
+        test_pair(v, leaf, other, dt, out);
     }
 }
 
@@ -498,9 +504,7 @@ static __device__ void find_in_group(const collision_view &v, int32_t at, struct
             next = first_shared;
             continue;
         }
-        const struct collision_leaf other = v.placed[(uint32_t)number];
-        if (leaves_overlap(leaf, other) & leaves_meet(v, leaf, other, dt))
-            add_pair(v, out, candidate_key(v, leaf, other), candidates_of(v, leaf.subshapes, other.subshapes));
+        test_pair(v, leaf, v.placed[(uint32_t)number], dt, out);
         ++next;
     }
 }

@@ -53,7 +53,7 @@ struct sadmm_cuda_hits {
 /* For tests and measurements; 0: the default. */
 struct sadmm_cuda_collision_tuning {
     int32_t tree_from;  /* shapes; below, all pairs are tested */
-    int32_t group_leaves; /* up to so many shapes an environment, its own pairs are tested; < 0: never */
+    int32_t group_leaves; /* up to so many shapes an environment, its own pairs are tested, no tree; < 0: never */
     int32_t by_warp_from; /* shapes; from so many on what is made of them is stored by the warp */
     int64_t radix_from; /* capacity for candidates; below, they are ranked by counting */
     int64_t

@@ -11,8 +11,8 @@
 #include "memory.h"
 #include "pipeline.h"
 
-/* Shapes from which the tree pays, and stores by the warp (fewer wait 1.4 us for them); capacity from which the radix
- * sort does. */
+/* Shapes from which the tree pays, and stores by the warp (fewer wait 1.4 us for them); shapes that a shape of an
+ * environment may meet, up to which it is tested against all of them; capacity from which the radix sort pays. */
 enum { TREE_FROM = 6144, BY_WARP_FROM = 16384, GROUP_LEAVES = 64 };
 static const int64_t RADIX_FROM = 16385;
 

@@ -402,8 +402,8 @@ struct ncp_view {
     int32_t *missed;                    /* how many others have contacts that give by more than the tolerance */
     double *impulse;                    /* points x 3: of solved islands; their velocities and multipliers are in
                                            joint_view */
-    int32_t *left, *left_count;         /* labels of those that small blocks have left to large ones */
-    char *memory;                       /* of blocks */
+    int32_t *left, *left_count;         /* labels of those that warps have left to blocks */
+    char *memory;                       /* of islands at a time */
 };
 
 struct cuda_view {
@@ -506,15 +506,15 @@ struct cuda_args {
     int32_t energy_limit; /* fast; enum cuda_energy_limit */
     int32_t rebounds;   /* fast: islands that start warm are tested for a rebound, too (math/energy_limit.h) */
     int32_t paper;      /* the method: energies are compared, nothing is slowed down */
-    int32_t left;       /* NCP: islands that small blocks have left are solved; or (LEAVES) may be left */
-    size_t memory;      /* NCP: bytes of a block in ncp_view.memory */
+    int32_t left;       /* NCP: islands that warps have left are solved; or (LEAVES) may be left */
+    size_t memory;      /* NCP: bytes of an island in ncp_view.memory */
     int32_t relax;      /* fast, STREAM: bits of enum cuda_relax */
     double factor;
     double row_floor;   /* fast: weight_row_floor */
 };
 
-/* Of the dense contact solve: all islands are solved, or left to the iterations; some are left to large blocks; these
- * are solved. */
+/* Of the dense contact solve: all islands are solved, or left to the iterations; some are left by warps to blocks;
+ * these are solved. */
 enum cuda_ncp_pass { NCP_ALL, NCP_LEAVES, NCP_LEFT };
 
 /* fast: what goes as many times as far as the settings' relaxation says; else once. RELAX_WARM: so of islands that

@@ -44,10 +44,10 @@ static __device__ __forceinline__ int32_t row_in_world(const articulation_view &
 }
 
 /* A part. SMALL: in the block's own memory; else its structure and its work are where they are. */
-template <bool SMALL> static __device__ __forceinline__ articulation_view view_of_part(const cuda_view &v, int32_t k,
-                                                                                       double *memory)
+template <bool SMALL>
+static __device__ __forceinline__ articulation_view view_of_part(const cuda_view &v, int32_t which, double *memory)
 {
-    const struct cuda_articulation_part part = v.joints.parts[k];
+    const struct cuda_articulation_part part = v.joints.parts[which];
     const int32_t *numbers = v.joints.structures + part.first_number;
     if (SMALL) copy(part.numbers, (int32_t *)memory, [&](int32_t k) { return numbers[k]; });
     __syncthreads(); /* flags, too */

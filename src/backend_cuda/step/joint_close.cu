@@ -1,7 +1,7 @@
 /* What is locked, closed at the end of a (sub-)step (core/model/joint_close.h) by the rule of the host
- * (world/step/joint_close.c): a thread block a part, where a loop of it folds or its islands may
- * be opened by more than the order of the step. Bodies get their place where they are moved (move_articulated.h),
- * once their island has paid for it (joint_momentum.cu). */
+ * (world/step/joint_close.c): a thread block a part, where a loop of it folds or its islands may be opened by more than
+ * the order of the step. Bodies get their place where they are moved (move_articulated.h), once their island has paid
+ * for it (joint_momentum.cu). */
 #include <algorithm>
 
 #include "backend_cuda/device/double.h"
@@ -160,8 +160,8 @@ static __device__ __noinline__ void close_one(const cuda_view &v, int32_t k, str
     each(p.s.bodies, [&](int32_t e) { atomicOr(&v.joints.touch[articulation_label(v, p.s.body[e])], ISLAND_CLOSED); });
 }
 
-/* Parts of a block: CLOSE_AT_ONCE are asked by its warps side by side, then those that may open are closed by all of
- * it. args.count: parts. */
+/* Most parts have nothing to close, and are asked by a warp each; those that may open are closed by the whole block.
+ * args.count: parts. */
 template <bool SMALL>
 static __global__ void __launch_bounds__(ARTICULATION_THREADS)
     joint_close_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)

@@ -1,8 +1,8 @@
 /* Momentum and energy of islands with joints (core/model/joint_momentum.h) on the device. A thread block an island,
  * once it is known where its joints let it go: what closing has cost, which it pays; then what each body adds, then
  * sums over the bodies, in the order of the host (world/step/joint_momentum.c). Bodies get what restores it where they
- * are moved (move_articulated.h). Beside them a thread a joint: how far that is off. Where islands are many their parts
- * of this are kernels of their own. */
+ * are moved (move_articulated.h). Beside them a thread a joint: how far that is off. Where islands are many these
+ * are three kernels. */
 #include <algorithm>
 
 #include "backend_cuda/device/double.h"
@@ -159,7 +159,7 @@ static __device__ __forceinline__ void add_bodies(const cuda_view &v, const stru
 static __device__ __noinline__ void find_restoring(const cuda_view &v, int32_t label, int32_t bits)
 {
     joint_restoring(&v.joints.momentum[label], bits, v.model.settings->dt);
-    v.joints.touch[label] = bits | ISLAND_RESTORED;
+    v.joints.touch[label] |= ISLAND_RESTORED;
 }
 
 /* Every thread of the block comes here. */

@@ -2,8 +2,6 @@
 #ifndef SADMM_CUDA_STEP_NCP_BODIES_H
 #define SADMM_CUDA_STEP_NCP_BODIES_H
 
-#include "core/model/push_law.h"
-#include "move.h"
 #include "world.h"
 
 enum {

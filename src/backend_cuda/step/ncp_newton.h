@@ -10,7 +10,7 @@
 
 /* What is added to the diagonal of a step's matrix, whose entries are shares of a law's own response: `share` of the
  * natural map, by the size of velocities, within bounds (core/solve/ncp_newton.c). */
-enum { NCP_FROM_START = 20, NCP_FROM_INSIDE = 100, NCP_IN_TURN = 50, NCP_OF_WARP = 8 /* the first of these */ };
+enum { NCP_FROM_START = 20, NCP_FROM_INSIDE = 100, NCP_IN_TURN = 50 };
 struct ncp_damping {
     double share, least, most;
 };
@@ -18,7 +18,7 @@ struct ncp_damping {
 /* Multiplications that a thread may do for an island in search of its solution: what takes more is iterated, which is
  * cheaper then. Without so many steps a search is not begun. */
 #define NCP_BUDGET 6e4
-enum { NCP_LEAST_STEPS = 8 };
+enum { NCP_LEAST_STEPS = 8 }; /* and so many a warp makes at most */
 static __device__ __forceinline__ double elimination_of(int32_t numbers)
 {
     return (double)numbers * numbers * numbers / 2 / ncp_threads();

@@ -182,7 +182,7 @@ static __device__ __noinline__ double search(const cuda_view &v, ncp_island *s, 
         if (left.full) return INFINITY;
         load_numbers(*s);
         regularise(*s, share);
-        const int steps = NCP_LEAVES_HARD ? (int)NCP_OF_WARP : (int)NCP_FROM_START;
+        const int steps = NCP_LEAVES_HARD ? (int)NCP_LEAST_STEPS : (int)NCP_FROM_START;
         bool ended;
         const double found = take_steps(*s, steps, budget, shared, &ended);
         if (NCP_LEAVES_HARD && !(ended && found <= NCP_ENOUGH)) return INFINITY; /* others would go on */

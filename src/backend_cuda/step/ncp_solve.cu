@@ -5,7 +5,9 @@
 #include "backend_cuda/device/double.h"
 
 #include "backend_cuda/device/plan_check.h"
+#include "core/model/push_law.h"
 #include "anchors.h"
+#include "move.h"
 #include "ncp_bodies.h"
 #include "world.h"
 
